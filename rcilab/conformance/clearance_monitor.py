@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import in_between
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, as_vector
-from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
-
-if TYPE_CHECKING:
-    from rcilab.model.kinematics.collision import LinkPair
-    from rcilab.model.robot_model import RobotModel
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit, LinkPair
+from rcilab.model.robot_model import RobotModel
 
 
 class ClearanceMonitor:

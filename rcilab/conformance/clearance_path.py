@@ -12,15 +12,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointPath, JointVector
-
-if TYPE_CHECKING:
-    from rcilab.model.kinematics.collision import LinkPair
+from rcilab.core.clearance import LinkPair
 
 MOST_TRAVEL = 5e-3  # [m]
 """How far any point of a link may move between two looks, unless the distance found leaves room for more."""

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING
 
 from rcilab.conformance.advice import amount, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
-from rcilab.conformance.report import LISTED, ConditionResult, Report, Violation
+from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
 from rcilab.i18n.units import Units
 
 if TYPE_CHECKING:
+    from rcilab.conformance.report import ConditionResult, Report, Violation
     from rcilab.conformance.time_scaling import SlowDown
+
+LISTED = 8  # Violations in full in a report: a thousand sentences are of no use.
 
 _TIMES = 10.0
 """From this share of a bound on it is told as a factor, not in percent."""
@@ -238,8 +241,6 @@ def explain_limit(source: str, language: Language = "en") -> str:
 
 
 def _link(number: int, voice: _Voice) -> str:
-    from rcilab.model.kinematics.collision import FLOOR, TOOL
-
     key = {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, "link")
     return voice.say(f"place.{key}", number=str(number))
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition
 from rcilab.core.fault import FaultCode
 from rcilab.i18n.translator import Remark
-
-if TYPE_CHECKING:
-    from rcilab.model.kinematics.collision import LinkPair
 
 
 class LimitViolation(NamedTuple):

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from rcilab.conformance.advice import amount, share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
+from rcilab.conformance.explain import LISTED, explain_report, explain_violation
+from rcilab.conformance.html import report_html
 from rcilab.conformance.limit_utilisation import Usage
 from rcilab.conformance.start import StartState
+from rcilab.conformance.time_scaling import SlowDown, find_slow_down
+from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition, Necessity
 from rcilab.core.errors import ConformanceError
 from rcilab.core.fault import FaultCode
+from rcilab.i18n.localized_text import language as notebook_language
+from rcilab.i18n.units import Units
 from rcilab.motion.motion import Motion
-
-if TYPE_CHECKING:
-    from rcilab.conformance.time_scaling import SlowDown
-    from rcilab.i18n.units import Units
-    from rcilab.model.kinematics.collision import LinkPair
-
-LISTED = 8  # Violations printed in full; a thousand sentences help nobody.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -172,8 +170,6 @@ class Violation:
         Raises:
             InvalidValueError: There is no such language.
         """
-        from rcilab.conformance.explain import explain_violation
-
         return explain_violation(self, language, units)
 
     def __repr__(self) -> str:
@@ -300,8 +296,6 @@ class Report:
         Raises:
             InvalidValueError: `at_most` is no number of at least 1.
         """
-        from rcilab.conformance.time_scaling import find_slow_down
-
         return find_slow_down(self, recommended=recommended, at_most=at_most, progress=progress)
 
     @property
@@ -322,8 +316,6 @@ class Report:
         Raises:
             InvalidValueError: There is no such language.
         """
-        from rcilab.conformance.explain import explain_report
-
         return explain_report(self, language, units, slowed)
 
     def __str__(self) -> str:
@@ -345,10 +337,7 @@ class Report:
         return f"<Report {self._verdict()}>"
 
     def _repr_html_(self) -> str:
-        from rcilab.conformance.html import report_html
-        from rcilab.i18n.localized_text import language
-
-        return report_html(self, language())
+        return report_html(self, notebook_language())
 
     def _verdict(self) -> str:
         worst = self.worst

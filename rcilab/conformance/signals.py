@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.clearance_conditions import clearance_conditions
+from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.standstill import beyond_a_cycle
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array
-from rcilab.core.clearance import ClearanceLimit
+from rcilab.core.clearance import ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
 from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
-
-if TYPE_CHECKING:
-    from rcilab.conformance.clearance_path import ClearancePath
-    from rcilab.model.kinematics.collision import LinkPair
 
 HOLD_SAMPLES = 3
 """Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
@@ -82,8 +78,6 @@ class MotionSignals:
         """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
         if not condition.is_clearance:
             return None
-        from rcilab.model.kinematics.collision import LinkPair
-
         return LinkPair(*self._clearance[condition.signal].links[row].tolist())
 
     def _throughout(self, condition: Condition) -> Array:
@@ -133,7 +127,6 @@ class MotionSignals:
     @cached_property
     def _clearance(self) -> dict[str, ClearancePath]:
         """The smallest distance between links, and that from the floor, by signal."""
-        from rcilab.conformance.clearance_path import clearance_path
         from rcilab.model.kinematics.collision import ClearanceQuery
 
         assert self._distance is not None

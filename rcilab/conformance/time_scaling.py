@@ -6,18 +6,21 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from rcilab.conformance.catalogue import Language
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.report import ConditionResult, Report
+from rcilab.conformance.explain import explain_slow_down
 from rcilab.core.arrays import as_number
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.motion.motion import Motion
+
+if TYPE_CHECKING:
+    from rcilab.conformance.report import ConditionResult, Report
 
 AT_MOST = 20.0
 """Largest factor that is tried. A choice: what needs more does not run too fast, it jumps."""
@@ -70,8 +73,6 @@ class SlowDown:
         Raises:
             InvalidValueError: There is no such language.
         """
-        from rcilab.conformance.explain import explain_slow_down
-
         return explain_slow_down(self, language)
 
     def __str__(self) -> str:

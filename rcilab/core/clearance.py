@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from rcilab.core.arrays import as_number
 from rcilab.core.errors import InvalidValueError
@@ -51,3 +52,23 @@ class ClearanceLimit:
 
 STANDARD_DISTANCE = ClearanceLimit()
 """Links that do not touch each other nor a floor at height 0, with 20 mm recommended."""
+
+FLOOR = -1
+"""Stands for the floor where a link's number is expected."""
+TOOL = -2
+"""Stands for the tool where a link's number is expected."""
+
+
+class LinkPair(NamedTuple):
+    """The two links of a distance: 0 is the base, n the last link; or `TOOL`, or `FLOOR`."""
+
+    first: int
+    second: int
+
+    def __str__(self) -> str:
+        return f"{link_name(self.first)} and {link_name(self.second)}"
+
+
+def link_name(number: int) -> str:
+    """Returns a link's name in words by its number; see `LinkPair`."""
+    return {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, f"link {number}")

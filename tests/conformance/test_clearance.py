@@ -14,12 +14,12 @@ from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
 from rcilab.conformance.monitor import JointMonitor
-from rcilab.core.clearance import ClearanceLimit
+from rcilab.core.clearance import FLOOR, ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
-from rcilab.model.kinematics.collision import FLOOR, ClearanceQuery, LinkPair
+from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 from rcilab.robots import ROBOT_NAMES

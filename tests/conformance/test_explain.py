@@ -17,6 +17,7 @@ from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
 from rcilab.conformance.report import Violation
+from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
@@ -26,7 +27,6 @@ from rcilab.makers.franka.conditions import FCI_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
-from rcilab.model.kinematics.collision import LinkPair
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, plan_joint
 from tests.catalogues import require_equal

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from rcilab.conformance.check import check
 from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.limit_violation import faults_of
+from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.motion_monitor import Monitor
 from rcilab.conformance.report import Report
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
@@ -421,6 +423,30 @@ def test_a_joint_monitor_of_a_panda_speaks_its_makers_names():
     }
     assert {breach.condition.id for breach in found if breach.condition.fault is None} == {
         "joint.torque", "joint.torque_rate"}  # fmt: skip
+    assert faults_of(found) == (
+        FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
+        FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
+        FrankaError.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
+    )
+
+
+@pytest.mark.parametrize("name", sorted(MODELS))
+def test_a_monitor_raises_the_faults_of_the_table_that_it_is_given(name):
+    model = MODELS[name]
+    table = condition_table(model.description)
+    rows = [row for row in table.motion if row.stage == "throughout" and row.signal == "joint"]
+    monitor = JointMonitor(model.limits.joint, rows)
+    monitor.reset(model.home.tolist())
+    found = monitor.step((model.home + 9.0).tolist())
+    assert found == monitor.broken()
+    assert faults_of(found) == tuple(sorted({row.fault for row in rows}))
+    assert {type(fault) for fault in faults_of(found)} == {model.description.faults}
+    common = JointMonitor(model.limits.joint)
+    common.reset(model.home.tolist())
+    assert [breach.condition.id for breach in common.step((model.home + 9.0).tolist())] == [
+        breach.condition.id for breach in found
+    ]
+    assert faults_of(common.broken()) == ()
 
 
 @pytest.mark.parametrize("name", sorted(MODELS))

@@ -33,9 +33,8 @@ from rcilab.app.run.readiness import is_moving
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
-from rcilab.core.clearance import ADVISED_DISTANCE
+from rcilab.core.clearance import ADVISED_DISTANCE, link_name
 from rcilab.core.errors import RcilabError
-from rcilab.model.kinematics.collision import link_name
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from math import hypot
-from typing import Any, NamedTuple
+from typing import Any
 
 import coal
 import numpy as np
@@ -22,26 +22,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointPath, JointVector, Vector3, readonly_copy
+from rcilab.core.clearance import FLOOR, TOOL, LinkPair
 from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 
-FLOOR = -1
-"""Stands for the floor where a link's number is expected."""
-TOOL = -2
-"""Stands for the tool where a link's number is expected."""
-
 _SLANT = 0.5  # Axes are along y or z; this is between.
-
-
-class LinkPair(NamedTuple):
-    """Who is near whom: 0 is the base, n the last link; or `TOOL`, or `FLOOR`."""
-
-    first: int
-    second: int
-
-    def __str__(self) -> str:
-        return f"{link_name(self.first)} and {link_name(self.second)}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,11 +47,6 @@ class Clearance:
 
     def _text(self, row: int | tuple[()]) -> str:
         return f"{self.distance[row]:.4g} m between {LinkPair(*self.links[row].tolist())}"
-
-
-def link_name(number: int) -> str:
-    """Returns a link's name in words by its number; see `Clearance.links`."""
-    return {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, f"link {number}")
 
 
 class CollisionGeometry:

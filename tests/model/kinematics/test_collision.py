@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.core.clearance import ClearanceLimit
+from rcilab.core.clearance import FLOOR, TOOL, ClearanceLimit
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.robots import ROBOTS
-from rcilab.model.kinematics.collision import FLOOR, TOOL, ClearanceQuery
+from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.shapes import build_shapes
