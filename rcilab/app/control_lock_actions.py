@@ -8,7 +8,7 @@ from typing import ClassVar
 from rcilab.app.control_lock import SILENCE, ClientHeartbeat
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
 from rcilab.app.text import message
 

@@ -23,8 +23,8 @@ from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.export_actions import Deliver, ExportActions
 from rcilab.app.run.folder_actions import FolderActions
 from rcilab.app.run.mode_actions import ModeActions
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.push_actions import PushActions
-from rcilab.app.run.readiness import is_moving
 from rcilab.app.run.run_actions import RobotCommand, RunActions
 from rcilab.app.run.signal_actions import SignalActions
 from rcilab.app.run.target_robot_actions import TargetRobotActions

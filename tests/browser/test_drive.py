@@ -71,7 +71,7 @@ def test_the_question_about_an_address_goes_when_another_one_is_typed(page):
     page.button("Yes, connect").wait_for()
     box.fill("127.0.0.1:99")
     page.wait(lambda: page.button("Yes, connect").count() == 0, "the question to go")
-    assert page.state.drive.typed_address == ""
+    assert page.state.typed_address == ""
     box.fill("999.1.1.1")
     page.button("Connect").click()
     page.wait(lambda: "999.1.1.1" in page.toast(), "the refusal")

@@ -203,11 +203,11 @@ def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     idle.conductor.ask(SetNetwork(pulled=True))
     wait(lambda: idle.session.status().phase == "lost", "the loss to be noticed")
     idle.conductor.ask(SetNetwork(pulled=False))
-    wait(lambda: not idle.store.state.drive.pulled, "the cable in")
+    wait(lambda: not idle.store.state.world.pulled, "the cable in")
     idle.conductor.ask(SetNetwork(name="loss", value=9.0))
-    wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.loss == 0.3, "the bound of the slider")
+    wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.loss == 0.3, "the bound of the slider")
     idle.conductor.ask(SetNetwork(clear=True))
-    wait(lambda: (w := idle.store.state.drive.world) is not None and w.commands.spares_datagrams, "a good network")
+    wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.spares_datagrams, "a good network")
     idle.conductor.ask(RobotCommand(what="reconnect"))
     wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
     settle(idle)
@@ -217,9 +217,9 @@ def test_the_emergency_stop_has_a_way_out(idle):
     ask = idle.conductor.ask
     ask(PressSafety(button="estop"))
     wait(lambda: idle.session.status().powered is False, "the motors off")
-    wait(lambda: idle.store.state.drive.world.button == "estop", "the button to show")
+    wait(lambda: idle.store.state.world.status.button == "estop", "the button to show")
     ask(PressSafety(button="none"))
-    wait(lambda: idle.store.state.drive.world.button == "none", "the release")
+    wait(lambda: idle.store.state.world.status.button == "none", "the release")
     ask(RobotCommand(what="power_on"))
     wait(lambda: bool(idle.session.status().powered), "the motors on")
     assert idle.session.status().faults == ()
@@ -228,21 +228,21 @@ def test_the_emergency_stop_has_a_way_out(idle):
 def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
     ask = idle.conductor.ask
     ask(ChooseDestination(where="address", address=" rci://127.0.0.1:9 "))
-    wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question")
+    wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question")
     assert idle.store.state.target == "virtual"
     ask(ChooseDestination(where="address", answer="no"))
-    wait(lambda: idle.store.state.drive.typed_address == "", "the end of it")
+    wait(lambda: idle.store.state.typed_address == "", "the end of it")
     ask(ChooseDestination(where="address", address="rci://127.0.0.1:9"))
-    wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
+    wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question again")
     ask(ChooseDestination(where="address", address="999.1.1.1"))
     wait(lambda: told(idle) == "address.bad", "the complaint")
     assert "is not a valid controller address" in Text("en").say(idle.store.state.notice.text)
-    assert idle.store.state.drive.typed_address == "", "the question was about another address"
+    assert idle.store.state.typed_address == "", "the question was about another address"
     ask(ChooseDestination(where="address", address="rci://127.0.0.1:9"))
-    wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
+    wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question again")
     assert told(idle) != "address.bad", "a good address was typed"
     ask(ChooseDestination(where="address", address="rci://127.0.0.1:10", answer="yes"))
-    wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:10", "the question about the other one")
+    wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:10", "the question about the other one")
     assert idle.store.state.target == "virtual", "a yes to one address connects to no other"
     ask(ChooseDestination(where="preview"))
     wait(lambda: idle.session.status().phase == "closed", "nothing connected")

@@ -46,4 +46,4 @@ def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_fie
 
 def test_auto_limit_goes_to_our_own_controller(bench: Workbench) -> None:
     bench.conductor.ask(SetWiring(name="auto_limit", on=True))
-    wait(lambda: bench.store.state.drive.auto_limit, "the switch")
+    wait(lambda: bench.store.state.world.auto_limit, "the switch")

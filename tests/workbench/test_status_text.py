@@ -166,7 +166,7 @@ def test_a_held_motion_has_its_own_word_and_the_cursor_stands_where_it_is_held()
 def test_health_says_how_many_commands_were_lost_in_a_row():
     world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
     state = initial_state()
-    spoiled = replace(state, drive=replace(state.drive, world=world))
+    spoiled = replace(state, world=replace(state.world, status=world))
     assert "<th>Commands lost in a row, at most</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
     assert "<td>—<br>" in health_html(state, status(), Text("en")), "another controller does not tell"
 

@@ -108,7 +108,7 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
 def test_what_a_page_typed_goes_with_its_controls(bench):
     with script(bench) as first, script(bench) as second:
         bench.conductor.ask(ChooseDestination(page=first.page, where="address", address="rci://192.0.2.7:1337"))
-        wait(lambda: bench.store.state.drive.typed_address != "", "the question")
+        wait(lambda: bench.store.state.typed_address != "", "the question")
         address = next(handle for name, handle in controls(bench).items() if name.startswith("Address"))
         name = next(handle for label, handle in controls(bench).items() if label.startswith("Name"))
         first.set(address, "rci://192.0.2.7:1337")
@@ -118,4 +118,4 @@ def test_what_a_page_typed_goes_with_its_controls(bench):
         first.say("answer", yes=True)
         wait(lambda: bench.store.state.lease.holder == second.page, "the controls to pass")
         wait(lambda: (address.value, name.value) == ("", ""), "the words of the other page to go")
-        wait(lambda: bench.store.state.drive.typed_address == "", "the question to go")
+        wait(lambda: bench.store.state.typed_address == "", "the question to go")

@@ -13,7 +13,7 @@ from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram, ProgramActions
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
+from rcilab.app.app_state import AppState
 from rcilab.app.goal.elbow import nearest_free
-from rcilab.app.goal.goal import Goal, goal_at
-from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
+from rcilab.app.goal.goal import Goal, goal_at, goal_toward
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
-from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.plan_readiness import is_done
-from rcilab.app.run.readiness import is_moving
-from rcilab.app.store import Store, UiState
+from rcilab.app.run.plan_readiness import is_done, is_moving
+from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
-from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
@@ -130,11 +131,25 @@ class SetLaw(Request):
     law: str
 
 
-class GoalActions:
-    """Poses, targets, typed numbers, speed; each ends in a fresh plan."""
+class StatusSource(Protocol):
+    """Where the arm is."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
+    def status(self) -> SupervisorStatus:
+        """Returns how the robot stands; `q_c` is where a plan begins."""
+        ...
+
+
+class GoalActions:
+    """Poses, targets, typed numbers, speed.
+
+    Args:
+        store: The state.
+        robot: Where the arm is.
+        plans_at_once: Whether every change is planned at once; otherwise only a request plans.
+    """
+
+    def __init__(self, store: StateStore[AppState], robot: StatusSource, *, plans_at_once: bool = True) -> None:
+        self._store, self._robot, self._plans_at_once = store, robot, plans_at_once
         self._stale = False  # The goal has changed while the arm was moving.
         self._planned = 0.0  # [s] When the last plan was made.
         self._due: float | None = None  # [s] When a path of the tool is to be planned.
@@ -166,7 +181,7 @@ class GoalActions:
         limits = model.limits.joint
         self._remember_hand(f"joint {request.joint}")
         q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
-        self._pose(readonly_copy(q))
+        self.pose(readonly_copy(q))
 
     def pose_goal(self, request: PoseGoal) -> None:
         """Poses the candidate arm by name."""
@@ -178,14 +193,14 @@ class GoalActions:
                 self.plan()
             return
         self._store.remember()
-        here = self._session.status().q_c
+        here = self._robot.status().q_c
         named = {
             "zero": np.zeros(state.model.n),
             "home": state.model.home,
             "here": state.goal.q if here is None else here,
             "start": state.goal.q if state.plan is None else _beginning(state.plan),
         }
-        self._pose(readonly_copy(named[request.name]))
+        self.pose(readonly_copy(named[request.name]))
         self._store.clear_problems("")
 
     def move_target(self, request: MoveTarget) -> None:
@@ -200,7 +215,7 @@ class GoalActions:
         self._is_held = not request.ended
         if request.ended:
             self._store.clear_problems("pose.")
-        self._aim(Pose(position, request.wxyz))
+        self.aim(Pose(position, request.wxyz))
 
     def _remember_hand(self, what: str) -> None:
         """Keeps the goal from before a hand moved something: once for all that one drag asks for."""
@@ -214,7 +229,7 @@ class GoalActions:
         if math.isfinite(request.psi) and self._store.state.model.redundancy:
             state = self._store.state
             psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
-            self._aim(state.goal.target, psi, snapped=snapped)
+            self.aim(state.goal.target, psi, snapped=snapped)
 
     def choose_branch(self, request: ChooseBranch) -> None:
         """Takes another analytic solution of the same pose."""
@@ -223,15 +238,15 @@ class GoalActions:
         if solutions is None or not 0 <= request.index < len(solutions):
             return
         self._store.remember()
-        self._aim(goal.target, None, near=solutions[request.index])
+        self.aim(goal.target, None, near=solutions[request.index])
 
     def lead_to(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
         """Poses the goal where a waypoint leads: at joint angles, or at a pose with an arm angle."""
         self._store.remember()
         if q is None:
-            self._aim(target, psi)
+            self.aim(target, psi)
         else:
-            self._pose(q)
+            self.pose(q)
         self._store.clear_problems("pose.")
 
     def type_field(self, request: TypeField) -> None:
@@ -251,11 +266,11 @@ class GoalActions:
             bound, unit = (FURTHEST * 1000.0, "mm") if index < 3 else (360.0, "deg")
             parsed = parse_number(request.text, -bound, bound, unit)
             value = parsed.value
-            act = None if value is None else lambda: self._aim(_with_number(state.goal.target, index, value))
+            act = None if value is None else lambda: self.aim(_with_number(state.goal.target, index, value))
         elif kind == "pose" and name == QUATERNION:
             parsed = parse_quaternion(request.text)
             wxyz = parsed.value
-            act = None if wxyz is None else lambda: self._aim(Pose(state.goal.target.position, wxyz))
+            act = None if wxyz is None else lambda: self.aim(Pose(state.goal.target.position, wxyz))
         elif request.field == "speed":
             parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
             value = parsed.value
@@ -299,7 +314,9 @@ class GoalActions:
 
         A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
         """
-        state, status = self._store.state, self._session.status()
+        if request is None and not self._plans_at_once:
+            return
+        state, status = self._store.state, self._robot.status()
         self._due = None
         if is_moving(status):
             self._stale = True
@@ -317,25 +334,36 @@ class GoalActions:
             return
         self._make(state, readonly_copy(status.q_c), is_asked=request is not None)
 
-    def _make(self, state: UiState, start: JointVector, *, is_asked: bool) -> None:
-        box = state.setup.wanted.box
-        made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
+    def _make(self, state: AppState, start: JointVector, *, is_asked: bool) -> None:
+        made = self.prepare_plan(start)()
         self._planned = time.monotonic()
         is_program = state.plan is not None and state.plan.program is not None
         if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
             self._store.say("warn", message("plan.replaced"))
-        self._show(replace(made, short=state.goal.reach.short) if isinstance(made, Plan) else made)
+        self.show(made)
+
+    def prepare_plan(self, start: JointVector) -> Callable[[], Plan | Message]:
+        """Returns the work of planning from joint angles, [rad], to the goal of this moment; any thread may do it."""
+        state = self._store.state
+        box, short = state.box, state.goal.reach.short
+
+        def make() -> Plan | Message:
+            made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
+            return replace(made, short=short) if isinstance(made, Plan) else made
+
+        return make
 
     def plan_recovery(self, request: PlanRecovery) -> None:
         """Plans from where the arm stands, outside a joint's range, back inside; the goal stays for the next plan."""
-        state, status = self._store.state, self._session.status()
+        state, status = self._store.state, self._robot.status()
         if status.q_c is None or is_moving(status):
             return
         self._stale, self._due = False, None
         self._planned = time.monotonic()
-        self._show(make_recovery(state.model, readonly_copy(status.q_c), state.setup.wanted.box))
+        self.show(make_recovery(state.model, readonly_copy(status.q_c), state.box))
 
-    def _show(self, made: Plan | Message) -> None:
+    def show(self, made: Plan | Message) -> None:
+        """Shows a plan from its start, or why there is none."""
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
@@ -358,10 +386,6 @@ class GoalActions:
         if self._stale:
             self.plan()
 
-    def pose(self, q: JointVector) -> None:
-        """Poses the candidate arm at these joint angles."""
-        self._pose(q)
-
     def follow(self, q: JointVector) -> Goal:
         """Puts the goal where the moving arm is and returns it; planned is when the arm has come to rest."""
         goal = goal_at(self._store.state.model, q)
@@ -369,30 +393,23 @@ class GoalActions:
         self._stale = True
         return goal
 
-    def _pose(self, q: JointVector) -> None:
-        model = self._store.state.model
-        goal = Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=self._arm_angle(q))
-        self._store.update(goal=goal)
+    def pose(self, q: JointVector) -> None:
+        """Poses the candidate arm at these joint angles."""
+        self._store.update(goal=goal_at(self._store.state.model, q))
         self.plan()
 
-    def _aim(
+    def aim(
         self,
         target: Pose,
         psi: float | None = None,
         near: JointVector | None = None,
         snapped: Message | None = None,
     ) -> None:
+        """Poses the candidate arm at a target pose, see `goal_toward`; `near` is the present goal when absent."""
         state = self._store.state
-        reach = evaluate_pose(state.model, target, state.goal.q if near is None else near, psi)
-        goal = Goal(q=reach.q, target=target, reach=reach, psi=self._arm_angle(reach.q), snapped=snapped)
-        self._store.update(goal=goal)
+        around = state.goal.q if near is None else near
+        self._store.update(goal=goal_toward(state.model, target, around, psi, snapped))
         self.plan()
-
-    def _arm_angle(self, q: JointVector) -> float | None:
-        try:
-            return self._store.state.model.arm_angle(q)
-        except KinematicsError:
-            return None
 
 
 def _beginning(plan: Plan) -> JointVector:

@@ -29,7 +29,7 @@ from rcilab.app.jog.jog_state import (
 from rcilab.app.jog.jog_step import take_step
 from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message

@@ -15,7 +15,7 @@ from rcilab.app.learn.learn_state import LearnState, LessonState, Show
 from rcilab.app.learn.lessons import LESSONS, Watcher
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.recording import Recording
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

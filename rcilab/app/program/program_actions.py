@@ -15,7 +15,7 @@ from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.program_planning import Job, plan_job
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
 from rcilab.app.text import Message, message
 from rcilab.core.arrays import readonly_copy

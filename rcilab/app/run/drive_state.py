@@ -1,8 +1,8 @@
-"""How the arm is driven from the page: mode, parameters, pace, and what is done to the virtual controller."""
+"""How the arm is driven: mode, its parameters, and the speed override."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending, with_number
@@ -14,7 +14,6 @@ from rcilab.makers.rokae.driver.controller_parameters import (
     control_ranges,
     standard_control,
 )
-from rcilab.sim.api import Direction, NetworkFaults, WorldStatus
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -24,21 +23,11 @@ if TYPE_CHECKING:
 Destination = Literal["preview", "ideal", "mujoco", "address"]
 
 DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address")
-CABLE_PULLED = NetworkFaults(loss=1.0, tcp_delay=10.0)
-"""No datagram comes through, and TCP says nothing."""
-NETWORK_LAB: dict[str, tuple[float, str]] = {
-    "loss": (0.3, "%"),
-    "delay": (0.05, "ms"),
-    "jitter": (0.05, "ms"),
-    "reorder": (0.3, "%"),
-    "duplicate": (0.3, "%"),
-}
-"""The sliders: largest value, [1] or [s], and the unit on the page. Choices: what is beyond ends any motion."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DriveState:
-    """What the operator has set in the Run tab."""
+    """How motions are executed."""
 
     mode: Mode = "joint_position"
     control: ControllerParameters | None = None
@@ -47,20 +36,6 @@ class DriveState:
     """Why the controller did not take them."""
     pace: float = 1.0
     """Part of the planned speed to run at."""
-    pulled: bool = False
-    """Whether the cable of the virtual controller is pulled."""
-    network: NetworkFaults = field(default_factory=NetworkFaults)
-    direction: Direction = "both"
-    world: WorldStatus | None = None
-    """What our own controller says of itself; None: it is not ours, or does not answer."""
-    loop_back: bool = False
-    """Whether the outputs of the virtual controller are wired to its inputs."""
-    auto_limit: bool = False
-    """Whether the virtual controller leads commands to rest inside the soft joint limits."""
-    reboot_asked: bool = False
-    """Whether the question about a restart of the controller waits for its answer."""
-    typed_address: str = ""
-    """The address that waits for a second yes."""
 
     def wanted_control(self, model: RobotModel) -> ControllerParameters:
         """Returns the parameters to show: those typed, or what a controller wakes up with."""

@@ -11,7 +11,7 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.setup.configuration_sender import SetupPost
 from rcilab.app.store import Store
 from rcilab.app.text import Message, message

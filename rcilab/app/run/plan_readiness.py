@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.translator import Finished, Message, message
 from rcilab.motion.extent import measure_extent
+
+if TYPE_CHECKING:
+    from rcilab.control_process import SupervisorStatus
 
 _SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
 _NOT_IDLE = {
@@ -67,6 +72,11 @@ def ask_to_move(plan: Plan, address: str) -> Message:
         angle=f"{np.degrees(extent.joint_speed):.1f}",
         speed=f"{1e3 * extent.tool_speed:.0f}",
     )
+
+
+def is_moving(status: SupervisorStatus) -> bool:
+    """Returns whether the arm is being moved by us."""
+    return status.phase in ("moving", "stopping")
 
 
 def _is_at(q: JointVector, place: JointVector) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import find_outside
 from rcilab.app.run.drive_state import parameter_obstacle
-from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, plan_obstacle
+from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, is_moving, plan_obstacle
 from rcilab.app.setup.configuration_state import setup_obstacle, tool_outside
 from rcilab.app.status_text import tell_status
 from rcilab.app.store import UiState
@@ -86,8 +86,3 @@ def time_shown(state: UiState, status: SupervisorStatus) -> float:
 def is_connected(status: SupervisorStatus) -> bool:
     """Returns whether a robot tells where it is."""
     return status.q is not None and status.phase not in ("closed", "lost", "crashed")
-
-
-def is_moving(status: SupervisorStatus) -> bool:
-    """Returns whether the arm is being moved by us."""
-    return status.phase in ("moving", "stopping")

@@ -14,7 +14,8 @@ from rcilab.app.goal.target_status import Tone
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import PLANTS, TOOL, is_guided
-from rcilab.app.run.readiness import is_moving, obstacle
+from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_recorder import RunRecorder
 from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
 from rcilab.app.status_text import StartingError, tell_error, tell_incident
@@ -204,7 +205,7 @@ class RunActions:
             model = setup.wanted.only(setup.touched).applied_to(model)
             self._untouched = goal_at(model, model.home)
             changes |= {"model": model, "goal": self._untouched, "setup": setup}
-            changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
+            changes |= {"drive": replace(state.drive, control=None, refusal=None)}
             state = replace(state, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant, _own_setup(state, target))
@@ -389,7 +390,9 @@ def _unasked(state: UiState) -> dict[str, object]:
     return {
         "setup": replace(state.setup, asked=None, refusal=None),
         "jog": replace(state.jog, robot=False, asked=False, said=None),
-        "drive": replace(state.drive, typed_address="", refusal=None, world=None),
+        "drive": replace(state.drive, refusal=None),
+        "typed_address": "",
+        "world": replace(state.world, status=None),
     }
 
 

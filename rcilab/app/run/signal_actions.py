@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.request import Handlers, Request
@@ -55,15 +55,15 @@ class SignalActions:
         if request.what == "read":
             self._tickets.append(("inputs", self._session.supervisor().read_inputs()))
             return
-        was_asked = self._store.state.drive.reboot_asked
-        self._store.update(drive=replace(self._store.state.drive, reboot_asked=request.what == "reboot"))
+        was_asked = self._store.state.reboot_asked
+        self._store.update(reboot_asked=request.what == "reboot")
         if request.what == "confirm" and was_asked:
             self._tickets.append(("reboot", self._session.supervisor().reboot()))
 
     def tick(self, status: SupervisorStatus) -> None:
         """Looks at the answers; a question about a restart ends with the connection."""
-        if self._store.state.drive.reboot_asked and status.phase not in ("idle", "fault"):
-            self._store.update(drive=replace(self._store.state.drive, reboot_asked=False))
+        if self._store.state.reboot_asked and status.phase not in ("idle", "fault"):
+            self._store.update(reboot_asked=False)
         waiting = []
         for what, ticket in self._tickets:
             if not ticket.done:

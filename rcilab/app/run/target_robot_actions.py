@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, cast
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import Plant
 from rcilab.app.run.drive_state import DESTINATIONS
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
@@ -66,7 +66,7 @@ class TargetRobotActions:
             self._robot.open(state.model.name, "virtual")
 
     def _choose_address(self, request: ChooseDestination) -> None:
-        asked, address = self._store.state.drive.typed_address, request.address.strip()
+        asked, address = self._store.state.typed_address, request.address.strip()
         self._ask("")  # It was about what stood in the field before.
         if request.answer == "yes" and asked and address == asked:
             self._robot.open(self._store.state.model.name, asked)
@@ -82,4 +82,4 @@ class TargetRobotActions:
         self._ask(address)
 
     def _ask(self, address: str) -> None:
-        self._store.update(drive=replace(self._store.state.drive, typed_address=address))
+        self._store.update(typed_address=address)

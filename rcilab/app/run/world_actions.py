@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import no_push
-from rcilab.app.run.drive_state import CABLE_PULLED, NETWORK_LAB
+from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
@@ -79,8 +79,8 @@ class WorldActions:
         watch = self._require_watch()
         if watch is None:
             return
-        drive = self._store.state.drive
-        network, direction, pulled = drive.network, drive.direction, drive.pulled
+        world = self._store.state.world
+        network, direction, pulled = world.network, world.direction, world.pulled
         if request.clear:
             network, direction, pulled = NetworkFaults(), "both", False
         if request.name in NETWORK_LAB and math.isfinite(request.value):
@@ -90,7 +90,7 @@ class WorldActions:
             direction: Direction = request.direction  # type: ignore[assignment]  # One of them.
         if request.pulled is not None:
             pulled = request.pulled
-        self._store.update(drive=replace(drive, network=network, direction=direction, pulled=pulled))
+        self._store.update(world=replace(world, network=network, direction=direction, pulled=pulled))
         self._tell(watch)
 
     def press_safety(self, request: PressSafety) -> None:
@@ -106,7 +106,7 @@ class WorldActions:
         if watch is None or request.name not in _WIRING:
             return
         watch.ask(_WIRING[request.name](request.on))
-        self._store.update(drive=replace(self._store.state.drive, **{request.name: request.on}))
+        self._store.update(world=replace(self._store.state.world, **{request.name: request.on}))
 
     def tick(self, status: SupervisorStatus) -> None:
         """Follows the controller of now and what it says of itself; another one has a good network."""
@@ -117,23 +117,14 @@ class WorldActions:
             if address is not None:
                 host, _, port = address.partition(":")
                 self._watch = SimulationStatusPoller(SimulationControl(host, int(port)))
-            drive = replace(
-                self._store.state.drive,
-                pulled=False,
-                network=NetworkFaults(),
-                direction="both",
-                world=None,
-                loop_back=False,
-                auto_limit=False,
-            )
-            self._store.update(drive=drive)
+            self._store.update(world=WorldState())
         if self._watch is None:
             return
         error = self._watch.take_error()
         if error is not None:
             self._store.say("bad", tell_error(error))
-        if self._watch.status is not self._store.state.drive.world:
-            self._store.update(drive=replace(self._store.state.drive, world=self._watch.status))
+        if self._watch.status is not self._store.state.world.status:
+            self._store.update(world=replace(self._store.state.world, status=self._watch.status))
 
     def close(self) -> None:
         """Ends the connection."""
@@ -142,13 +133,13 @@ class WorldActions:
             watch.close()
 
     def _tell(self, watch: SimulationStatusPoller) -> None:
-        drive = self._store.state.drive
-        if drive.pulled:
+        world = self._store.state.world
+        if world.pulled:
             watch.ask(Network(CABLE_PULLED))
             return
-        if drive.direction != "both":
-            watch.ask(Network(NetworkFaults(), "states" if drive.direction == "commands" else "commands"))
-        watch.ask(Network(drive.network, drive.direction))
+        if world.direction != "both":
+            watch.ask(Network(NetworkFaults(), "states" if world.direction == "commands" else "commands"))
+        watch.ask(Network(world.network, world.direction))
 
     def _require_watch(self) -> SimulationStatusPoller | None:
         if self._watch is None:

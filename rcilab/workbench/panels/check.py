@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Message, Text
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
 from rcilab.workbench.widgets import Ask, Html, esc, on_press

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.run.drive_state import NETWORK_LAB, is_ours
+from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
+from rcilab.app.run.world_state import NETWORK_LAB
 from rcilab.app.text import Text
 from rcilab.control_process.status_messages import tell_success
 from rcilab.core.fault import name_faults
@@ -65,9 +66,8 @@ class FaultInjectionPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows our own controller."""
-        text, drive, ours = self._text, state.drive, is_ours(status)
-        world = drive.world
-        pressed = "none" if world is None else world.button
+        text, world, ours = self._text, state.world, is_ours(status)
+        pressed = "none" if world.status is None else world.status.button
         for name, button in self._buttons.items():
             button.disabled = not ours or name == pressed
         nobody = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
@@ -75,11 +75,11 @@ class FaultInjectionPanel:
         tone = "good" if ours and pressed == "none" else "warn"
         self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(said)}</p>')
         for name, slider in self._sliders.items():
-            slider.show(round(getattr(drive.network, name) * _SCALE[NETWORK_LAB[name][1]], 3))
-            slider.handle.disabled = not ours or drive.pulled
-        self._way.show(self._ways[drive.direction])
-        self._way.handle.disabled = not ours or drive.pulled
-        self._pull.visible, self._plug.visible = not drive.pulled, drive.pulled
+            slider.show(round(getattr(world.network, name) * _SCALE[NETWORK_LAB[name][1]], 3))
+            slider.handle.disabled = not ours or world.pulled
+        self._way.show(self._ways[world.direction])
+        self._way.handle.disabled = not ours or world.pulled
+        self._pull.visible, self._plug.visible = not world.pulled, world.pulled
         self._pull.disabled = self._plug.disabled = not ours
         note = text("network.note") if ours else nobody
         self._note.show(f'<p class="rl-note">{esc(note)}</p>')
@@ -88,7 +88,7 @@ class FaultInjectionPanel:
 
 def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns what the client and the controller each notice of the network."""
-    world = state.drive.world
+    world = state.world.status
     faults = name_faults(status.faults) or text("bar.none")
     rows = [
         ("client_rate", f"{status.rate_hz:.0f} Hz"),

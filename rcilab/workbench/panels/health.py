@@ -44,7 +44,7 @@ class HealthPanel:
 
 def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns how well the cycles are kept, as a table."""
-    late, world = status.lateness, state.drive.world
+    late, world = status.lateness, state.world.status
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
     rows = [

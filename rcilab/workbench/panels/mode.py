@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text, message
 from rcilab.core.state import MODES, Mode
 from rcilab.makers.rokae.driver.controller_parameters import (

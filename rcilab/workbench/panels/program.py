@@ -11,7 +11,8 @@ import numpy as np
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
 from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, number_at, tell_place
-from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.workbench.panels.jog import problems_html

@@ -15,8 +15,8 @@ from rcilab.app.run.active_force import (
     is_guided,
     no_push,
 )
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.push_actions import HoldPush, SetPush
-from rcilab.app.run.readiness import is_moving
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import fixed

@@ -61,16 +61,16 @@ class SignalsPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the controller."""
-        text, drive, is_ready = self._text, state.drive, status.phase in ("idle", "fault")
+        text, is_ready = self._text, status.phase in ("idle", "fault")
         for button in self._buttons:
             button.disabled = not is_ready
         self._levels.show(levels_html(status, text))
-        self._wired.show(drive.loop_back)
+        self._wired.show(state.world.loop_back)
         self._wired.handle.disabled = not is_ours(status)
         self._reboot.disabled = not is_ready
-        self._reboot.visible = not drive.reboot_asked
-        self._agree.visible = self._cancel.visible = drive.reboot_asked
-        said = esc(text("reboot.ask", address=status.address or status.target)) if drive.reboot_asked else ""
+        self._reboot.visible = not state.reboot_asked
+        self._agree.visible = self._cancel.visible = state.reboot_asked
+        said = esc(text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
 
 

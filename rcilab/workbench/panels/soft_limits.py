@@ -54,5 +54,5 @@ class SoftLimitsPanel:
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
         self._whole.disabled = limits == own_limits(state)
-        self._auto.show(state.drive.auto_limit)
+        self._auto.show(state.world.auto_limit)
         self._auto.handle.disabled = not is_ours(status)

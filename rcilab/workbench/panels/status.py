@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.control_lock import PATIENCE, ControlLock
 from rcilab.app.run.drive_state import destination
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import played_at
-from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.run.readiness import time_shown
 from rcilab.app.status_text import phase_code, tell_status
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.request import Request
 from rcilab.app.run.drive_state import DESTINATIONS, destination
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.status_text import phase_code, tell_status
@@ -75,10 +75,10 @@ class TargetRobotPanel:
         self._choice.show(self._names[self._picked or where])
         self._choice.handle.disabled = self._connect.disabled = moving
         is_address = (self._picked or where) == "address"
-        if self._address.show(state.lease, _address_of(state)) and state.drive.typed_address:
+        if self._address.show(state.lease, _address_of(state)) and state.typed_address:
             self._ask(_choose(None, "address", answer="no"))  # Who asked has the controls no more.
         self._address.handle.visible = self._connect.visible = is_address
-        asked = self._asked = state.drive.typed_address
+        asked = self._asked = state.typed_address
         said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._yes.visible = self._no.visible = bool(asked)

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.check.freshness import outdated
 from rcilab.app.program.program_draft import tell_place
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import paced_of, played_at
-from rcilab.app.run.readiness import is_moving, time_shown
+from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, RATES, Play, Seek, SetView, ShowPlot, has_plot
 from rcilab.core.clock import CYCLE_TIME

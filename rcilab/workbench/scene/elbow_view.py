@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.goal.elbow import Elbow
-from rcilab.app.run.readiness import is_moving
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.scene.scene_actions import DragElbow
 from rcilab.app.text import Text
 from rcilab.robots.mesh import revolve

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rcilab.app.run.readiness import is_connected, is_moving
+from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.readiness import is_connected
 from rcilab.app.run.replay import replayed_pose
 from rcilab.app.text import Text
 from rcilab.core.arrays import JointVector

@@ -1,0 +1,71 @@
+"""The part of the state that page and notebook share: the arm, the goal, the plan, how it is run, what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from rcilab.app.goal.goal import Goal
+from rcilab.app.goal.target_status import Tone
+from rcilab.app.planning import PathKind, Plan, PlannableLaw
+from rcilab.app.run.drive_state import DriveState
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message
+from rcilab.model.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from rcilab.app.run.recording import Recording
+
+
+@dataclass(frozen=True, slots=True)
+class Toast:
+    """A message that is shown once."""
+
+    serial: int
+    tone: Tone
+    text: Message
+    page: int | None = None
+    """Client id of the only page it concerns; None: all of them."""
+    trouble: str = ""
+    """Names a trouble that it reports and that can end: then it is withdrawn."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AppState:
+    """Values of the features that page and notebook have in common."""
+
+    model: RobotModel
+    drive: DriveState = field(default_factory=DriveState)
+    goal: Goal
+    plan: Plan | None = None
+    no_plan: Message | None = None
+    """Why there is no plan."""
+    recording: Recording | None = None
+    last_run: Recording | None = None
+    """The run that was made last, whatever was planned since: for its table and for export."""
+    speed: float = 0.5
+    law: PlannableLaw = "torque_rate_limited"
+    way: PathKind = "joint"
+    """How the tool goes to the goal."""
+    via: Pose | None = None
+    """What an arc leads over."""
+    place: float = 0.0
+    """Where in the plan the preview stands, 0 to 1."""
+    playing: bool = False
+    notices: tuple[Toast, ...] = ()
+    """The newest of each page and of all pages together, oldest first: what one is told takes no place of another's."""
+    problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
+    """What is wrong with typed numbers, by field."""
+
+    @property
+    def notice(self) -> Toast | None:
+        """The newest notice, whomever it concerns."""
+        return self.notices[-1] if self.notices else None
+
+    @property
+    def box(self) -> SafetyBox | None:
+        """The safety box that plans are checked with."""
+        return None

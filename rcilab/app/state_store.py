@@ -1,0 +1,91 @@
+"""The one place where the state of an application is exchanged: a whole new value for the old one."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, Generic, TypeVar
+
+from rcilab.app.app_state import AppState, Toast
+from rcilab.app.goal.goal import Goal
+from rcilab.app.goal.target_status import Tone
+from rcilab.i18n.translator import Message
+
+_UNDO_DEPTH = 100
+_NOTICES = 4  # Kept of each page, and of all pages together: more would cover the scene.
+
+S = TypeVar("S", bound=AppState, covariant=True)
+
+
+class StateStore(Generic[S]):
+    """Holds the state. One thread at a time writes, any thread may read a snapshot."""
+
+    def __init__(self, state: S) -> None:
+        self._lock = threading.Lock()
+        self._state = state
+        self._past: list[Goal] = []
+        self._notices = 0
+        self.changed = threading.Event()
+        """Set when a request has been carried out whole, cleared by who shows it."""
+
+    @property
+    def state(self) -> S:
+        """The newest snapshot."""
+        return self._state
+
+    def update(self, **changes: Any) -> S:
+        """Exchanges the state for one with these fields changed, and returns it."""
+        with self._lock:
+            self._state = replace(self._state, **changes)
+            return self._state
+
+    def say(self, tone: Tone, text: Message, *, page: int | None = None, trouble: str = "") -> None:
+        """Shows a notice, on one page or on every page.
+
+        Args:
+            tone: How it looks.
+            text: What it says.
+            page: Client id of the only page it concerns; None: all of them.
+            trouble: Names the trouble that it reports, for `settle`.
+        """
+        with self._lock:
+            self._notices += 1
+            new = Toast(self._notices, tone, text, page, trouble)
+            same = [notice for notice in self._state.notices if notice.page == page]
+            gone = same[: -(_NOTICES - 1)]
+            kept = (notice for notice in self._state.notices if notice not in gone)
+            self._state = replace(self._state, notices=(*kept, new))
+
+    def forget_page(self, page: int) -> None:
+        """Drops what was to be said to a page that has gone."""
+        with self._lock:
+            self._state = replace(self._state, notices=tuple(n for n in self._state.notices if n.page != page))
+
+    def settle(self, trouble: str) -> None:
+        """Withdraws the notices of a trouble that is over."""
+        with self._lock:
+            notices = self._state.notices
+            if any(notice.trouble == trouble for notice in notices):
+                self._state = replace(self._state, notices=tuple(n for n in notices if n.trouble != trouble))
+
+    def complain(self, field: str, problem: Message) -> None:
+        """Says beside a field what is wrong with what was typed."""
+        self.update(problems=MappingProxyType({**self._state.problems, field: problem}))
+
+    def clear_problems(self, *beginnings: str) -> None:
+        """Takes back what was said beside all fields whose names begin so."""
+        kept = {field: said for field, said in self._state.problems.items() if not field.startswith(beginnings)}
+        self.update(problems=MappingProxyType(kept))
+
+    def remember(self) -> None:
+        """Keeps the goal of this moment, to come back to with `undo`."""
+        self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]
+
+    def undo(self) -> Goal | None:
+        """Returns the goal that was remembered last, or None."""
+        return self._past.pop() if self._past else None
+
+    def forget(self) -> None:
+        """Drops what could be undone: it belongs to another arm."""
+        self._past = []
