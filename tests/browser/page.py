@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable
 
 import numpy as np
 
 from rcilab.app.goal.goal_actions import PoseGoal, SetLaw, SetSpeed
 from rcilab.app.view_actions import SetView
+from tests.waiting import wait_for
 
 _PROJECT = """([name, offset]) => {
   const m = __viserMutable, node = m.nodeRefFromName[name];
@@ -39,18 +39,6 @@ def close_toasts(tab) -> None:
     tab.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach((button) => button.click())")
 
 
-def wait_for(condition: Callable[[], bool], what: str, timeout: float = 15.0, tab=None) -> None:
-    """Polls until something holds; the message says what never came."""
-    end = time.monotonic() + timeout
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(f"within {timeout} s this did not happen: {what() if callable(what) else what}")
-        if tab is None:
-            time.sleep(0.05)
-        else:
-            tab.wait_for_timeout(50)  # Lets playwright handle the page's events.
-
-
 class BenchPage:
     """One browser page on a workbench."""
 
@@ -68,7 +56,7 @@ class BenchPage:
         return self.bench.session.status()
 
     def wait(self, condition: Callable[[], bool], what: str, timeout: float = 15.0) -> None:
-        wait_for(condition, what, timeout, self.tab)
+        wait_for(condition, what=what, timeout=timeout, tab=self.tab)
 
     def wait_until_drawn(self) -> None:
         self.tab.wait_for_function(_DRAWN, timeout=40_000)

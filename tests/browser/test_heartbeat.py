@@ -9,14 +9,15 @@ import pytest
 
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.run.run_actions import RobotCommand
-from tests.browser.page import BenchPage, wait_for
+from tests.browser.page import BenchPage
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
 
 def test_a_page_that_is_held_up_by_drawing_keeps_the_controls(page) -> None:
     store = page.bench.store
-    wait_for(lambda: store.state.lease.holder is not None, "a holder", 20.0, page.tab)
+    wait_for(lambda: store.state.lease.holder is not None, what="a holder", timeout=20.0, tab=page.tab)
     holder = store.state.lease.holder
     page.tab.evaluate("setTimeout(() => { const end = Date.now() + 3500; while (Date.now() < end); }, 0)")
     end, holders = time.monotonic() + 3.0, set()
@@ -32,9 +33,9 @@ def test_a_page_that_is_closed_is_gone_at_once(chromium, page) -> None:
     context = chromium.new_context(viewport={"width": 400, "height": 300})
     tab = context.new_page()
     tab.goto(f"{page.bench.url}?fixedDpr=0.2")
-    wait_for(lambda: len(store.state.lease.pages) == len(before) + 1, "another page", 30.0, tab)
+    wait_for(lambda: len(store.state.lease.pages) == len(before) + 1, what="another page", timeout=30.0, tab=tab)
     tab.close()
-    wait_for(lambda: store.state.lease.pages == before, "the page to be gone", 2.0 + 3.0)
+    wait_for(lambda: store.state.lease.pages == before, what="the page to be gone", timeout=2.0 + 3.0)
     context.close()
 
 
@@ -59,7 +60,7 @@ def test_a_moving_arm_stops_when_the_page_that_holds_the_controls_is_gone(chromi
                 tab.close()
             else:
                 tab.evaluate("setTimeout(() => { const end = Date.now() + 20000; while (Date.now() < end); }, 0)")
-            wait_for(lambda: page.status.code == "idle.operator", lambda: f"the stop: {page.status}", 12.0)
+            wait_for(lambda: page.status.code == "idle.operator", what=lambda: f"the stop: {page.status}", timeout=12.0)
             assert np.abs(page.status.q_c - bench.store.state.plan.motion.q[-1]).max() > 0.05, "on its way"
     finally:
         context.close()

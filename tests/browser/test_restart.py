@@ -7,7 +7,7 @@ from urllib.parse import urlparse
 import pytest
 from playwright.sync_api import Error
 
-from tests.browser.page import wait_for
+from tests.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 _READY = "document.documentElement.dataset.rlReady !== undefined"
@@ -33,12 +33,22 @@ def test_a_page_loads_itself_again_when_another_workbench_answers_at_its_address
             port = urlparse(first.url).port
             tab = context.new_page()
             tab.goto(f"{first.url}?fixedDpr=0.2")
-            wait_for(lambda: look(tab, _READY), "the page", 60.0, tab)
+            wait_for(lambda: look(tab, _READY), what="the page", timeout=60.0, tab=tab)
             tab.evaluate("window.before = true")
-        wait_for(lambda: look(tab, "document.querySelector('.rl-lost') !== null"), "the loss to show", 15.0, tab)
+        wait_for(
+            lambda: look(tab, "document.querySelector('.rl-lost') !== null"),
+            what="the loss to show",
+            timeout=15.0,
+            tab=tab,
+        )
         with Workbench(WorkbenchConfig(port=port, quality="light", runs=tmp_path)):
-            wait_for(lambda: look(tab, "window.before === undefined"), "the page to load itself again", 60.0, tab)
-            wait_for(lambda: look(tab, _READY), "the panels", 60.0, tab)
+            wait_for(
+                lambda: look(tab, "window.before === undefined"),
+                what="the page to load itself again",
+                timeout=60.0,
+                tab=tab,
+            )
+            wait_for(lambda: look(tab, _READY), what="the panels", timeout=60.0, tab=tab)
             assert tab.evaluate("document.querySelector('.rl-lost') === null")
     finally:
         context.close()
@@ -56,12 +66,19 @@ def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphic
         with Workbench(WorkbenchConfig(port=0, runs=tmp_path)) as bench:
             tab = context.new_page()
             tab.goto(f"{bench.url}?fixedDpr=0.2")
-            wait_for(lambda: look(tab, drawn) == "light", "light graphics", 60.0, tab)
+            wait_for(lambda: look(tab, drawn) == "light", what="light graphics", timeout=60.0, tab=tab)
             for quality in ("full", "light"):
                 bench.conductor.ask(SetView(name="quality", value=quality))
-                wait_for(lambda wanted=quality: look(tab, drawn) == wanted, f"{quality} graphics", 60.0, tab)
-            wait_for(lambda: look(tab, _OPACITY) == 1.0, "a solid arm", 60.0, tab)
+                wait_for(
+                    lambda wanted=quality: look(tab, drawn) == wanted, what=f"{quality} graphics", timeout=60.0, tab=tab
+                )
+            wait_for(lambda: look(tab, _OPACITY) == 1.0, what="a solid arm", timeout=60.0, tab=tab)
             bench.session.disconnect()
-            wait_for(lambda: (look(tab, _OPACITY) or 1.0) < 0.5, "a translucent arm without a connection", 60.0, tab)
+            wait_for(
+                lambda: (look(tab, _OPACITY) or 1.0) < 0.5,
+                what="a translucent arm without a connection",
+                timeout=60.0,
+                tab=tab,
+            )
     finally:
         context.close()

@@ -14,7 +14,7 @@ from rcilab.control_process.fork_server import fork_server_pid
 from rcilab.control_process.launch import start_controller
 from rcilab.control_process.managed_process import ManagedProcess
 from rcilab.core.errors import ConnectionLostError
-from tests.control_process.test_supervisor import wait_for
+from tests.waiting import wait_for
 
 SOON = 20.0
 

@@ -9,16 +9,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from ipywidgets.widgets import widget
 
 import rcilab
 from rcilab import notebook
 from rcilab.notebook import cells
 from rcilab.notebook.cells import CellRegistry
 from rcilab.notebook.kernel_reachability import KernelReachability
-from tests.late import Late
 from tests.processes import processes
-
-widget = Late("ipywidgets.widgets.widget")
 
 PRO7 = rcilab.load_model("xMatePro7")
 HERE = KernelReachability(way="loopback")

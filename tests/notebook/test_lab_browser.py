@@ -8,7 +8,7 @@ import shutil
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import pytest
 import rcilab
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from tests.notebook.jupyter_servers import serving
+from tests.waiting import wait_for
 
 FLAGS = (
     "--no-sandbox --no-first-run --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
@@ -102,13 +103,6 @@ def page(jupyter: tuple[dict[str, Any], Path]) -> Iterator[Any]:
         assert outside == [], f"JupyterLab asked for something beyond this machine: {outside}"
 
 
-def wait_for(page: Any, condition: Callable[[], bool], what: str, timeout: float = 40.0) -> None:
-    deadline = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < deadline, f"within {timeout} s this did not happen: {what}"
-        page.wait_for_timeout(100)
-
-
 def run_all(page: Any) -> None:
     """Presses Run, Run All Cells, until the cell runs: JupyterLab drops what is asked before it has a kernel."""
     page.get_by_text("(ipykernel) | Idle").wait_for()
@@ -124,10 +118,10 @@ def run_all(page: Any) -> None:
         if entry.is_visible():
             entry.click()
             with suppress(AssertionError):
-                wait_for(page, is_asked, "the cell to run", timeout=3.0)
+                wait_for(is_asked, what="the cell to run", timeout=3.0, tab=page)
         return is_asked()
 
-    wait_for(page, begun, "the cell to run")
+    wait_for(begun, what="the cell to run", timeout=40.0, tab=page)
 
 
 def tool_in_scene(page: Any) -> np.ndarray | None:
@@ -156,7 +150,7 @@ def turn_joint_1(page: Any, handle: Any) -> np.ndarray:
         handle.press(key)  # Wherever a cell that still runs has taken the focus to.
     goal = PRO7.home.copy()
     goal[0] = np.radians(30.0)
-    wait_for(page, lambda: shows(page, goal), "the arm where the slider put it")
+    wait_for(lambda: shows(page, goal), what="the arm where the slider put it", timeout=40.0, tab=page)
     return goal
 
 
@@ -172,7 +166,7 @@ def test_jupyterlab_starts_on_loopback_and_serves_the_directory(jupyter: tuple[d
 def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> None:
     run_all(page)
     page.locator(".rl-title").wait_for()
-    wait_for(page, lambda: shows(page, PRO7.home), "the arm at home in the scene")
+    wait_for(lambda: shows(page, PRO7.home), what="the arm at home in the scene", timeout=40.0, tab=page)
     assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
 
     handle = page.locator(".widget-tab .noUi-handle:visible").first
@@ -191,7 +185,7 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
     page.get_by_role("tab", name="Run", exact=True).click()
     button(page, "Execute").click()
     page.locator(".rl-chip", has_text=re.compile("^moving$")).wait_for()
-    wait_for(page, lambda: not shows(page, PRO7.home), "the solid arm on its way")
+    wait_for(lambda: not shows(page, PRO7.home), what="the solid arm on its way", timeout=40.0, tab=page)
     button(page, "Stop").first.click()
     page.get_by_text("Stopped before its end").wait_for()
     assert not shows(page, goal)
@@ -246,8 +240,10 @@ def test_the_first_lesson_runs_in_its_language_and_its_slider_moves_the_arm(
     handle = tab.locator(".widget-hslider .noUi-handle").first
     handle.wait_for()
     assert tab.locator(".widget-hslider .widget-label").first.inner_text() == "关节 1"
-    wait_for(tab, lambda: shows(tab, PRO7.home), "the arm at home in the preview")
+    wait_for(lambda: shows(tab, PRO7.home), what="the arm at home in the preview", timeout=40.0, tab=tab)
     turn_joint_1(tab, handle)
-    wait_for(tab, lambda: tab.get_by_text("(ipykernel) | Idle").count() == 1, "the end of the lesson")
+    wait_for(
+        lambda: tab.get_by_text("(ipykernel) | Idle").count() == 1, what="the end of the lesson", timeout=40.0, tab=tab
+    )
     assert tab.locator("[data-mime-type='application/vnd.jupyter.stderr']").count() == 0
     tab.close()

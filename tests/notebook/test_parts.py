@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from ipywidgets.widgets import widget
 
 import rcilab
 import rcilab.notebook
@@ -22,12 +22,11 @@ from rcilab.i18n.locale import LANGUAGES, load_words
 from rcilab.i18n.translator import load_face
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.catalogues import require_equal
-from tests.late import Late
+from tests.waiting import wait_for
 
 if TYPE_CHECKING:
     from rcilab.notebook import Lab
 
-widget = Late("ipywidgets.widgets.widget")
 
 PRO7 = rcilab.load_model("xMatePro7")
 XMATE3 = rcilab.load_model("xMate3")
@@ -45,13 +44,6 @@ def fresh(lab: Lab) -> Lab:
     lab.state.start_from(PRO7.home)
     lab.jog.q = PRO7.home
     return lab
-
-
-def wait_for(condition: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
 
 
 def text_of(widget: Any) -> str:

@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from matplotlib import colors
 
 import rcilab
 from rcilab.core.errors import InvalidValueError
+from rcilab.notebook import widgets
 from rcilab.notebook.plot import JOINT_COLORS, VIOLATION_COLOR, plot
 from rcilab.notebook.preview import preview
-from tests.late import Late
 from tests.recording.runs import PLAN, some_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-colors, widgets = Late("matplotlib.colors"), Late("rcilab.notebook.widgets")
 
 PRO7 = rcilab.load_model("xMatePro7")
 MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.7, -0.8, 1.0]))

@@ -12,17 +12,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import pytest
+import umsgpack
+from tornado import httpclient, websocket
 
 import rcilab
 from rcilab import notebook
 from rcilab.notebook.kernel_reachability import find_place
-from tests.late import Late
 from tests.notebook.jupyter_servers import serving
 
 if TYPE_CHECKING:
     from tornado.httpclient import HTTPRequest
-
-httpclient, websocket, umsgpack = Late("tornado.httpclient"), Late("tornado.websocket"), Late("umsgpack")
 
 
 QUICK = "import sys; sys.modules['rfc3987_syntax'] = None; from jupyter_server.serverapp import main; main()"

@@ -16,14 +16,13 @@ from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
 from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, standard_control
+from rcilab.notebook import robot_words
 from rcilab.notebook.robot_side import BusyError, Outcome
-from tests.late import Late
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
     from rcilab.notebook import RunPanel
 
-robot_words = Late("rcilab.notebook.robot_words")
 PRO7 = rcilab.load_model("xMatePro7")
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import time
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -19,18 +17,12 @@ from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import Outcome
+from tests.waiting import wait_for
 
 if TYPE_CHECKING:
     from rcilab.notebook import RunPanel
 
 PRO7 = rcilab.load_model("xMatePro7")
-
-
-def wait_for(condition: Callable[[], Any], what: str) -> None:
-    deadline = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
 
 
 def phase(panel: RunPanel) -> str:
@@ -39,9 +31,9 @@ def phase(panel: RunPanel) -> str:
 
 
 def power_on(panel: RunPanel) -> None:
-    wait_for(lambda: phase(panel) == "idle" and not panel.power_on.disabled, "a robot that can be powered")
+    wait_for(lambda: phase(panel) == "idle" and not panel.power_on.disabled, what="a robot that can be powered")
     panel.power_on.click()
-    wait_for(lambda: panel.state.status is not None and panel.state.status.powered, "motor power")
+    wait_for(lambda: panel.state.status is not None and panel.state.status.powered, what="motor power")
 
 
 def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> None:
@@ -55,20 +47,20 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
         panel.state.make_plan()
         assert not panel.execute.disabled
         panel.execute.click()
-        wait_for(lambda: panel.state.run is not None, "the run")
+        wait_for(lambda: panel.state.run is not None, what="the run")
         run = panel.state.run
         assert run is not None
         np.testing.assert_allclose(run.q[-1], jog.q, atol=1e-6)
-        wait_for(lambda: "Arrived" in panel._outcome.value, "the outcome in words")
+        wait_for(lambda: "Arrived" in panel._outcome.value, what="the outcome in words")
         assert panel.execute.disabled  # The plan begins elsewhere now.
 
         jog.q = PRO7.home - 0.6
         panel.state.make_plan()
         panel.execute.click()
-        wait_for(lambda: phase(panel) == "moving" and (panel.state.status.motion_time or 0.0) > 0.05, "a motion")
+        wait_for(lambda: phase(panel) == "moving" and (panel.state.status.motion_time or 0.0) > 0.05, what="a motion")
         panel.stop.click()
-        wait_for(lambda: panel.state.error is not None, "the end of the motion")
-        wait_for(lambda: "Stopped before its end" in panel._outcome.value, "the outcome in words")
+        wait_for(lambda: panel.state.error is not None, what="the end of the motion")
+        wait_for(lambda: "Stopped before its end" in panel._outcome.value, what="the outcome in words")
         status = panel.state.status
         assert status is not None
         assert status.q_c is not None
@@ -90,13 +82,13 @@ def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch)
         panel.state.make_plan()
         heart._on_answer({})  # A browser was there.
         panel.execute.click()
-        wait_for(lambda: phase(panel) == "moving", "a motion")
+        wait_for(lambda: phase(panel) == "moving", what="a motion")
         monkeypatch.setattr(heart, "_missed", PATIENCE)  # And is not any more.
-        wait_for(lambda: panel.state.run is not None, "the run")
+        wait_for(lambda: panel.state.run is not None, what="the run")
         run = panel.state.run
         assert run is not None
         assert run.stopped == LEFT_ALONE
-        wait_for(lambda: "page did not answer" in panel._outcome.value, "why, in words")
+        wait_for(lambda: "page did not answer" in panel._outcome.value, what="why, in words")
     assert repr(robot).endswith("closed>")
 
 
@@ -108,7 +100,7 @@ def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
             panel.state.pose(PRO7.home + 0.05)
             panel.state.make_plan()
             panel.execute.click()
-            wait_for(lambda: panel.state.run is not None, "the run")
+            wait_for(lambda: panel.state.run is not None, what="the run")
             with notebook.JogPanel(robot) as jog:
                 assert jog.state is panel.state
         np.testing.assert_allclose(robot.state.q_c, PRO7.home + 0.05, atol=1e-9)
@@ -128,27 +120,29 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         panel.state.speed = 0.1
         panel.state.make_plan()
         panel.execute.click()
-        wait_for(lambda: not pace.pause.disabled, "a motion that can be held")
+        wait_for(lambda: not pace.pause.disabled, what="a motion that can be held")
         pace.pause.click()
-        wait_for(lambda: pace.resume.layout.display is None, "the arm held")
-        wait_for(lambda: re.search(r"Held at \d+\.\d s of the plan", pace._way.value), "where it is held, in words")
+        wait_for(lambda: pace.resume.layout.display is None, what="the arm held")
+        wait_for(
+            lambda: re.search(r"Held at \d+\.\d s of the plan", pace._way.value), what="where it is held, in words"
+        )
         pace.field.box.value = "50"
         assert pace.slider.value == 50.0
         assert panel.state.status is not None
         assert panel.state.status.pace == 0.0  # It keeps waiting.
         pace.resume.click()
-        wait_for(lambda: "50 %" in pace._way.value, "half the speed")
+        wait_for(lambda: "50 %" in pace._way.value, what="half the speed")
         assert panel.state.status.motion_place is not None
         assert panel.state.status.motion_place < (panel.state.status.motion_time or 0.0)
         assert pace.resume.layout.display == "none"
         pace.slider.value = 100.0
-        wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, "all of it")
+        wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, what="all of it")
         panel.stop.click()
-        wait_for(lambda: pace.pause.disabled, "the end of the motion")
+        wait_for(lambda: pace.pause.disabled, what="the end of the motion")
         wait_for(
-            lambda: not pace._way.value, "the end of what is said of it"
+            lambda: not pace._way.value, what="the end of what is said of it"
         )  # Another thread writes it, a moment later.
-        wait_for(lambda: panel.state.run is not None, "the run")
+        wait_for(lambda: panel.state.run is not None, what="the run")
         run = panel.state.run
         assert run is not None
         assert run.paced
@@ -171,7 +165,7 @@ def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
         panel.pace.pause.click()
-        wait_for(lambda: "Too late to hold" in panel.pace._way.value, "why not")
+        wait_for(lambda: "Too late to hold" in panel.pace._way.value, what="why not")
         assert robot.paces == [0.0]
         assert "rl-problem" in panel.pace._way.value
 
@@ -254,15 +248,17 @@ def test_outputs_and_inputs_are_shown_and_a_restart_is_asked_about(is_own: bool)
         panel = stack.enter_context(notebook.RunPanel(subject))
         if is_own:
             panel.connect.click()
-        wait_for(lambda: phase(panel) == "idle", "a robot")
+        wait_for(lambda: phase(panel) == "idle", what="a robot")
         signals = panel.signals
         signals.output.value = 4
         signals.on.click()
-        wait_for(lambda: panel.state.status.outputs[4] is True and panel.state.status.inputs == (False,) * 6, "levels")
+        wait_for(
+            lambda: panel.state.status.outputs[4] is True and panel.state.status.inputs == (False,) * 6, what="levels"
+        )
         signals.reboot.click()
         assert phase(panel) == "idle"
         signals.yes.click()
-        wait_for(lambda: phase(panel) in ("lost", "closed"), "the end of the connection")
+        wait_for(lambda: phase(panel) in ("lost", "closed"), what="the end of the connection")
 
 
 @pytest.mark.parametrize("is_own", [True, False], ids=["control_process", "session"])
@@ -272,7 +268,7 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         panel = stack.enter_context(notebook.RunPanel(subject))
         if is_own:
             panel.connect.click()
-        wait_for(lambda: phase(panel) == "idle", "a robot")
+        wait_for(lambda: phase(panel) == "idle", what="a robot")
         panel.state.pose(PRO7.home + np.eye(7)[0])
         panel.state.make_plan()
         assert panel.state.plan.report.ok
@@ -282,8 +278,8 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         assert limits.fields[0][1].problem
         limits.fields[0][1].box.value = "30"
         limits.send.click()
-        wait_for(lambda: np.isclose(panel.model.limits.joint.upper[0], np.radians(30.0)), "the limit in the model")
-        wait_for(lambda: not panel.state.plan.report.ok, "the plan checked anew")
+        wait_for(lambda: np.isclose(panel.model.limits.joint.upper[0], np.radians(30.0)), what="the limit in the model")
+        wait_for(lambda: not panel.state.plan.report.ok, what="the plan checked anew")
         assert panel.state.status.setup.joints.upper[0] == pytest.approx(np.radians(30.0))
         assert panel.execute.disabled
         panel.state.make_plan()
@@ -291,9 +287,9 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         with pytest.raises(RcilabError, match="joint 1"):
             panel.state.pose(PRO7.home + np.eye(7)[0])
         limits.auto.value = True
-        wait_for(lambda: panel.state.robot.auto_limit, "auto_limit")
+        wait_for(lambda: panel.state.robot.auto_limit, what="auto_limit")
         limits.whole.click()
-        wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], "the whole range")
+        wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], what="the whole range")
         limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"
         limits.send.click()
         assert "20.0° to 10.0° is no range" in limits.said.value

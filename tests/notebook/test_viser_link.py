@@ -4,7 +4,7 @@ import math
 import socket
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from websockets.sync.client import connect
 import rcilab
 from rcilab.core.errors import UsageError
 from rcilab.notebook.viser_link import PreviewPage, serve_preview
+from tests.waiting import wait_for
 
 PRO7 = rcilab.load_model("xMatePro7")
 MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.5)
@@ -23,13 +24,6 @@ MOTION = rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.5)
 def page() -> Iterator[PreviewPage]:
     with serve_preview(MOTION, PRO7) as page:
         yield page
-
-
-def wait_until(condition: Callable[[], bool], timeout: float = 5.0) -> bool:
-    deadline = time.monotonic() + timeout
-    while not condition() and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return condition()
 
 
 def handshake(page: PreviewPage, origin: str | None) -> int:
@@ -60,12 +54,12 @@ def test_our_own_origin_is_let_in(page: PreviewPage) -> None:
 
 
 def test_it_plays_by_itself_to_the_end(page: PreviewPage) -> None:
-    assert wait_until(lambda: page.time >= MOTION.duration - 1e-3)
+    assert wait_for(lambda: page.time >= MOTION.duration - 1e-3)
 
 
 def test_a_hand_on_the_slider_holds_the_arm_there(page: PreviewPage) -> None:
     page._slider.value = 0.25
-    assert wait_until(lambda: page._play.value is False)
+    assert wait_for(lambda: page._play.value is False)
     time.sleep(0.1)
     assert page.time == 0.25
     q1 = MOTION.at(0.25).q[0]
@@ -75,9 +69,9 @@ def test_a_hand_on_the_slider_holds_the_arm_there(page: PreviewPage) -> None:
 
 def test_a_time_that_is_no_number_is_not_taken(page: PreviewPage) -> None:
     page._slider.value = 0.2
-    assert wait_until(lambda: page._play.value is False)
+    assert wait_for(lambda: page._play.value is False)
     page._slider.value = math.nan
-    assert wait_until(lambda: page.time == 0.2)
+    assert wait_for(lambda: page.time == 0.2)
 
 
 def test_a_taken_port_is_refused_with_the_way_round_it(page: PreviewPage) -> None:

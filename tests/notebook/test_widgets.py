@@ -8,9 +8,7 @@ import pytest
 
 import rcilab
 from rcilab.core.errors import InvalidValueError
-from tests.late import Late
-
-widgets = Late("rcilab.notebook.widgets")
+from rcilab.notebook import widgets
 
 PRO7 = rcilab.load_model("xMatePro7")
 

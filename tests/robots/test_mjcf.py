@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -13,9 +14,6 @@ from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.files import write_model
 from rcilab.robots.mjcf import build_mjcf
-from tests.late import Late
-
-mujoco = Late("mujoco")
 
 arms = pytest.mark.parametrize("name", ROBOT_NAMES)
 

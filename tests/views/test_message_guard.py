@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 import msgspec
@@ -18,6 +17,7 @@ from websockets.sync.client import connect
 from rcilab.views.access_control import Gate
 from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
 from rcilab.views.viser_server import GuardedServer, listen
+from tests.waiting import wait_for
 
 NAN, INF = float("nan"), float("inf")
 
@@ -85,14 +85,7 @@ class Page:
         """Waits until all that was sent before has been dealt with."""
         wanted = self.last.value + 1
         self.update(link, self.last, wanted)
-        wait_until(lambda: self.last.value == wanted)
-
-
-def wait_until(condition: Callable[[], bool], timeout: float = 20.0) -> None:
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.01)
+        wait_for(lambda: self.last.value == wanted)
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +99,7 @@ def page() -> Iterator[Page]:
 def link(page):
     with page.open() as opened:
         page.enter(opened)
-        wait_until(lambda: page.guard.viser.get_clients())
+        wait_for(lambda: page.guard.viser.get_clients())
         page.settle(opened)
         page.heard.clear()
         yield opened
@@ -183,7 +176,7 @@ def test_an_upload_is_bounded_before_it_is_kept(page, link):
     start_upload(page, link, "good", 7, 2)
     send_part(page, link, "good", 0, b"half")
     send_part(page, link, "good", 1, b"end")
-    wait_until(lambda: [file.content for file in page.uploads] == [b"halfend"])
+    wait_for(lambda: [file.content for file in page.uploads] == [b"halfend"])
     start_upload(page, link, "second", 10, 1)
     start_upload(page, link, "third", 10, 1)
     page.settle(link)
@@ -197,7 +190,7 @@ def test_a_page_that_goes_leaves_no_upload_behind(page):
         page.settle(link)
         start_upload(page, link, "left", 100, 2)
         page.settle(link)
-    wait_until(lambda: not states)
+    wait_for(lambda: not states)
     with page.open() as link:
         link.recv(timeout=20)
         page.settle(link)
@@ -216,7 +209,7 @@ def test_a_message_without_an_end_costs_its_sender_the_connection(page):
 
 def client_of(page) -> int:
     """The newest client."""
-    wait_until(lambda: page.guard.viser.get_clients())
+    wait_for(lambda: page.guard.viser.get_clients())
     return max(page.guard.viser.get_clients())
 
 
@@ -259,11 +252,11 @@ def test_a_page_that_watches_changes_nothing_and_is_shown_what_all_see(page, lin
         assert page.refused == [watcher], "said once a second"
         for_anyone(page.box)
         page.update(other, page.box, True)
-        wait_until(lambda: page.box.value)
+        wait_for(lambda: page.box.value)
         page.box.value = False
         page.watching.clear()
         page.update(other, page.slider, 0.9)
-        wait_until(lambda: page.slider.value == 0.9)
+        wait_for(lambda: page.slider.value == 0.9)
         page.slider.value = 0.5
 
 

@@ -20,6 +20,7 @@ from rcilab.workbench import security
 from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
 from rcilab.workbench.page import decorate
 from rcilab.workbench.security import bind, check_host
+from tests.waiting import wait_for
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "localhost", "::1"])
@@ -185,18 +186,9 @@ def test_a_client_can_set_a_value_but_neither_nan_nor_anything_else(door):
         page.send(update(slider._impl.uuid, update_cb=[]))
         page.send(update(slider._impl.uuid, value=0.7, update_cb=[]))
         page.send(update(slider._impl.uuid, value=0.25))
-        wait_until(lambda: slider.value == 0.25)
+        wait_for(lambda: slider.value == 0.25)
     assert len(slider._impl.update_cb) == 1
     assert slider.value == 0.25
-
-
-def wait_until(condition, timeout: float = 10.0) -> None:
-    import time
-
-    end = time.monotonic() + timeout
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.01)
 
 
 def test_stop_and_seek_arrive_over_the_live_channel_and_garbage_does_not_hurt_it(door):
@@ -245,7 +237,7 @@ def test_only_a_page_that_brings_its_key_is_somebody(door):
                 page.send(json.dumps(said))
         for said in ({"kind": "hello", "page": 5, "key": key}, *words, {"kind": "answer", "yes": 1}):
             page.send(json.dumps(said))
-        wait_until(lambda: len(door.asked) >= 2)
+        wait_for(lambda: len(door.asked) >= 2)
     assert door.here == [5, 5]
     assert door.asked == [5, (5, True)]
     door.live.forget(5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,9 +14,6 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
 from rcilab.robots.mjcf import build_mjcf
-from tests.late import Late
-
-mujoco = Late("mujoco")
 
 TERMS = ("full", "inertial", "coriolis", "gravity", "friction")
 
