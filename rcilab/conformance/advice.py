@@ -39,7 +39,7 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         row: Index of the first sample that does.
         count: Number of samples in a row.
         ratio: Worst value over bound.
-        off_start: Whether the motion starts elsewhere than it was judged from.
+        off_start: Whether the motion starts elsewhere than the start state of the check.
     """
     if condition.stage == "start" and condition.signal == "torque":
         return Phrase("advice.torque.rate")

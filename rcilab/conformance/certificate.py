@@ -1,4 +1,4 @@
-"""The proof that a motion was judged: for this motion, this arm, this start, and no other."""
+"""The proof that a motion was checked: for this motion, this arm, this start, and no other."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 
 NO_SAFETY_BOX = "none"
-"""The part of a certificate that says that the motion was judged without a safety box."""
-NOT_JUDGED = "not judged"
-"""The part of a certificate that says that nobody looked for collisions: no hand-off takes it."""
+"""The part of a certificate for a motion that was checked without a safety box."""
+NOT_CHECKED = "not judged"  # The text is part of certificates in saved runs.
+"""The part of a certificate for a motion whose distances were not checked: no hand-off accepts it."""
 
 MODEL_PARTS = ("model", "limits", "tool", "load")
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What a conforming motion was judged with, by fingerprint. A plain value: it may travel between processes."""
+    """What a conforming motion was checked with, by fingerprint. A plain value that can be sent between processes."""
 
     entries: tuple[tuple[str, str], ...]
     """Name and fingerprint of each part."""
     start_q: tuple[float, ...]
-    """Commanded joint angles it was judged from, [rad]."""
+    """Commanded joint angles at the start of the check, [rad]."""
 
     @property
     def parts(self) -> Mapping[str, str]:
@@ -63,15 +63,15 @@ class Certificate:
             motion: The motion that is about to run.
             model: The arm as it is now, with its tool and load.
             start_q: Commanded joint angles now (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
-            box: The safety box that is in force now. Where there is none, or it is not active, a motion that was
-                judged inside a box is as good as one that was not.
-            distance: How far the links must stay from each other and from the floor here; None takes whichever it was
-                judged with. One that was judged with none at all is refused.
+            box: The safety box that is in force now. Without an active one, a motion that was checked inside a box is
+                accepted too.
+            distance: How far the links must stay from each other and from the floor here; None accepts the one it
+                was checked with. A motion whose distances were not checked is refused.
             mode: How the motion is about to be commanded; each mode has its own conditions.
 
         Raises:
-            CertificateError: Something is not what was judged; `.changed` and the message name it.
-            InvalidValueError: The motion is no motion, the model no model, or the start no state of the arm.
+            CertificateError: Something differs from the check; `.changed` and the message name it.
+            InvalidValueError: The motion, the model or the start is not valid for this arm.
         """
         require_motion(motion)
         require_model(model)
@@ -86,7 +86,7 @@ class Certificate:
             changed.remove("safety box")
         if "safety distance" in changed and distance is None:
             changed.remove("safety distance")
-        if self.parts.get("safety distance") == NOT_JUDGED and "safety distance" not in changed:
+        if self.parts.get("safety distance") == NOT_CHECKED and "safety distance" not in changed:
             changed.append("safety distance")
         if changed:
             raise CertificateError(self._reason(changed, start, mode), changed)
@@ -105,14 +105,14 @@ class Certificate:
             i = int(np.abs(off).argmax())
             if abs(off[i]) > START_POSITION_TOLERANCE:
                 return (
-                    f"the motion was judged from another start: joint {i + 1} is commanded to "
+                    f"the motion was checked from another start: joint {i + 1} is commanded to "
                     f"{degrees(start.q[i]):.4f}° now, the motion starts from {degrees(self.start_q[i]):.4f}°; "
                     f"plan it again from where the arm is (state.q_c)"
                 )
-            return "the motion was judged from another start: the arm moves differently now; plan it again"
+            return "the motion was checked from another start: the arm moves differently now; plan it again"
         if changed == ["mode"]:
             return (
-                f"the motion was judged for the mode {self.parts['mode']}, and is about to run in the mode {mode}, "
+                f"the motion was checked for the mode {self.parts['mode']}, and is about to run in the mode {mode}, "
                 f"which has other conditions; check it again with mode={mode!r}"
             )
         if changed == ["safety box"]:
@@ -121,15 +121,15 @@ class Certificate:
                 "with box=..., the one that set_cartesian_limit was given"
             )
         if changed == ["safety distance"]:
-            if self.parts["safety distance"] == NOT_JUDGED:
-                return "nobody looked for collisions: check the motion again, without distance=None"
+            if self.parts["safety distance"] == NOT_CHECKED:
+                return "collisions were not checked: check the motion again, without distance=None"
             return (
                 "the certificate is stale: it does not cover the safety distance that is asked for here; check the "
                 "motion again with that distance=..."
             )
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
-        return f"the certificate is stale: {what} {verb} changed since the motion was judged; check it again"
+        return f"the certificate is stale: {what} {verb} changed since the motion was checked; check it again"
 
 
 def issue_certificate(
@@ -162,13 +162,13 @@ def verify_certificate(
     distance: ClearanceLimit | None = None,
     mode: Mode = "joint_position",
 ) -> None:
-    """Makes sure that there is a certificate and that it is for this; the gate in front of every hand-off.
+    """Makes sure that there is a certificate for this motion; every hand-off calls this first.
 
     Arguments as in `Certificate.verify`.
 
     Raises:
-        CertificateError: There is none, or it is stale.
-        InvalidValueError: It is something else: the report, say.
+        CertificateError: It is missing or stale.
+        InvalidValueError: It is something else, such as the report.
     """
     if certificate is None:
         raise CertificateError(
@@ -190,7 +190,7 @@ def require_certificate(certificate: object) -> Certificate:
         return certificate
     if hasattr(certificate, "certificate"):
         raise InvalidValueError("certificate", Unquoted("pass report.certificate,"), "not the report")
-    raise InvalidValueError("certificate", certificate, "is no certificate; pass check(motion, model).certificate")
+    raise InvalidValueError("certificate", certificate, "is not a certificate; pass check(motion, model).certificate")
 
 
 def _start_fingerprint(start: StartState) -> str:
@@ -199,7 +199,7 @@ def _start_fingerprint(start: StartState) -> str:
 
 
 def _distance_fingerprint(distance: ClearanceLimit | None) -> str:
-    return NOT_JUDGED if distance is None else hashlib.sha256(repr(distance).encode()).hexdigest()
+    return NOT_CHECKED if distance is None else hashlib.sha256(repr(distance).encode()).hexdigest()
 
 
 def _box_fingerprint(box: SafetyBox | None) -> str:

@@ -1,4 +1,4 @@
-"""The judgement of a whole motion at once: the controller's arithmetic, vectorised."""
+"""The check of a whole motion at once: the controller's arithmetic, vectorised."""
 
 from __future__ import annotations
 
@@ -40,20 +40,20 @@ def check(
     distance: ClearanceLimit | None = STANDARD_DISTANCE,
     mode: Mode = "joint_position",
 ) -> Report:
-    """Returns what the robot would say to this motion, and whether its links keep their distance.
+    """Checks a motion against the conditions of its robot's controller, and the distances between its links.
 
-    Every row of the 1 ms grid is judged by backward differences, as the controller does it: the arm comes from the
-    start state, and after the last row the controller holds it. To an arm that moves, row 0 is the command it has
-    already had, and row 1 the first new one. Torques, which the manual recommends to bound, are those of the model
+    Every row of the 1 ms grid is checked by backward differences, as the controller does it: the arm comes from the
+    start state, and after the last row the controller holds it. For a moving arm row 0 is the command that it
+    already has, and row 1 the first new one. Torques, which the manual recommends to bound, are those of the model
     with its tool and load and without gravity, as the manual counts commanded torques (4.4).
 
-    No controller looks for collisions, so the rows on distances are ours: links that touch each other or the floor are
-    refused, 20 mm are recommended. Distances are those between capsules, looked at so often that no point of a link
-    moves more than 5 mm in between, and in every cycle where they come near a bound. They take most of the time.
+    No controller checks for collisions, so the rows on distances are rcilab's own: links that touch each other or the
+    floor are refused, 20 mm are recommended. Distances are those between capsules, computed so often that no point of a
+    link moves more than 5 mm in between, and in every cycle near a bound. They take most of the time.
 
-    By default the angles themselves are commanded. In Cartesian modes it is the tool's poses and arm angles that they
-    lead to: tool and arm angle are judged, whether a pose is singular, and the joints that follow from the poses. In
-    torque mode it is the torques that make the arm follow: they have to keep their bounds, and the arm its range.
+    By default the angles themselves are commanded. In Cartesian modes the tool's poses and arm angles that follow
+    from them are: tool, arm angle, singularity and the joint angles of the poses are checked. In torque mode the
+    torques that make the arm follow are commanded: the torques and the arm's range are checked.
 
     A motion that ends inside the joint ranges may start outside, by `RECOVERY_RANGE` at most, and lead back, not
     farther out, as `plan_recovery` plans it. A tool that starts outside the box may move inwards only.
@@ -63,15 +63,15 @@ def check(
         model: The arm.
         start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one; None for
             an arm that stands where the motion starts.
-        box: Where the tool shall stay, as `set_cartesian_limit` tells the robot; None, or one that is not active, is
-            not judged.
-        distance: How far links shall stay from each other and from the floor, and where that is. None does not judge
-            it: for planning while somebody drags, as no hand-off takes the certificate.
+        box: Where the tool shall stay, as sent with `set_cartesian_limit`; None, or one that is not active, is not
+            checked.
+        distance: How far links shall stay from each other and from the floor, and where that is. None does not
+            check it: for planning while the operator drags a target, as no hand-off accepts the certificate.
         mode: How it will be commanded, as in `control`; the certificate is for this mode.
 
     Raises:
-        InvalidValueError: The motion is for another number of joints, the start is no state of this arm, there is no
-            such mode, or one of them is something else altogether.
+        InvalidValueError: The motion is for another number of joints, or the start, the mode or another argument is not
+            valid for this arm.
     """
     require_motion(motion)
     require_model(model)
@@ -79,7 +79,9 @@ def check(
         raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
     box = active_box(box)
     if distance is not None and not isinstance(distance, ClearanceLimit):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise InvalidValueError("distance", described(distance), "is no ClearanceLimit; ClearanceLimit(links=...) is")
+        raise InvalidValueError(
+            "distance", described(distance), "is not a ClearanceLimit; use ClearanceLimit(links=...)"
+        )
     state = as_start(motion.start if start is None else start, model.n)
     mode = require_mode(mode)
     rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
@@ -98,9 +100,9 @@ def _report(
     distance: ClearanceLimit | None,
     mode: Mode,
 ) -> Report:
-    """Returns the verdict of some of the conditions on a motion for this arm."""
-    judge = _MotionChecker(motion, model, start, box, distance, mode)
-    results = [judge.judge(row) for row in rows]
+    """Returns the report of some of the conditions on a motion for this arm."""
+    checker = _MotionChecker(motion, model, start, box, distance, mode)
+    results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
     return Report(
@@ -110,9 +112,9 @@ def _report(
         warnings=tuple(v for v in found if v.condition.necessity == "recommended"),
         motion=motion,
         start=start,
-        measure=partial(judge.usage, rows),
+        measure=partial(checker.usage, rows),
         issue=partial(issue_certificate, motion, model, start, box, distance, mode),
-        judge=partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
+        check_again=partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
     )
 
 
@@ -133,7 +135,7 @@ class _MotionChecker:
         self._signals = MotionSignals(motion, model, start, box, distance, mode)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
-    def judge(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
+    def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
         values, first_time = self._signals.table(condition)
         lower, upper = condition.bounds(self._limits)
         smallest, largest = values.min(axis=0), values.max(axis=0)
@@ -163,7 +165,7 @@ class _MotionChecker:
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
 
     def usage(self, conditions: tuple[Condition, ...]) -> Usage:
-        """Returns the worst of the necessary conditions that are judged throughout, in every row of the motion."""
+        """Returns the worst of the necessary conditions that hold throughout, in every row of the motion."""
         wanted = [row for row in conditions if row.necessity == "necessary" and row.stage == "throughout"]
         return worst_of((row, self._used(row)) for row in wanted)
 

@@ -1,7 +1,7 @@
-"""The conditions on distances between links and from the floor: rcilab's own, for no controller knows of them.
+"""The conditions on distances between links and from the floor: rcilab's own, no controller checks them.
 
-An xMate that is told to drive its wrist into its base, or into the table, does so and raises a fault at the contact.
-So these rows are necessary, raise no fault, and the virtual controller does not look at them, as the real one does not.
+An arm that is commanded into its own base, or into the table, moves there and raises a fault at the contact. So these
+rows are necessary and raise no fault, and the virtual controller does not check them, as the real one does not.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rcilab.core.condition import AnyLimits, Bounds, Condition, Necessity
 
 OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]
-"""How far beyond its bound a distance uses none of it. A choice: a hand's width."""
+"""How far beyond its bound a distance uses nothing of it: a hand's width."""
 
 Distance: TypeAlias = Literal["link_distance", "floor_distance"]
 """The signals that are distances."""
@@ -29,7 +29,7 @@ _QUANTITIES: dict[Distance, str] = {
 
 
 def clearance_conditions(distance: ClearanceLimit) -> tuple[Condition, ...]:
-    """Returns the rows that judge a safety distance: what is necessary first, then what is recommended beyond it."""
+    """Returns the rows for a safety distance: what is necessary first, then what is recommended beyond it."""
     necessary: dict[Distance, float] = {"link_distance": distance.links, "floor_distance": distance.floor}
     if distance.floor_height is None:
         del necessary["floor_distance"]

@@ -1,4 +1,4 @@
-"""Distances between links and from the floor, cycle by cycle. For programs of one's own: no controller does this."""
+"""Distances between links and from the floor, cycle by cycle, for the user's own programs: no controller does this."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from rcilab.model.robot_model import RobotModel
 
 
 class ClearanceMonitor:
-    """Judges one commanded position a cycle by the same rows as `check`, at the same places.
+    """Checks one commanded position a cycle by the same rows as `check`, at the same points of the path.
 
     Owned by the thread that runs the cycle. A step takes some 20 us.
 
     Attributes:
         distance: The smallest one in the last step, [m].
-        links: Between whom it was.
+        links: Between which links it was.
 
     Args:
         model: The arm.
-        distance: What to keep. The monitor starts at `model.home`; `reset` places it.
+        distance: What to keep. The monitor starts at `model.home`; `reset` moves it.
     """
 
     def __init__(self, model: RobotModel, distance: ClearanceLimit = STANDARD_DISTANCE) -> None:
@@ -36,7 +36,7 @@ class ClearanceMonitor:
         self.reset(model.home)
 
     def reset(self, q: Sequence[float] | JointVector) -> None:
-        """Forgets the past: the arm stands at `q`.
+        """Restarts the history: the arm stands at `q`.
 
         Args:
             q: Joint angles, n numbers, [rad].

@@ -1,4 +1,4 @@
-"""Distances along a whole motion: looked at every 5 mm of travel, less often far from everything, more often near it.
+"""Distances along a whole motion: computed every 5 mm of travel, less often far from everything, more often near it.
 
 No point of the arm moves farther than the joints turn times their levers, so a distance changes by no more than that
 from one row to the next (conservative advancement, Mirtich 1996). After a look nothing can happen until the arm has

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 LISTED = 8  # Violations in full in a report: a thousand sentences are of no use.
 
 _TIMES = 10.0
-"""From this share of a bound on it is told as a factor, not in percent."""
+"""From this share of a bound on it is written as a factor, not in percent."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Voice:
-    """In which language, and in which units; without units in SI, angles in degrees beside."""
+    """Language and units of the sentences; without units SI, with degrees next to radians."""
 
     language: Language
     units: Units | None = None
@@ -41,8 +41,8 @@ def explain_report(
     Args:
         report: What to explain.
         language: "en" is English, "zh" Chinese.
-        units: What angles and lengths are said in; None is SI, with degrees beside.
-        slowed: What `report.slow_down` has found, where that is known already: finding it takes the longest.
+        units: Units of angles and lengths; None is SI, with degrees next to radians.
+        slowed: The result of `report.slow_down`, where it is known already: the search takes the longest.
 
     Raises:
         InvalidValueError: There is no such language.
@@ -201,7 +201,7 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
 
 
 def explain_quantity(row: Condition, language: Language = "en") -> str:
-    """Returns what a condition judges.
+    """Returns the quantity of a condition.
 
     Raises:
         InvalidValueError: There is no such language.

@@ -37,14 +37,14 @@ def report_html(report: Report, language: Language = "en") -> str:
     head = "".join(f"<th {_CELL}>{heading}</th>" for heading in headings)
     body = "".join(_row(row, language) for row in report.rows)
     is_english = language == "en"
-    told = str(report).splitlines()[1] if is_english else explain_verdict(report, language)
+    headline = str(report).splitlines()[1] if is_english else explain_verdict(report, language)
     found = (*report.violations, *report.warnings)
     sentences = [str(item) if is_english else explain_violation(item, language) for item in found[:_LISTED]]
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
     if len(found) > _LISTED:
         items += f"<li>{say(language, 'html.more', count=str(len(found) - _LISTED))}</li>"
     return (
-        f'<div><b style="color:{COLORS[verdict]}">{escape(told)}</b>'
+        f'<div><b style="color:{COLORS[verdict]}">{escape(headline)}</b>'
         f"<br>{escape(report.title.text(language))}"
         f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
         + (f"<ul>{items}</ul>" if items else "")

@@ -1,4 +1,4 @@
-"""How much of its limits a motion uses, cycle by cycle: what a path is coloured by."""
+"""How much of its limits a motion uses, cycle by cycle: the colours of a drawn path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.condition import Condition
 
 FREE = 0.8
-"""Part of a joint's range, or of the way to a face of the safety box, that uses nothing of it. A choice."""
+"""Part of a joint's range, or of the way to a face of the safety box, that counts as unused, so that
+most of a path has one colour."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

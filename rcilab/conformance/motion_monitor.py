@@ -1,4 +1,4 @@
-"""One cycle judged in any mode, for any arm: the per-cycle monitors put together by the arm's own table."""
+"""One cycle checked in any mode, for any arm: the per-cycle monitors combined by the arm's own table."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from rcilab.motion.range import RECOVERY_RANGE, range_from
 
 
 class Monitor:
-    """Judges one command a cycle by the rows that `check` judges a whole motion by, in the same mode.
+    """Checks one command a cycle by the rows that `check` uses for a whole motion, in the same mode.
 
-    Owned by the thread that runs the cycle. It is used alike for every arm: an xMate is judged by the manual's table,
-    a Panda by Franka's. A motion's rest is judged with the first commands and with the one that says `finished`.
+    Owned by the thread that runs the cycle. It is used alike for every arm, with the table of the arm's maker.
+    Standstill at the ends of a motion is checked with the first commands and with the one that says `finished`.
 
     Args:
         model: The arm with its tool and load.
         mode: How it is commanded, as in `control`.
-        box: Where the tool shall stay; None, or one that is not active, is not judged.
-        distance: How far links shall stay from each other and from the floor; None is not judged.
+        box: Where the tool shall stay; None, or one that is not active, is not checked.
+        distance: How far links shall stay from each other and from the floor; None is not checked.
 
     Raises:
-        InvalidValueError: The model is none, or there is no such mode.
+        InvalidValueError: The model is not a RobotModel, or there is no such mode.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Monitor:
         self.reset(model.home)
 
     def reset(self, start: ArrayLike | StartState) -> None:
-        """Forgets the past: the arm stands somewhere, or comes along.
+        """Restarts the history: the arm stands somewhere, or moves.
 
         Args:
             start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one.
@@ -131,15 +131,15 @@ class Monitor:
     def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[LimitViolation, ...]:
         """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
 
-        A number that is none breaks every condition on it. After a breach of a necessary condition a controller stops;
-        here the history moves on, and it is for the caller to `reset`. A pose for which there are no joint angles
+        NaN breaks every condition on it. After a violation of a necessary condition a controller stops; here the
+        history advances, and the caller has to `reset`. A pose for which there are no joint angles
         leaves the joints where they were.
 
         Args:
             command: As the mode asks for; without an arm angle the elbow stays.
             cycles: Cycles since the last command, 1 or more.
-            side: Side of the elbow, +1 or -1 as `model.elbow` counts it, which Franka commands with every pose; None
-                keeps the last. Other arms have none.
+            side: Side of the elbow, +1 or -1 as `model.elbow` counts it, for interfaces that command it with every
+                pose; None keeps the last.
 
         Raises:
             InvalidValueError: The command is of another kind than the mode's, or for another number of joints.
@@ -154,7 +154,7 @@ class Monitor:
         return tuple(found)
 
     def observe(self, q: Sequence[float] | Array, dq: Sequence[float] | Array) -> tuple[LimitViolation, ...]:
-        """Takes what the sensors say in this cycle and returns what the arm itself breaks.
+        """Takes what the sensors measure in this cycle and returns what the arm itself breaks.
 
         Args:
             q: Joint angles, shape (n,), [rad].
@@ -227,7 +227,7 @@ class Monitor:
         return found + self._distances(q)
 
     def _difference(self, row: Condition) -> Sequence[float]:
-        """Returns the last velocities or accelerations of what a row judges: the joints', or the tool's norm."""
+        """Returns the last velocities or accelerations for a row: the joints', or the tool's norm."""
         if row.is_per_joint:
             assert self._joints is not None
             return self._joints.dq if row.order == 1 else self._joints.ddq
@@ -269,7 +269,7 @@ class Monitor:
         return self._clearance.broken()
 
     def _own(self, breaches: list[LimitViolation]) -> list[LimitViolation]:
-        """Returns breaches of the manual's rows as those of the arm's own table; what it has no row for is none."""
+        """Returns violations of common rows as those of the arm's own table, without those that it has no row for."""
         own = self._own_rows
         return [breach._replace(condition=own[row.id]) for breach in breaches if (row := breach.condition).id in own]
 

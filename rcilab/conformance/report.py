@@ -41,7 +41,7 @@ class ConditionResult:
     broken: int
     """Number of samples that break the condition, over all joints."""
     links: LinkPair | None = None
-    """Between whom the worst distance is; None for anything that is no distance."""
+    """The two links of the worst distance; None for other conditions."""
     led_in: float = 0.0
     """How far outside the safety box the tool starts, to be led in, [m]; 0 inside, and in all other rows."""
 
@@ -67,7 +67,7 @@ class ConditionResult:
 
     @property
     def fault(self) -> FaultCode | None:
-        """What the controller raises when it is broken; None for what it only recommends, or does not know of."""
+        """What the controller raises when it is broken; None for what it only recommends, or does not check."""
         return self.condition.fault
 
     @property
@@ -118,7 +118,7 @@ class ConditionResult:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Violation:
-    """Consecutive samples of one joint that break one condition; `str` makes a sentence of it.
+    """Consecutive samples of one joint that break one condition; `str` returns a sentence.
 
     Attributes:
         condition: What is broken.
@@ -130,7 +130,7 @@ class Violation:
         bound: The bound it passes.
         ratio: As in ConditionResult; 1 is the bound.
         advice: What to do about it.
-        links: Between whom the worst distance is; None for anything that is no distance.
+        links: The two links of the worst distance; None for other conditions.
     """
 
     condition: Condition
@@ -152,11 +152,11 @@ class Violation:
     advice: str
     """What to do about it."""
     links: LinkPair | None = None
-    """Between whom the worst distance is; None for anything that is no distance."""
+    """The two links of the worst distance; None for other conditions."""
 
     @property
     def fault(self) -> FaultCode | None:
-        """What the controller raises; None for what it only recommends, or does not know of."""
+        """What the controller raises; None for what it only recommends, or does not check."""
         return self.condition.fault
 
     @property
@@ -215,11 +215,11 @@ class Report:
         worst: The row of the necessary condition nearest to, or farthest past, its bound.
         violations: Necessary conditions that are broken, worst first: the robot would stop, or hit itself or the floor.
         warnings: Recommended conditions that are broken, worst first.
-        motion: What was judged.
-        start: The state of the arm that it was judged from.
-        measure: Looks at every cycle when somebody asks for `usage`.
-        issue: Makes the certificate when somebody asks for it.
-        judge: Judges another motion by some of the rows, for the same arm, start, safety box and mode.
+        motion: The motion that was checked.
+        start: The state of the arm at the start of the check.
+        measure: Evaluates every cycle, for `usage`.
+        issue: Makes the certificate, for `certificate`.
+        check_again: Checks another motion by some of the rows, for the same arm, start, safety box and mode.
     """
 
     title: Phrase
@@ -231,15 +231,15 @@ class Report:
     warnings: tuple[Violation, ...]
     """Recommended conditions that are broken, worst first."""
     motion: Motion
-    """What was judged."""
+    """The motion that was checked."""
     start: StartState
-    """The state of the arm that it was judged from."""
+    """The state of the arm at the start of the check."""
     measure: Callable[[], Usage] = field(repr=False)
-    """Looks at every cycle when somebody asks for `usage`."""
+    """Evaluates every cycle, for `usage`."""
     issue: Callable[[], Certificate] = field(repr=False)
-    """Makes the certificate when somebody asks for it."""
-    judge: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
-    """Judges another motion by some of the rows, for the same arm, start, safety box and mode."""
+    """Makes the certificate, for `certificate`."""
+    check_again: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
+    """Checks another motion by some of the rows, for the same arm, start, safety box and mode."""
 
     @property
     def ok(self) -> bool:
@@ -282,7 +282,7 @@ class Report:
         """Returns the least slow-down of the motion that passes, or why none does.
 
         The curve stays the same and runs slower as a whole. The factor is found to 0.1 % and checked: the motion comes
-        with its own report. A way that leaves its range or the box does not mend, nor does a start that is elsewhere.
+        with its own report. It does not help a path that leaves its range or the box, nor a start that is elsewhere.
         Rows from elsewhere (`Motion.from_cycles`) jump a little in acceleration from row to row, and that shows at one
         factor and not at the next: with them a smaller factor may pass by chance.
 
@@ -310,7 +310,7 @@ class Report:
 
         Args:
             language: "en" is English, "zh" Chinese.
-            units: What angles and lengths are said in; None is SI, with degrees beside.
+            units: Units of angles and lengths; None is SI, with degrees next to radians.
             slowed: What `slow_down` has found already.
 
         Raises:

@@ -1,4 +1,4 @@
-"""What a controller would see of a motion, cycle by cycle, as tables: the values that the conditions judge."""
+"""The values of a motion that the conditions are on, as tables with a row for each cycle of the controller."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
 
 HOLD_SAMPLES = 3
-"""Cycles judged after the last row, in which the controller repeats it: a third difference looks back that far."""
+"""Cycles checked after the last row, in which the controller repeats it: a third difference reaches back that far."""
 
 _SMOOTH_JERK = 0.01
-"""Part of the jerk limits below which torques change smoothly, at speeds within the limits. A choice: a tenth of what
-the torque rate allows."""
+"""Part of the jerk limits below which torques change smoothly, at speeds within the limits: a tenth of what the torque
+rate allows."""
 _SMOOTH_STEP = 16
-"""[cycles] How far apart torques are computed where they change smoothly; straight lines between them. A choice."""
+"""[cycles] How far apart torques are computed where they change smoothly; straight lines between them, exact to 2 % of
+the bounds (tests/conformance/test_signals.py)."""
 
 
 _SURE = 0.8
-"""Part of a bound on torques up to which straight lines leave no doubt; rows beyond are computed. A choice."""
+"""Part of a bound on torques up to which straight lines are enough; rows beyond it are computed."""
 
 
 class MotionSignals:
@@ -45,7 +46,7 @@ class MotionSignals:
         start: Where the arm comes from.
         box: Where the tool shall stay, or None.
         distance: How far links shall stay from each other and from the floor, or None.
-        mode: How it is commanded. Told in torques, these are exact in every row, as the controller judges each.
+        mode: How it is commanded. Commanded torques are exact in every row, as the controller checks each.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class MotionSignals:
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
     def table(self, condition: Condition) -> tuple[Array, float]:
-        """Returns the values that a condition judges, shape (rows, n) or (rows, 1), and the first row's time, [s]."""
+        """Returns the values for a condition, shape (rows, n) or (rows, 1), and the first row's time, [s]."""
         if condition.stage == "throughout":
             return self._throughout(condition), 0.0
         if condition.stage == "end":
@@ -75,7 +76,7 @@ class MotionSignals:
         return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._rest(condition), 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
-        """Returns between whom the distance in a row of a table is; None for anything that is no distance."""
+        """Returns the two links of the distance in a row of a table; None for other conditions."""
         if not condition.is_clearance:
             return None
         return LinkPair(*self._clearance[condition.signal].links[row].tolist())

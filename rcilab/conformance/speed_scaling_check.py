@@ -1,4 +1,4 @@
-"""The judgement of another pace: the rows that will be commanded, by the conditions of the mode they run in."""
+"""The check of a change of the speed override: the new rows, by the conditions of the mode they run in."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
 from rcilab.motion.speed_scaling import SpeedScaledMotion, begun_at, changed_pace, require_pace
 
-_ATTEMPTS = 12  # Candidates that are judged in full; a choice.
+_ATTEMPTS = 12  # Candidates that are checked in full, which bounds the time of a change.
 _PAST = 3  # Rows that the differences of a row reach back to.
 
 
 def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
-    """Returns a motion that runs at a pace from its first row on, judged by the conditions of its mode.
+    """Returns a motion that runs with a speed override from its first row on, checked by the conditions of its mode.
 
-    The way is the one that was judged, so safety box and distances need no other look; at 1 nothing does.
+    The path is the one that was checked, so safety box and distances need no other check; at 1 nothing does.
 
     Args:
-        motion: The motion, judged as planned.
+        motion: The motion, checked as planned.
         pace: `SLOWEST_PACE` to 1.
         model: The arm, with its tool and load.
         mode: How it is commanded.
 
     Raises:
-        InvalidValueError: The pace is out of range.
-        PlanningError: At this pace it breaks a condition that it keeps as planned, as torques may that hold the arm.
+        InvalidValueError: The override is out of range.
+        PlanningError: At this speed it breaks a condition that it keeps as planned, as torques that hold the arm may.
     """
     paced = begun_at(motion, require_pace(pace))
     if not paced.changed:
@@ -47,13 +47,13 @@ def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> Sp
 
 
 def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
-    """Returns the motion that goes on with another pace from a cycle on, as soon as all conditions allow it.
+    """Returns the motion that continues with another speed override from a cycle on, once all conditions allow it.
 
-    The way stays what was judged before, so safety box and distances need no other look. Where the same pace is asked
-    for that it has, nothing changes.
+    The path stays the one that was checked, so safety box and distances need no other check. The override that it has
+    already changes nothing.
 
     Args:
-        paced: How it is run through so far.
+        paced: The motion as it runs so far.
         cycle: The first row that may differ.
         pace: From 0, to be held, to 1.
         model: The arm, with its tool and load.

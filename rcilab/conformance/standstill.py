@@ -1,4 +1,4 @@
-"""What counts as rest at the ends of a motion: what one cycle cannot tell from it."""
+"""What counts as standstill at the ends of a motion: what is below the resolution of one cycle."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from rcilab.core.condition import AnyLimits, Condition, all_limits, joint_limits
 
 
 def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
-    """Returns how large a difference of commands can be in the first cycle out of rest, within the jerk limit.
+    """Returns how large a difference of commands can be in the first cycle after standstill, within the jerk limit.
 
-    A motion that leaves rest as fast as it may has moved by the time of its second command. So the controller, who sees
-    commands alone, cannot tell less than this from rest, and neither row of the table asks for more.
+    A motion that starts as fast as it may has moved by the time of its second command. So the controller, which has
+    only the commands, cannot distinguish less than this from standstill, and no row of the table asks for more.
 
     Args:
         condition: A row on the velocity or acceleration at the start or the end.
@@ -32,11 +32,11 @@ def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Arra
 
 
 def beyond_a_cycle(value: Array, condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
-    """Returns what is left of velocities or accelerations without what one cycle cannot tell from rest.
+    """Returns what is left of velocities or accelerations without what one cycle cannot resolve.
 
     Args:
         value: Differences of commands, shape (..., n), or (..., 1) for norms of the tool's.
-        condition: The row that judges them.
+        condition: The row on them.
         limits: Of the arm.
         cycles: Over how many cycles the differences are taken.
     """

@@ -1,4 +1,4 @@
-"""Rest at both ends of a motion, cycle by cycle: the recommended rows that `check` judges of a whole motion."""
+"""Standstill at both ends of a motion, cycle by cycle: the recommended rows of `check`."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rcilab.core.limits import Limits
 
 
 class StandstillMonitor:
-    """Judges whether a motion leaves rest and comes to rest, from the differences that other monitors took.
+    """Checks that a motion starts and ends at standstill, from the differences that other monitors took.
 
     Owned by the thread that runs the cycle. A velocity needs two commands, an acceleration three, so those at the start
-    are judged with the second and the third command, and those at the end with the one that says it is the last.
+    are checked with the second and the third command, and those at the end with the last one.
 
     Args:
         limits: Bounds of the arm.
@@ -29,10 +29,10 @@ class StandstillMonitor:
         self.reset(False)
 
     def reset(self, is_moving: bool) -> None:
-        """Forgets the past.
+        """Restarts the history.
 
         Args:
-            is_moving: Whether the arm comes along: then it has already had its first command.
+            is_moving: Whether the arm moves already: then it has its first command.
         """
         self._passed = 0 if is_moving else -1
 
@@ -42,7 +42,7 @@ class StandstillMonitor:
         """Takes the differences of this cycle and returns what they break at an end of the motion.
 
         Args:
-            differences: Gives the velocities or accelerations that a row judges, one a joint, or a norm of the tool's.
+            differences: Returns the velocities or accelerations for a row, one a joint, or a norm of the tool's.
             cycles: Cycles since the last command, 1 or more.
             is_last: Whether this command ends the motion.
         """

@@ -1,4 +1,4 @@
-"""The state a motion is judged from: what the controller holds before the first command."""
+"""The state that a motion starts from: what the controller holds before the first command."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class StartState:
 
     @property
     def moving(self) -> bool:
-        """Whether the arm is on its way."""
+        """Whether the arm moves."""
         return bool(self.dq.any() or self.ddq.any())
 
 

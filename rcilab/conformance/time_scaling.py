@@ -23,26 +23,26 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
 
 AT_MOST = 20.0
-"""Largest factor that is tried. A choice: what needs more does not run too fast, it jumps."""
+"""Largest factor that is tried: a motion that needs more does not run too fast, it jumps."""
 LONGEST = 600.0  # [s]
-"""How long a slowed motion may last. A choice: 600 000 rows; the factor 2 is tried in any case."""
+"""How long a slowed motion may last: 600 000 rows. The factor 2 is tried in any case."""
 PRECISION = 1e-3
 """Part by which the factor may be larger than the least one."""
 
-_USUAL_TRIES = 6  # A choice: searches that were looked at took 2 to 13.
+_USUAL_TRIES = 6  # Measured searches took 2 to 13; for the progress estimate only.
 _LOOK_BACK = 3  # [cycles] How long a third difference sees the start.
 _JUMP = 4.0
-"""Times more than a smooth motion would have left at the largest factor: then it jumps. A choice."""
+"""Times more than a smooth motion would have left at the largest factor: then it jumps."""
 
 Obstacle: TypeAlias = Literal["position", "elsewhere", "moving_start", "jump", "too_fast"]
-"""Why no slow-down mends a motion: the way itself leaves its range or the box; it starts elsewhere than the arm is; the
-arm moves at the start, and the slowed motion does not go on like that; it jumps somewhere; it is too fast for the
+"""Why no slow-down helps: the path itself leaves its range or the box; it starts elsewhere than the arm is; the arm
+moves at the start, and the slowed motion does not continue that; it jumps somewhere; it is too fast for the
 largest factor tried."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SlowDown:
-    """The least slow-down of a motion that passes, or why none does; `str` makes a sentence of it."""
+    """The least slow-down of a motion that passes, or why no slow-down passes; `str` returns a sentence."""
 
     before: Motion
     """The motion as it was."""
@@ -95,8 +95,8 @@ def find_slow_down(
         report: On the motion as it is.
         recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
         at_most: Largest factor to try, 1 or more; None is `AT_MOST`, or what makes the motion last `LONGEST`.
-        progress: Called after every try with the part of the work that is done, 0 to 1; nobody knows how many tries
-            there will be, so it is an estimate. What it raises ends the search.
+        progress: Called after every try with the part of the work that is done, 0 to 1: an estimate, as the
+            number of tries is not known. What it raises ends the search.
 
     Raises:
         InvalidValueError: `at_most` is no number of at least 1.
@@ -107,12 +107,12 @@ def find_slow_down(
 class _Search:
     """One search, with the report it starts from and the largest factor it may try."""
 
-    def __init__(self, report: Report, at_most: float, tell: Callable[[float], None]) -> None:
+    def __init__(self, report: Report, at_most: float, progress: Callable[[float], None]) -> None:
         self._report = report
         self._motion = report.motion
         self._at_most = at_most
         self._nothing = SlowDown(before=report.motion, at_most=at_most)
-        self._tell, self._tries = tell, 0
+        self._progress, self._tries = progress, 0
 
     def run(self, recommended: bool) -> SlowDown:
         """Returns the least slow-down that keeps the necessary conditions, and on demand the recommended ones."""
@@ -162,9 +162,9 @@ class _Search:
         """Returns those of the rows that are broken at a factor."""
         if not rows:
             return []
-        found = _broken(self._report.judge(self._motion.slowed(factor), rows))
+        found = _broken(self._report.check_again(self._motion.slowed(factor), rows))
         self._tries += 1
-        self._tell(self._tries / (self._tries + _USUAL_TRIES))
+        self._progress(self._tries / (self._tries + _USUAL_TRIES))
         return found
 
     def _obstacle(self, row: ConditionResult) -> Obstacle:
@@ -181,8 +181,8 @@ class _Search:
 
     def _proven(self, factor: float, name: str, unmet: tuple[Condition, ...]) -> SlowDown:
         motion = self._motion.slowed(factor)
-        report = self._report.judge(motion, tuple(row.condition for row in self._report.rows))
-        if not report.ok:  # More rows of the same way: one of them is past a bound that those before just kept.
+        report = self._report.check_again(motion, tuple(row.condition for row in self._report.rows))
+        if not report.ok:  # More rows of the same path: one of them is past a bound that those before just kept.
             return replace(self._nothing, decisive=_broken(report)[0], obstacle="position")
         decisive = next(row for row in report.rows if row.id == name)
         return replace(self._nothing, factor=factor, motion=motion, report=report, decisive=decisive, unmet=unmet)

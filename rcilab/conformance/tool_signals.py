@@ -1,4 +1,4 @@
-"""What a controller would see of the tool and the elbow, cycle by cycle, as tables: `CartesianMonitor` for all rows."""
+"""The signals of the tool and the elbow as tables with a row for each cycle: `CartesianMonitor` for all rows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rcilab.core.spatial import Rotation9, turn_between
 from rcilab.model.robot_model import RobotModel
 
 BEFORE = 3
-"""Commands before the first that is judged: a third difference looks back that far."""
+"""Commands before the first that is checked: a third difference reaches back that far."""
 
 Differences: TypeAlias = tuple[Array, Array, Array, Array]
 """A signal and its first, second and third backward difference, a row a cycle."""
@@ -30,7 +30,7 @@ class ToolSignals:
     Args:
         model: The arm with its tool.
         start: Where the arm comes from.
-        path: Joint angles in every cycle that is judged, shape (N, n), [rad].
+        path: Joint angles in every checked cycle, shape (N, n), [rad].
     """
 
     def __init__(self, model: RobotModel, start: StartState, path: JointPath) -> None:
@@ -43,7 +43,7 @@ class ToolSignals:
     def differences(self, signal: str) -> Differences:
         """Returns the norms of "translation" or "rotation" with their differences, or the "arm_angle" and its own.
 
-        Each of shape (N, 1). Place and orientation themselves have no norm that is judged: zeros stand for them.
+        Each of shape (N, 1). Position and orientation themselves have no bound on a norm: zeros stand for them.
         """
         if signal == "arm_angle":
             return self._arm_angle
@@ -64,7 +64,7 @@ class ToolSignals:
 
     @cached_property
     def start_distance(self) -> float:
-        """How far the first commanded place of the tool is from the arm's, [m]."""
+        """How far the first commanded position of the tool is from the arm's, [m]."""
         return float(np.linalg.norm(self._poses[self._first, :3, 3] - self._poses[BEFORE - 1, :3, 3]))
 
     @cached_property
@@ -100,7 +100,7 @@ class ToolSignals:
         return np.zeros_like(first), first, second, third
 
     def _judged(self, steps: Array) -> tuple[Array, Array, Array]:
-        """Returns velocity, acceleration and jerk of the cycles that are judged from the steps between all rows."""
+        """Returns velocity, acceleration and jerk of the checked cycles from the steps between all rows."""
         first = steps / CYCLE_TIME
         second = np.diff(first, axis=0) / CYCLE_TIME
         third = np.diff(second, axis=0) / CYCLE_TIME

@@ -1,4 +1,4 @@
-"""How far the links shall stay from each other and from the floor: rcilab's own demand, no controller knows of it."""
+"""How far the links shall stay from each other and from the floor: rcilab's own condition, no controller checks it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.core.arrays import as_number
 from rcilab.core.errors import InvalidValueError
 
 ADVISED_DISTANCE = 0.02  # [m]
-"""What is left to what the capsules do not cover: a link's rim (at most 12 mm), cables, a brake's way. A choice."""
+"""What is left to what the capsules do not cover: a link's rim (at most 12 mm), cables, a brake's way."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +18,7 @@ class ClearanceLimit:
     """How far the capsules around the links shall stay from each other and from the floor.
 
     A motion that comes as near as `links` or `floor` is refused; one that comes as near as `advised` is advised
-    against. The floor is a horizontal plane under the whole arm; the base stands on it and is not judged against it.
+    against. The floor is a horizontal plane under the whole arm; the base stands on it and is not compared with it.
 
     Raises:
         InvalidValueError: A number is not finite, or a distance or radius is below 0.
@@ -31,7 +31,7 @@ class ClearanceLimit:
     advised: float = ADVISED_DISTANCE
     """What is recommended for both, [m]."""
     floor_height: float | None = 0.0
-    """Height of the floor in the base frame, [m]; None where there is none, as under a ceiling."""
+    """Height of the floor in the base frame, [m]; None without a floor, as under a ceiling."""
     tool_radius: float | None = None
     """Radius of a capsule from the flange to the origin of the tool that counts as a link, [m]; None: the tool has no
     body."""

@@ -32,9 +32,9 @@ Signal: TypeAlias = Literal[
     "external_force",
     "lost_commands",
 ]
-"""What is judged: every joint's angle or torque; the tool's position, the norms of its translation and rotation; the
-arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the side of the elbow;
-external torques and force; commands that did not come."""
+"""The quantity of a condition: every joint's angle or torque; the tool's position, the norms of its translation and
+rotation; the arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the side
+of the elbow; external torques and force; commands that did not arrive."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -59,7 +59,7 @@ class Condition:
     id: str
     """Short stable name, such as "joint.velocity"."""
     quantity: str
-    """What is judged, in words, such as "commanded velocity"."""
+    """The quantity in words, such as "commanded velocity"."""
     formula: str
     """As the manual, or the maker's page, prints it."""
     necessity: Necessity
@@ -70,22 +70,22 @@ class Condition:
     fault: FaultCode | None = None
     """What the maker's controller raises; None for a recommended condition, and for one that it does not check."""
     stage: Stage
-    """When it is judged."""
+    """When it is checked."""
     signal: Signal = "joint"
-    """What it judges."""
+    """The signal it is on."""
     order: int
-    """Which derivative of the signal it judges: 0 the signal itself, 3 its jerk."""
+    """Which derivative of the signal it is on: 0 the signal itself, 3 its jerk."""
     bounds: Callable[[AnyLimits], Bounds]
     """Returns its bounds from the limits of an arm."""
 
     @property
     def is_measured(self) -> bool:
-        """Whether it judges what the arm does, not what it is told to do."""
+        """Whether it is on measured values, not on commanded ones."""
         return self.id.startswith("measured.")
 
     @property
     def is_clearance(self) -> bool:
-        """Whether it judges distances, which no controller does: rcilab's own."""
+        """Whether it is on distances, which no controller checks: rcilab's own."""
         return self.signal in ("link_distance", "floor_distance")
 
     @property

@@ -79,12 +79,12 @@ def all_makers() -> tuple[Maker, ...]:
 
 
 def maker_of(model: RobotModel) -> Maker | None:
-    """Returns the maker of an arm; None for an arm of none of them."""
+    """Returns the maker of an arm; None for an arm without a maker."""
     return next((maker for maker in all_makers() if maker.name == model.description.maker), None)
 
 
 def find_scheme(scheme: str) -> Maker | None:
-    """Returns the maker whose controllers have addresses with a URL scheme; None where there is none."""
+    """Returns the maker whose controllers have addresses with a URL scheme; None for an unknown scheme."""
     return next((maker for maker in all_makers() if maker.scheme == scheme.lower()), None)
 
 
@@ -102,7 +102,7 @@ def require_simulator(model: RobotModel) -> RobotModel:
     """Returns `model` if its arm has a virtual controller.
 
     Raises:
-        ModelError: It has none; the message says what can be done with it.
+        ModelError: It has no virtual controller; the message says what can be done with it.
     """
     return _require(model, simulated_robots())
 

@@ -107,7 +107,7 @@ class RobotDescription:
     """An arm: everything the rest of the package computes from."""
 
     name: str
-    """Name as the manual spells it, such as xMatePro7."""
+    """Name as the maker spells it."""
     dh: tuple[DhRow, ...]
     """One row a joint, base to flange."""
     dh_source: str
@@ -131,7 +131,7 @@ class RobotDescription:
     elbow_flip: float | None = None
     """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker knows no flip."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
-    """What base and links are drawn and collide as, base first; None for the xMates, whose housings are designed."""
+    """What base and links are drawn and collide as, base first; None for arms with designed housings."""
 
     @property
     def n(self) -> int:

@@ -236,7 +236,7 @@ def _housing_capsules(ends: list[tuple[_Joint, float, float]]) -> list[Capsule]:
 
 
 def _capsule(start: tuple[float, float, float], end: tuple[float, float, float], radius: float) -> Capsule:
-    """Returns a capsule in whole micrometres: nobody needs more, and files stay readable."""
+    """Returns a capsule in whole micrometres: more digits are of no use, and files stay readable."""
     return Capsule(readonly_copy(np.round(start, 6)), readonly_copy(np.round(end, 6)), round(radius, 6))
 
 

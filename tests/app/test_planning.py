@@ -40,7 +40,7 @@ def test_a_plan_is_judged_but_for_collisions_until_it_is_completed():
 
 def test_only_a_completed_plan_has_a_certificate_to_run_with():
     quick = planned(HOME + 0.2)
-    with pytest.raises(CertificateError, match="nobody looked for collisions"):
+    with pytest.raises(CertificateError, match="collisions were not checked"):
         quick.report.certificate.verify(quick.motion, MODEL, HOME)
     quick.completed().report.certificate.verify(quick.motion, MODEL, HOME)
 

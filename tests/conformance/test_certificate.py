@@ -95,7 +95,7 @@ def test_a_certificate_covers_the_distances_it_was_judged_with():
 @pytest.mark.parametrize("distance", [None, STANDARD_DISTANCE])
 def test_where_nobody_looked_for_collisions_no_hand_off_takes_the_certificate(distance):
     quick = check(MOTION, MODEL, distance=None).certificate
-    with pytest.raises(CertificateError, match="nobody looked for collisions: check the motion again") as caught:
+    with pytest.raises(CertificateError, match="collisions were not checked: check the motion again") as caught:
         verify_certificate(quick, MOTION, MODEL, START, distance=distance)
     assert caught.value.changed == ("safety distance",)
 
@@ -122,7 +122,7 @@ def test_it_travels_between_processes():
 def test_what_is_no_certificate_is_refused_in_words():
     with pytest.raises(InvalidValueError, match=r"certificate: pass report\.certificate, not the report"):
         verify_certificate(check(MOTION, MODEL), MOTION, MODEL, START)
-    with pytest.raises(InvalidValueError, match="certificate: 'yes' is no certificate"):
+    with pytest.raises(InvalidValueError, match="certificate: 'yes' is not a certificate"):
         verify_certificate("yes", MOTION, MODEL, START)
     with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
         CERTIFICATE.verify(MOTION, "xMatePro7", START)

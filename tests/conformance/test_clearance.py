@@ -228,7 +228,7 @@ def test_without_a_distance_nothing_is_looked_for():
     report = check(plan_joint(MODEL, MODEL.home, ON_THE_FLOOR), MODEL, distance=None)
     assert report.ok
     assert not [row for row in report.rows if row.condition.is_clearance]
-    with pytest.raises(InvalidValueError, match=r"distance: 0\.02 is no ClearanceLimit"):
+    with pytest.raises(InvalidValueError, match=r"distance: 0\.02 is not a ClearanceLimit"):
         check(plan_joint(MODEL, MODEL.home, MODEL.home), MODEL, distance=0.02)
 
 

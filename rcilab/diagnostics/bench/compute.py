@@ -171,7 +171,7 @@ def bench_check_full() -> Measurement:
 def bench_check_joint_rows() -> Measurement:
     """The judgement of a 7-joint motion of 10 s by the conditions on joint angles alone."""
     model = load_model(_ROBOT)
-    judge = check(motion_of(model, 1.0), model, distance=None).judge
+    judge = check(motion_of(model, 1.0), model, distance=None).check_again
     rows = tuple(row for row in RCI_CONDITIONS.motion if row.signal == "joint")
     return _bench_check("check_joint_rows", lambda motion: judge(motion, rows), model, 5.0)
 

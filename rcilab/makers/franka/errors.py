@@ -1,7 +1,7 @@
 """The errors of Franka's control interface, each with the name its client library prints.
 
-An error is one of 41 flags of the robot state; the value is its place there. What a name stands for is told on Franka's
-page "Errors"; those that the page leaves out are told from their names. Franka words two things in its own way: a
+An error is one of 41 flags of the robot state; the value is its place there. Franka's page "Errors" explains the
+names; those that the page leaves out are explained from their names. Franka words two things in its own way: a
 velocity "discontinuity" is an acceleration beyond its limit, an acceleration "discontinuity" a jerk.
 """
 

@@ -21,8 +21,8 @@ _SDK = "vendor SDK, rate limiter"
 def cartesian_limits(limits: Limits, table: LimitTable = "manual") -> Limits:
     """Returns the limits with the Cartesian bounds of a table.
 
-    A program that limits its rates with the vendor's SDK may legally exceed the manual's numbers (4.4); whoever wants
-    to run it unchanged judges by "sdk".
+    A program that limits its rates with the vendor's SDK may legally exceed the manual's numbers (4.4); "sdk" lets it
+    run unchanged.
 
     Args:
         limits: The bounds of an arm as its model has them: the manual's.

@@ -148,7 +148,7 @@ _RODS = (
     (_rod((0.0, 0.0, -0.220), (0.0, 0.0, -0.190), 0.052), _rod((0.0, 0.032, -0.178), (0.0, 0.094, -0.090), 0.032)),
     (_rod((0.0, -0.025, 0.0), (0.0, 0.065, 0.0), 0.050), _rod((0.0, 0.0, 0.0), (0.080, 0.0, 0.010), 0.045)),
     (_rod((0.0, 0.0, 0.100), (0.0, 0.0, 0.045), 0.045),),
-)  # A choice, after pictures of the arm: round enough to be told from an xMate, and inside the real housings' reach.
+)  # After pictures of the arm: rounder than an xMate, and inside the real housings' reach.
 
 DESCRIPTION = RobotDescription(
     name="Panda",
