@@ -14,7 +14,7 @@ from rcilab.app.setup.configuration_json import build_setup, setup_facts
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.atomic_file import write_whole
 from rcilab.core.errors import RcilabError
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 

@@ -13,7 +13,7 @@ from rcilab.core.memory import memory_needed
 
 if TYPE_CHECKING:
     from rcilab.control_process import Supervisor, SupervisorStatus
-    from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+    from rcilab.makers.configuration import RobotConfiguration
     from rcilab.model.robot_model import RobotModel
 
 

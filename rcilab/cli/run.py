@@ -199,7 +199,7 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
     print(_what_will_move(motion, robot), file=out, flush=True)
     if not args.yes and not _agreed(out):
         return _Move(outcome="not_agreed", report=report)
-    if not robot.motor_state():
+    if not robot.is_powered():
         robot.power_on()
     result = stopper.execute(robot, motion, report.certificate)
     if not args.json:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.spatial import IDENTITY
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 
 if TYPE_CHECKING:
     from rcilab.control_process.pending_request import PendingRequest

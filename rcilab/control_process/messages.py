@@ -16,8 +16,8 @@ from rcilab.core.errors import RcilabError, RecordedError
 from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
-from rcilab.execution.guiding import GuideKind, GuideSpace
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace
 
 _OVERHEAD = 256  # [bytes] Left for what surrounds an error in its reply.
 _LONGEST = 1000  # Characters that are kept of a sentence that does not fit.
@@ -27,11 +27,7 @@ _LONGEST = 1000  # Characters that are kept of a sentence that does not fit.
 class Settings:
     """The arm, as far as the control process needs it when it starts."""
 
-    name: str
-    """Name of the arm, to compare with the controller's."""
-    lengths: tuple[tuple[float, float], ...]
-    """Its Denavit-Hartenberg a and d, one pair a joint, [m]; also to compare."""
-    n: int
+    arm: ExpectedArm
     limits: Limits
     T_flange_tool: Pose
 

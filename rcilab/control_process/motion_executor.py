@@ -19,8 +19,7 @@ from rcilab.execution.filters import RateLimiter
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
-from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import RciConnection
+from rcilab.makers.driver import StreamingDriver
 from rcilab.model.robot_model import RobotModel
 from rcilab.realtime.cpu_latency import awake_cores
 
@@ -60,7 +59,7 @@ class MotionExecutor:
         self._mode: Mode = "joint_position"
         self._softly: str | None = None  # Why a motion in torques is being brought to rest.
 
-    def execute(self, link: RciConnection, commands: RciCommands, model: RobotModel, request: Execute) -> None:
+    def execute(self, driver: StreamingDriver, model: RobotModel, request: Execute) -> None:
         """Streams the rows that lie in the block; returns once the arm stands at their end.
 
         Raises:
@@ -70,39 +69,38 @@ class MotionExecutor:
         """
         rows = self._block.motion[: request.rows]
         mode = request.mode
-        if link.latest is not None:
-            mismatch = describe_start_mismatch(rows[0], link.latest.q_c)
+        if driver.latest is not None:
+            mismatch = describe_start_mismatch(rows[0], driver.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
-            model.rigid_body.motion_torque(link.latest.q, link.latest.dq, link.latest.dq)  # Builds it now.
+            model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Builds it now.
         self._publisher.begin_motion(request.duration)
         self._publisher.say("moving", "moving")
         self._stream, self._softly = MotionStream(rows, mode, model, self._publisher.on_cycle), None
         try:
-            self._move(link, commands, model, self._stream, "idle.arrived", mode)
+            self._move(driver, model, self._stream, "idle.arrived", mode)
         finally:
             self._stream = None
 
-    def jog(self, link: RciConnection, commands: RciCommands, model: RobotModel) -> None:
+    def jog(self, driver: StreamingDriver, model: RobotModel) -> None:
         """Moves the arm as long as somebody holds it, and returns once it stands.
 
         Raises:
             StoppedError: Somebody wanted it to end before.
             ControlError: The controller stopped the arm.
         """
-        assert link.latest is not None  # A connection begins with a state.
-        self._jog = HeldJog(self._block, model, link.latest.q_c)
+        assert driver.latest is not None  # A connection begins with a state.
+        self._jog = HeldJog(self._block, model, driver.latest.q_c)
         self._publisher.begin_motion(None)
         self._publisher.say("moving", "moving.jog")
         try:
-            self._move(link, commands, model, self._jog, "idle.jogged")
+            self._move(driver, model, self._jog, "idle.jogged")
         finally:
             self._jog = None
 
     def _move(
         self,
-        link: RciConnection,
-        commands: RciCommands,
+        driver: StreamingDriver,
         model: RobotModel,
         callback: Callback,
         arrived: str,
@@ -111,8 +109,7 @@ class MotionExecutor:
         """Runs a motion; what it says at its end tells why it ended."""
         self._mode = mode
         loop = ControlLoop(
-            link,
-            commands,
+            driver,
             self._limits,
             ControllerMode[mode.upper()],
             self._log,

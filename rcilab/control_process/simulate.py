@@ -60,10 +60,10 @@ def simulate(
         raise
     try:
         if not model.T_flange_tool.is_close(IDENTITY, 0.0):
-            session.set_coor(model.T_flange_tool)
+            session.set_tool(model.T_flange_tool)
         own, joint = load_model(model.name).limits.joint, model.limits.joint
         if not (np.array_equal(joint.lower, own.lower) and np.array_equal(joint.upper, own.upper)):
-            session.set_joint_limit(joint.lower, joint.upper)
+            session.rci.set_joint_limit(joint.lower, joint.upper)
         if model.load.mass > 0.0:
             session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
     except BaseException:

@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.rokae.faults import Fault
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]

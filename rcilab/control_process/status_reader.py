@@ -15,7 +15,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
-from rcilab.makers.rokae.driver.commands import SIGNALS
+from rcilab.makers.driver import SIGNALS
 from rcilab.makers.rokae.faults import faults_from_bits
 
 

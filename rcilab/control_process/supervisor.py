@@ -47,11 +47,9 @@ from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
 from rcilab.core.memory import memory_needed
 from rcilab.core.state import Mode
-from rcilab.execution.guiding import GuideKind, GuideSpace, require_guidable
-from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.commands import require_signal
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration, require_setup
-from rcilab.makers.rokae.driver.identify import dh_lengths
+from rcilab.execution.guiding import require_guidable
+from rcilab.makers.configuration import RobotConfiguration, require_setup
+from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
 if TYPE_CHECKING:
@@ -102,7 +100,7 @@ class Supervisor(Closeable):
 
         self.model = require_driver(require_model(model))
         require_plant(plant)
-        self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target))
+        self._target = VIRTUAL if target == VIRTUAL else normalise_address(target)
         if setup is None:
             setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
         self.model = require_setup(setup).applied_to(self.model)
@@ -640,9 +638,7 @@ class Supervisor(Closeable):
 def build_settings(model: RobotModel) -> Settings:
     """Returns what the control process needs to know of an arm when it starts."""
     return Settings(
-        name=model.name,
-        lengths=tuple(dh_lengths(model.description.dh)),
-        n=model.n,
+        arm=ExpectedArm.of(model),
         limits=replace(model.limits, sources={}),
         T_flange_tool=model.T_flange_tool,
     )

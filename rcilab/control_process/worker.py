@@ -47,14 +47,8 @@ from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import RobotMode, RobotState
 from rcilab.execution.guiding import HandGuide
 from rcilab.execution.recorder import CycleLog
-from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.commands import SIGNALS, RciCommands
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration, give_setup
-from rcilab.makers.rokae.driver.connection import RciConnection
-from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there
-from rcilab.makers.rokae.driver.recovery import recover
-from rcilab.makers.rokae.driver.transport import SocketTransport
-from rcilab.makers.rokae.wire import STATE_SIZE
+from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.driver import SIGNALS, StreamingDriver, open_driver
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.punctual import PRIORITY
@@ -84,11 +78,11 @@ class ControlProcess:
         self._mover = MotionExecutor(
             block, self._settings.limits, self._publisher, self._log, self._requests, self._oversight
         )
-        self._link: RciConnection | None = None
+        self._driver: StreamingDriver | None = None
         self._address = ""
         self._is_ending = False
         self._next_look = 0.0
-        self._model = load_model(self._settings.name, tool=self._settings.T_flange_tool)
+        self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
         self._told: tuple[JointVector, Pose] | None = None  # Joint angles and pose that the tool was last found from.
 
@@ -96,9 +90,9 @@ class ControlProcess:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
         plan_stop(
             self._settings.limits.joint,
-            np.zeros(self._settings.n),
-            np.full(self._settings.n, 0.1),
-            np.zeros(self._settings.n),
+            np.zeros(self._settings.arm.n),
+            np.full(self._settings.arm.n, 0.1),
+            np.zeros(self._settings.arm.n),
         )  # The first one loads the planner; the next one must be quick.
         self._model.rigid_body.gravity(self._model.home)  # Loads its library: from a cold disk that takes seconds.
         granted = enter_realtime(PRIORITY)
@@ -117,7 +111,7 @@ class ControlProcess:
     def leave(self) -> None:
         """Brings the arm to rest and ends, as when the supervisor is gone; where no arm is connected, at once."""
         self._oversight.dismiss()
-        if self._link is None:
+        if self._driver is None:
             sys.exit()
 
     def _is_orphan(self) -> bool:
@@ -130,26 +124,26 @@ class ControlProcess:
 
     def _listen(self) -> None:
         """Takes in what the robot says while nothing moves."""
-        if self._link is None:
+        if self._driver is None:
             self._publisher.beat()
             time.sleep(_LOOK)
             return
         if self._guide is None and self._publisher.snapshot.phase == "idle":
             time.sleep(_NAP)  # To wake up for every state of a resting arm would take twice its share of a core.
-            self._record(self._link.poll(0.0), is_awaited=False)
-        states = self._link.poll(_LOOK)
+            self._record(self._driver.poll(0.0), is_awaited=False)
+        states = self._driver.poll(_LOOK)
         self._record(states)
         if states:
             self._show_state(states[-1])
-        elif time.monotonic_ns() - self._link.received_ns > SILENCE * 1e9:
+        elif time.monotonic_ns() - self._driver.received_ns > SILENCE * 1e9:
             self._publisher.say("lost", "lost.silent", address=self._address)
 
     def _record(self, states: list[RobotState], *, is_awaited: bool = True) -> None:
         if not states:
             self._publisher.beat()  # Otherwise every row is one.
         for state in states:
-            assert self._link is not None
-            self._log.write(state, self._link.received_ns, is_awaited=is_awaited)
+            assert self._driver is not None
+            self._log.write(state, self._driver.received_ns, is_awaited=is_awaited)
 
     def _show_state(self, state: RobotState) -> None:
         """Keeps the phase in step with what the robot reports while nothing moves."""
@@ -200,7 +194,6 @@ class ControlProcess:
             case SetOutput():
                 self._set_output(request.signal, request.level)
             case ReadInputs():
-                self._require_link()
                 self._read_inputs()
             case Reboot():
                 self._reboot()
@@ -214,13 +207,13 @@ class ControlProcess:
             case StopGuiding():
                 self._end_guiding("idle.guided")
             case Execute():
-                link = self._require_link()
-                self._record(link.poll(_LOOK))
-                self._mover.execute(link, self._commands, self._model, request)
+                driver = self._require_driver()
+                self._record(driver.poll(_LOOK))
+                self._mover.execute(driver, self._model, request)
             case Jog():
-                link = self._require_link()
-                self._record(link.poll(_LOOK))
-                self._mover.jog(link, self._commands, self._model)
+                driver = self._require_driver()
+                self._record(driver.poll(_LOOK))
+                self._mover.jog(driver, self._model)
             case SwitchRows():
                 raise UsageError("no motion runs whose pace could change").coded("no_pace")
             case End():
@@ -229,13 +222,13 @@ class ControlProcess:
     def _fail(self, request: NumberedRequest, error: Exception) -> None:
         if isinstance(error, StoppedError):
             pass  # Said already.
-        elif isinstance(error, ConnectionLostError) or (isinstance(request.body, Connect) and self._link is None):
+        elif isinstance(error, ConnectionLostError) or (isinstance(request.body, Connect) and self._driver is None):
             self._disconnect()
             code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
             self._publisher.say("lost", code, error=str(error))
         elif isinstance(error, ControlError) and error.faults:
             self._say_fault(error.faults)
-        elif self._link is not None and self._guide is None:
+        elif self._driver is not None and self._guide is None:
             self._publisher.say("idle", "idle.failed", error=str(error))
         self._requests.answer(request, error)
 
@@ -243,64 +236,52 @@ class ControlProcess:
         self._disconnect()
         self._address = request.address
         self._publisher.say("connecting", "connecting", address=self._address)
-        place = parse_address(self._address)
-        transport = SocketTransport(place, STATE_SIZE, request.timeout)
-        try:
-            link = RciConnection(transport, self._settings.n, str(place), request.timeout)
-            require_arm_there(RciCommands(link), self._settings.name, self._settings.lengths, str(place))
-            await_first_state(link, place, transport.local_address, request.timeout)
-        except BaseException:
-            transport.close()
-            raise
-        self._link = link
-        link.on_states = self._record
+        driver = open_driver(self._address, request.timeout, self._settings.arm)
+        self._driver = driver
+        driver.on_states = self._record
         self._log.restart()
         self._publisher.restart()
-        if link.latest is not None:
-            self._record([link.latest])  # Before it is said to be ready: the newest row may be a dead predecessor's.
+        if driver.latest is not None:
+            self._record([driver.latest])  # Before it is said to be ready: the newest row may be a dead predecessor's.
         self._told = None
-        self._commands = RciCommands(link, self._settings.limits)
         self._learn_power()
         self._configure(request.configuration)
 
     def _configure(self, configuration: RobotConfiguration) -> None:
-        self._require_link()
+        driver = self._require_driver()
         self._model = configuration.applied_to(self._model)
-        give_setup(self._commands, configuration)
+        driver.configure(configuration)
         self._say_ready()
 
     def _set_power(self, on: bool) -> None:
-        self._require_link()
-        self._commands.set_motor_power(on)
+        self._require_driver().power(on)
         self._learn_power()
         self._say_ready()
 
     def _set_output(self, signal: int, level: bool) -> None:
-        self._require_link()
         bit = 1 << signal
-        self._commands.set_do(signal, level)
+        self._require_driver().set_output(signal, level)
         shown = self._publisher.snapshot
         outputs = shown.outputs | bit if level else shown.outputs & ~bit
         self._publisher.update(outputs_known=shown.outputs_known | bit, outputs=outputs)
         self._read_inputs()  # What an output is wired to may have changed.
 
     def _read_inputs(self) -> None:
-        self._publisher.update(inputs=sum(self._commands.get_di(signal) << signal for signal in SIGNALS))
+        driver = self._require_driver()
+        self._publisher.update(inputs=sum(driver.read_input(signal) << signal for signal in SIGNALS))
 
     def _reboot(self) -> None:
-        self._require_link()
-        self._commands.reboot()
+        self._require_driver().reboot()
         self._disconnect()
         self._publisher.say("lost", "lost.rebooted", address=self._address)
 
     def _recover(self) -> None:
-        recover(self._commands, self._require_link())
+        self._require_driver().recover()
         self._learn_power()
         self._say_ready()
 
     def _start_guiding(self, request: StartGuiding) -> None:
-        self._require_link()
-        guide = HandGuide(self._commands)
+        guide = HandGuide(self._require_driver())
         guide.start(request.space, request.kind)
         self._guide = guide
         self._publisher.begin_motion(None)
@@ -324,11 +305,11 @@ class ControlProcess:
             self._publisher.say("idle", code, **facts)
 
     def _learn_power(self) -> None:
-        self._publisher.update(powered=self._commands.motor_state())
+        self._publisher.update(powered=self._require_driver().is_powered())
 
     def _say_ready(self) -> None:
-        if self._link is not None and self._link.latest is not None and self._link.latest.faults:
-            self._say_fault(self._link.latest.faults)
+        if self._driver is not None and self._driver.latest is not None and self._driver.latest.faults:
+            self._say_fault(self._driver.latest.faults)
         elif self._guide is not None:
             self._publisher.say("moving", "moving.guided")
         elif self._publisher.snapshot.powered:
@@ -338,22 +319,22 @@ class ControlProcess:
 
     def _say_fault(self, faults: Sequence[object]) -> None:
         """Says what has stopped the arm; a safety stop shows as an error bit that means something else."""
-        state = None if self._link is None else self._link.latest
+        state = None if self._driver is None else self._driver.latest
         if state is not None and state.robot_mode is RobotMode.USER_STOPPED:
             self._publisher.say("fault", "fault.pressed")
         else:
             self._publisher.say("fault", "fault", faults=name_faults(faults))
 
-    def _require_link(self) -> RciConnection:
-        if self._link is None:
+    def _require_driver(self) -> StreamingDriver:
+        if self._driver is None:
             raise UsageError("no controller is connected; reconnect first").coded("not_connected")
-        return self._link
+        return self._driver
 
     def _disconnect(self) -> None:
-        if self._link is not None:
+        if self._driver is not None:
             self._guide = None  # The controller ends it with the connection.
-            self._link.close()
-            self._link = None
+            self._driver.close()
+            self._driver = None
             self._publisher.update(powered=None, inputs=-1, outputs_known=0, outputs=0)
 
 

@@ -12,9 +12,9 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
+from rcilab.core.rotation import nine
 from rcilab.core.spatial import find_rotation_error
 from rcilab.core.state import RobotState
-from rcilab.execution.rotation import nine
 
 START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
 _ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bit; this is for a sign of zero.

@@ -26,15 +26,10 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.execution.call_times import CallTimes
 from rcilab.execution.command_validation import check_command, describe_distance, distance_to, require_first
-from rcilab.execution.fault_report import describe_faults
 from rcilab.execution.filters import CommandFilter, is_near
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner
-from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import RciConnection
-from rcilab.makers.rokae.driver.refusal import Refusal
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.wire import SafetyStop, StartMotionMode, build_command
+from rcilab.makers.driver import StreamingDriver
 
 if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
@@ -59,27 +54,21 @@ Callback: TypeAlias = Callable[[RobotState, float], Command]
 StopCheck: TypeAlias = Callable[[float], str | None]
 """Asked in every cycle, with t; anything but None brings the motion to rest and is the reason."""
 
-_MOTION_MODES = {
-    ControllerMode.JOINT_POSITION: StartMotionMode.JOINT,
-    ControllerMode.JOINT_IMPEDANCE: StartMotionMode.JOINT,
-    ControllerMode.CARTESIAN_POSITION: StartMotionMode.CARTESIAN,
-    ControllerMode.CARTESIAN_IMPEDANCE: StartMotionMode.CARTESIAN,
-    ControllerMode.TORQUE: StartMotionMode.IDLE,
-}
-_COMMANDS = {
-    StartMotionMode.JOINT: JointPosition,
-    StartMotionMode.CARTESIAN: CartesianPosition,
-    StartMotionMode.IDLE: JointTorque,
+_COMMANDS: dict[ControllerMode, type[Command]] = {
+    ControllerMode.JOINT_POSITION: JointPosition,
+    ControllerMode.JOINT_IMPEDANCE: JointPosition,
+    ControllerMode.CARTESIAN_POSITION: CartesianPosition,
+    ControllerMode.CARTESIAN_IMPEDANCE: CartesianPosition,
+    ControllerMode.TORQUE: JointTorque,
 }
 
 
 class ControlLoop:
-    """One motion from StartMove to StopMove. Owned by the thread that calls `run`.
+    """One motion from its start to its end. Owned by the thread that calls `run`.
 
     Args:
-        link: The connection.
-        commands: The commands on it.
-        limits: Bounds of the arm, for coming to rest.
+        driver: The connection.
+        limits: Bounds of the arm, for stopping.
         mode: How the controller shall follow.
         log: Where every cycle is written.
         watch: Asked in every cycle whether to stop.
@@ -92,8 +81,7 @@ class ControlLoop:
 
     def __init__(
         self,
-        link: RciConnection,
-        commands: RciCommands,
+        driver: StreamingDriver,
         limits: Limits,
         mode: ControllerMode,
         log: CycleLog,
@@ -105,15 +93,13 @@ class ControlLoop:
         collision_thresholds: JointVector | None = None,
         silence: float = SILENCE,
     ) -> None:
-        if mode not in _MOTION_MODES:
-            raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _MOTION_MODES]}")
-        self._link = link
-        self._commands = commands
+        if mode not in _COMMANDS:
+            raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _COMMANDS]}")
+        self._driver = driver
         self._model = model
         self._limits = limits
         self._mode = mode
-        self._motion_mode = _MOTION_MODES[mode]
-        self._kind = _COMMANDS[self._motion_mode]
+        self._kind = _COMMANDS[mode]
         self._log = log
         self._watch = watch
         self._silence = silence
@@ -127,11 +113,7 @@ class ControlLoop:
         self._calls = CallTimes()
         self._command: Command | None = None
         self._pending: deque[RobotState] = deque()
-        self._brake: StopPlanner = {
-            StartMotionMode.JOINT: lambda: JointStopPlanner(limits.joint),
-            StartMotionMode.CARTESIAN: lambda: CartesianStopPlanner(limits, model),
-            StartMotionMode.IDLE: lambda: TorqueStopPlanner(limits.joint),
-        }[self._motion_mode]()
+        self._brake = _build_stop_planner(self._kind, limits, model)
 
     def run(self, callback: Callback) -> str | None:
         """Runs a motion to its end.
@@ -150,7 +132,7 @@ class ControlLoop:
             InvalidValueError: The callback returned no usable command; the motion was brought to rest.
             Exception: Whatever the callback raised, after the motion was brought to rest.
         """
-        self._commands.start_move(self._mode, self._motion_mode)
+        self._driver.begin(self._mode)
         try:
             state = self._await_modes()
             reason = self._stream(state, callback) if isinstance(state, RobotState) else state
@@ -165,24 +147,23 @@ class ControlLoop:
     def _await_modes(self) -> RobotState | str:
         """Returns the newest state that shows the requested modes, or what `watch` said when it wants an end first."""
         deadline = time.monotonic() + MODE_TIMEOUT
-        shown = self._motion_mode.shown_as
         while time.monotonic() < deadline:
-            states = self._link.poll(self._silence)
+            states = self._driver.poll(self._silence)
             if not states:
                 raise self._lost()
             for state in states[:-1]:
-                self._log.write(state, self._link.received_ns)
+                self._log.write(state, self._driver.received_ns)
             state = states[-1]
             if state.faults:
                 raise self._fault(state)
-            if state.controller_mode == self._mode and state.motion_generator_mode == shown:
+            if self._driver.has_begun(state):
                 self._first_id, self._first_q_c, self._first_tau_c = state.message_id, state.q_c, state.tau_c
                 self._brake.begin(state)
                 return state
-            self._log.write(state, self._link.received_ns)
+            self._log.write(state, self._driver.received_ns)
             if state.robot_mode is RobotMode.USER_STOPPED:
                 raise ControlError(
-                    f"{self._link.name}: an emergency stop or the safety gate has stopped the arm before the motion "
+                    f"{self._driver.name}: an emergency stop or the safety gate has stopped the arm before the motion "
                     "began; release it and switch the power on",
                     (),
                     self._log.recorder.last(RECORD_CYCLES),
@@ -193,8 +174,8 @@ class ControlLoop:
         if not self._has_power():
             raise self._cut_off()
         raise DeadlineError(
-            f"{self._link.name} accepted StartMove and then did not show {self._mode.name} within {MODE_TIMEOUT:g} s; "
-            "try again, and look at the teach pendant if it goes on"
+            f"{self._driver.name} accepted the start of a motion and then did not show {self._mode.name} within "
+            f"{MODE_TIMEOUT:g} s; try again, and look at the teach pendant if it goes on"
         ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
 
     def _stream(self, state: RobotState, callback: Callback) -> str | None:
@@ -266,28 +247,27 @@ class ControlLoop:
                     raise self._fault(state)
                 # A lock-step controller repeats a state whose answer it has not seen yet: it was answered, wait on.
                 if state.message_id > self._answered_id:
-                    if state.motion_generator_mode != self._motion_mode.shown_as:
+                    if not self._driver.is_streaming(state):
                         raise self._ended_by_controller(state)
                     return state
-            states = self._link.poll(deadline - time.monotonic())
+            states = self._driver.poll(deadline - time.monotonic())
             if not states and time.monotonic() >= deadline:
                 raise self._lost()
             for state in states[:-CATCH_UP]:
                 if state.message_id > self._answered_id:
-                    self._log.write(state, self._link.received_ns, self._time(state))
+                    self._log.write(state, self._driver.received_ns, self._time(state))
             # A fault anywhere in the burst ends the motion: nothing before it is worth an answer any more.
             faulty = [state for state in states if state.faults]
             self._pending.extend(faulty[:1] or states[-CATCH_UP:])
 
     def _answer(self, state: RobotState, command: Command) -> None:
-        # The end is announced by StopMove alone: a set `finished` byte has never been seen from the vendor's client.
-        self._link.send(build_command(state.message_id, command, state)._replace(finished=False))
+        self._driver.send(state, command)
         sent_ns = time.monotonic_ns()
         self._answered_id = state.message_id
         self._command = command
         self._t = self._time(state)
         self._brake.remember(command, state.message_id - self._first_id, state)
-        self._log.write(state, self._link.received_ns, self._t, sent_ns, command)
+        self._log.write(state, self._driver.received_ns, self._t, sent_ns, command)
 
     def _hold(self, command: Command) -> RobotState:
         """Repeats the last command until the controller has played it: StopMove may overtake a queued one.
@@ -354,42 +334,38 @@ class ControlLoop:
             others(arrived)
             states.extend(arrived)
 
-        others, self._link.on_states = self._link.on_states, take
+        others, self._driver.on_states = self._driver.on_states, take
         try:
-            self._commands.stop_move()
+            self._driver.end()
             deadline = time.monotonic() + REST_TIMEOUT
             while self._is_running(states) and time.monotonic() < deadline:
-                take(self._link.poll(min(self._silence, REST_TIMEOUT)))
+                take(self._driver.poll(min(self._silence, REST_TIMEOUT)))
         finally:
-            self._link.on_states, self._log.braking = others, False
+            self._driver.on_states, self._log.braking = others, False
         faulty = next((state for state in states if state.faults), None)
         return None if faulty is None else self._fault(faulty)
 
     def _is_running(self, states: list[RobotState]) -> bool:
         """Returns whether the newest of these states still shows the motion without a fault, or there is none."""
-        shown = (self._mode, self._motion_mode.shown_as)
-        return not states or (
-            not any(state.faults for state in states)
-            and (states[-1].controller_mode, states[-1].motion_generator_mode) == shown
-        )
+        return not states or (not any(state.faults for state in states) and self._driver.has_begun(states[-1]))
 
     def _end_badly(self, error: BaseException) -> None:
-        others = self._link.on_states
-        if isinstance(error, ControlError) and not self._link.is_heard:
-            self._link.on_states = self._record  # The controller's own stop has begun.
+        others = self._driver.on_states
+        if isinstance(error, ControlError) and not self._driver.has_listener:
+            self._driver.on_states = self._record  # The controller's own stop has begun.
         try:
-            self._commands.stop_move(STOP_TIMEOUT)
+            self._driver.end(STOP_TIMEOUT)
         except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
-            error.add_note(f"StopMove did not go well either: {refusal}")
+            error.add_note(f"ending the motion failed, too: {refusal}")
         finally:
-            self._link.on_states, self._log.braking = others, False
+            self._driver.on_states, self._log.braking = others, False
 
     def _watch_standstill(self) -> None:
         """Records the controller's own stop, so that the record shows it and the next motion starts from rest."""
         deadline = time.monotonic() + REST_TIMEOUT
         before: RobotState | None = None
         while time.monotonic() < deadline:
-            states = self._link.poll(self._silence)
+            states = self._driver.poll(self._silence)
             self._record(states)
             if not states or (before is not None and _stands(before, states[-1])):
                 return
@@ -397,11 +373,11 @@ class ControlLoop:
 
     def _record(self, states: list[RobotState]) -> None:
         for state in states:
-            self._log.write(state, self._link.received_ns, self._time(state))
+            self._log.write(state, self._driver.received_ns, self._time(state))
 
     def _checked(self, command: Any, state: RobotState) -> Command:
         """Returns the callback's command once it is found good."""
-        return check_command(command, self._kind, self._link.n, self._time(state))
+        return check_command(command, self._kind, self._driver.n, self._time(state))
 
     def _filtered(self, command: Command, state: RobotState) -> Command:
         """Returns what is to be sent for a command; the first one starts the filters, and must be where the arm is."""
@@ -419,38 +395,26 @@ class ControlLoop:
 
     def _fault(self, state: RobotState) -> ControlError:
         t = self._time(state) if self._command is not None else math.nan
-        self._log.write(state, self._link.received_ns, t)
-        pressed = self._find_safety_stop(state)
-        if pressed is None and state.faults == (Fault.INSTABILITY_DETECTION,) and not self._has_power():
+        self._log.write(state, self._driver.received_ns, t)
+        pressed = self._driver.find_safety_stop(state)
+        lacks_commands = self._driver.is_lack_of_commands(state.faults)
+        if pressed is None and lacks_commands and len(state.faults) == 1 and not self._has_power():
             return self._cut_off()
         record = self._log.recorder.last(RECORD_CYCLES)
-        late = ""
-        if Fault.INSTABILITY_DETECTION in state.faults:
-            late = self._calls.describe()
-        message = describe_faults(
-            (fault for fault in state.faults if isinstance(fault, Fault)),
+        message = self._driver.describe_faults(
+            state.faults,
             record,
             t,
             self._model,
             self._limits,
             self._mode,
-            late=late,
+            late=self._calls.describe() if lacks_commands else "",
             pressed="" if pressed is None else pressed.sentence,
             box=self._box,
             collision_thresholds=self._thresholds,
         )
         error = ControlError(message, state.faults, record)
-        return error if pressed is None else error.coded("safety_stop", status=pressed.word)
-
-    def _find_safety_stop(self, state: RobotState) -> Refusal | None:
-        """Returns which safety stop ended the motion; None: a fault of the motion did."""
-        if state.robot_mode is not RobotMode.USER_STOPPED:
-            return None
-        try:
-            is_gate = self._commands.safety_stop() is SafetyStop.GSTOP
-        except RcilabError:  # The state says that there is one.
-            is_gate = False
-        return Refusal.GSTOP if is_gate else Refusal.ESTOP
+        return error if pressed is None else error.coded("safety_stop", status=pressed.code)
 
     def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
         if isinstance(command, JointTorque) or np.array_equal(state.q_c, self._first_q_c):
@@ -467,17 +431,17 @@ class ControlLoop:
 
     def _has_power(self) -> bool:
         try:
-            return self._commands.motor_state()
+            return self._driver.is_powered()
         except RcilabError:  # Whoever is gone has another error.
             return True
 
     def _cut_off(self) -> ControlError:
         record = self._log.recorder.last(RECORD_CYCLES)
         said = "the motors were switched off while the motion ran, and the brakes hold the arm; power_on() leads on"
-        return ControlError(f"{self._link.name}: {said}", (), record)
+        return ControlError(f"{self._driver.name}: {said}", (), record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:
-        self._log.write(state, self._link.received_ns, self._time(state))
+        self._log.write(state, self._driver.received_ns, self._time(state))
         if not self._has_power():
             return self._cut_off()
         record = self._log.recorder.last(RECORD_CYCLES)
@@ -492,7 +456,7 @@ class ControlLoop:
     def _lost(self) -> ConnectionLostError:
         when = "before the first command" if math.isnan(self._t) else f"after t = {self._t:.3f} s"
         return ConnectionLostError(
-            f"{self._link.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
+            f"{self._driver.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
             "cable is in, then connect again. The controller stops an arm that gets no commands by itself"
         )
 
@@ -503,3 +467,9 @@ def _stands(before: RobotState, after: RobotState) -> bool:
         and bool(np.array_equal(before.q_c, after.q_c))
         and float(np.abs(after.dq).max()) < 1e-3
     )
+
+
+def _build_stop_planner(kind: type[Command], limits: Limits, model: RobotModel) -> StopPlanner:
+    if kind is JointPosition:
+        return JointStopPlanner(limits.joint)
+    return CartesianStopPlanner(limits, model) if kind is CartesianPosition else TorqueStopPlanner(limits.joint)

@@ -16,7 +16,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
-from rcilab.execution.rotation import nine, rotation_matrix, rotation_vector
+from rcilab.core.rotation import nine, rotation_matrix, rotation_vector
 from rcilab.makers.rokae.wire.bounds import FILTER_OFF
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp

@@ -1,22 +1,19 @@
-"""Hand guiding through the control process: it asks the controller for it and notices when the controller ends it."""
+"""Hand guiding: it is requested from the controller, which may also end it by itself."""
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias, get_args
+from typing import get_args
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import RobotMode, RobotState
-from rcilab.makers.rokae.driver.commands import RciCommands
-
-GuideSpace: TypeAlias = Literal["joint", "cartesian"]
-GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
+from rcilab.makers.driver import Driver, GuideKind, GuideSpace
 
 
 def require_guidable(space: object, kind: object) -> None:
-    """Returns if there is such a way to guide an arm.
+    """Makes sure that an arm can be guided so.
 
     Raises:
-        InvalidValueError: There is none; the message lists those there are.
+        InvalidValueError: The space or the kind does not exist; the message lists those that do.
     """
     if space not in get_args(GuideSpace):
         raise InvalidValueError("space", space, f"is unknown; known: {', '.join(get_args(GuideSpace))}")
@@ -25,14 +22,14 @@ def require_guidable(space: object, kind: object) -> None:
 
 
 class HandGuide:
-    """One time of hand guiding, from startDrag to stopDrag. Owned by the control process's thread.
+    """Hand guiding from its start to its end. Owned by the driver's thread.
 
     Args:
-        commands: The connected controller.
+        driver: The connection.
     """
 
-    def __init__(self, commands: RciCommands) -> None:
-        self._commands = commands
+    def __init__(self, driver: Driver) -> None:
+        self._driver = driver
         self._was_seen = False
 
     def start(self, space: GuideSpace, kind: GuideKind) -> None:
@@ -41,11 +38,11 @@ class HandGuide:
         Raises:
             CommandRejectedError: The controller refuses.
         """
-        self._commands.start_drag(space, kind)
+        self._driver.start_guiding(space, kind)
 
     def stop(self) -> None:
         """Holds the arm again; returns once it stands still."""
-        self._commands.stop_drag()
+        self._driver.stop_guiding()
 
     def has_ended(self, state: RobotState) -> bool:
         """Returns whether the controller has left guiding by itself: a fault, an emergency stop, power taken away.

@@ -9,7 +9,7 @@ from rcilab.core.state import Mode
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionProgress:
-    """The motion that `RobotSession.execute` streams just now; see `RobotSession.under_way`."""
+    """The motion that `RobotSession.execute` streams just now; see `RobotSession.progress`."""
 
     time: float
     """Since its first command, [s]."""
@@ -25,4 +25,6 @@ class MotionProgress:
     """How the arm is commanded in it."""
 
     def __repr__(self) -> str:
-        return f"<UnderWay: at {self.place:.3f} s of the plan, {100.0 * self.pace:.0f} % of its speed, {self.mode}>"
+        return (
+            f"<MotionProgress: at {self.place:.3f} s of the plan, {100.0 * self.pace:.0f} % of its speed, {self.mode}>"
+        )

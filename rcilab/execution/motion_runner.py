@@ -1,4 +1,4 @@
-"""One motion on a connection from StartMove to what became of it."""
+"""One motion on a connection, from its start to its run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.state import ControllerMode, Mode
 from rcilab.execution.control_loop import Callback, ControlLoop
@@ -15,33 +14,31 @@ from rcilab.execution.filters import CommandFilter
 from rcilab.execution.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.speed_scaled_stream import SpeedScaledStream
-from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import RciConnection
+from rcilab.makers.driver import ConfiguredArm, StreamingDriver
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.punctual import punctual
 from rcilab.recording.run import Run, build_run
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
-    from rcilab.core.safety_box import SafetyBox
-    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
 
-Ear: TypeAlias = Callable[[Run, BaseException | None], None]
+RunListener: TypeAlias = Callable[[Run, BaseException | None], None]
+"""Called with the run of a motion and the error that ended it, or None."""
 
 _SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
 
 
 class MotionRunner:
-    """Runs motions on a connection, one at a time, and tells who listens what became of each.
+    """Runs motions on a connection, one at a time, and reports each to its listeners.
 
     Attributes:
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
-        collision_thresholds: Those that were set, shape (n,), [N m]; None as long as none were.
 
     Args:
-        link: The connection.
-        turns: Whose turn it is on it.
+        driver: The connection.
+        lock: Who may use it.
+        arm: What is configured on the robot.
         realtime: False for a controller in lock-step, where timing means nothing.
         silence: Time without a state, while moving, that counts as a lost connection, [s].
         partner: See above.
@@ -50,8 +47,9 @@ class MotionRunner:
 
     def __init__(
         self,
-        link: RciConnection,
-        turns: SessionLock,
+        driver: StreamingDriver,
+        lock: SessionLock,
+        arm: ConfiguredArm,
         *,
         realtime: bool,
         silence: float,
@@ -59,71 +57,66 @@ class MotionRunner:
         record_all: bool,
     ) -> None:
         self.partner = partner
-        self.collision_thresholds: JointVector | None = None
-        self._link = link
-        self._turns = turns
+        self._driver = driver
+        self._lock = lock
+        self._arm = arm
         self._realtime = realtime
         self._silence = silence
         self._record_all = record_all
-        self._ears: tuple[Ear, ...] = ()
+        self._listeners: tuple[RunListener, ...] = ()
 
-    def hear(self, ear: Ear) -> Callable[[], None]:
-        """Has somebody told of every motion, as soon as it has ended; returns what ends that.
+    def on_run(self, listener: RunListener) -> Callable[[], None]:
+        """Calls a listener after every motion; returns what removes it.
 
         Args:
-            ear: Called in the thread that ran the motion, with its run and the error that ended it, or None.
+            listener: Called in the thread that ran the motion, with its run and the error that ended it, or None.
         """
-        self._ears = (*self._ears, ear)
+        self._listeners = (*self._listeners, listener)
 
-        def end() -> None:
-            self._ears = tuple(other for other in self._ears if other is not ear)
+        def remove() -> None:
+            self._listeners = tuple(other for other in self._listeners if other is not listener)
 
-        return end
+        return remove
 
     def run(
         self,
         callback: Callback,
         mode: Mode,
-        model: RobotModel,
         plan: Motion | SpeedScaledStream | None = None,
         filters: Sequence[CommandFilter] = (),
-        *,
-        box: SafetyBox | None = None,
     ) -> Run:
-        """Runs the motion that has set out, and returns what became of it.
+        """Runs a motion and returns what became of it.
 
         Args:
             callback: Gives the command for each state.
             mode: How the arm is commanded.
-            model: The arm.
-            plan: What is to be commanded, and may change on the way; None where only the callback knows.
+            plan: What is to be commanded, and may change in between; None where only the callback knows.
             filters: What every command passes before it is sent.
-            box: The safety box that the controller has, as far as it is known: to say what passed which face of it.
 
         Raises:
             ControlError: The controller stopped it.
             ConnectionLostError: The controller is gone.
-            Exception: Whatever the callback raised; the arm was brought to rest.
+            Exception: Whatever the callback raised; the arm was stopped.
         """
-        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held on its way.
+        model = self._arm.model
+        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held.
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
         loop = ControlLoop(
-            self._link,
-            RciCommands(self._link),  # Not the session's own: those are refused while a motion runs.
+            self._driver,
             model.limits,
             ControllerMode[mode.upper()],
             CycleLog(recorder),
-            watch=self._turns.reason_to_stop,
+            watch=self._lock.reason_to_stop,
             silence=self._silence,
             model=model,
             filters=filters,
-            box=box,
-            collision_thresholds=self.collision_thresholds,
+            box=self._arm.safety_box,
+            collision_thresholds=self._arm.collision_thresholds,
         )
-        setup = Setup(target=self._link.name, mode=mode, started_ns=time.time_ns())
+        setup = Setup(target=self._driver.name, mode=mode, started_ns=time.time_ns())
 
-        def tell(stopped: str | None, error: BaseException | None = None) -> Run:
+        def report(stopped: str | None, error: BaseException | None = None) -> Run:
             run = build_run(
                 recorder.rows(),
                 plan=plan.as_motion() if isinstance(plan, SpeedScaledStream) else plan,
@@ -134,15 +127,15 @@ class MotionRunner:
                 model=model,
                 setup=setup,
             )
-            for ear in self._ears:
-                ear(run, error)
+            for listener in self._listeners:
+                listener(run, error)
             return run
 
         try:
-            with self._turns.move(), punctual(self._realtime), one_core(self.partner):
+            with self._lock.move(), punctual(self._realtime), one_core(self.partner):
                 stopped = loop.run(callback)
         except BaseException as error:
-            if self._ears:
-                tell(str(error) or type(error).__name__, error)
+            if self._listeners:
+                report(str(error) or type(error).__name__, error)
             raise
-        return tell(stopped)
+        return report(stopped)

@@ -2,37 +2,49 @@
 
 from __future__ import annotations
 
+import threading
+import weakref
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import as_number, as_vector
+from rcilab.core.arrays import as_number, described
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
-from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import Pose
-from rcilab.core.state import RobotState
-from rcilab.execution.control_loop import SILENCE, SILENCE_HERE
-from rcilab.execution.motion_runner import Ear, MotionRunner
-from rcilab.execution.motions import Motions
-from rcilab.execution.open_sessions import enlist
+from rcilab.core.safety_box import SafetyBox, require_box
+from rcilab.core.spatial import Pose, as_pose
+from rcilab.core.state import Mode, RobotState, require_mode
+from rcilab.execution.control_loop import SILENCE, SILENCE_HERE, Callback
+from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
+from rcilab.execution.motion_callback import Progress, follow, follow_poses, report_progress
+from rcilab.execution.motion_progress import MotionProgress
+from rcilab.execution.motion_runner import MotionRunner, RunListener
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
-from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import RciConnection
-from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there, require_timeout, with_tool_of
-from rcilab.makers.rokae.driver.identify import dh_lengths, identify_robot
-from rcilab.makers.rokae.driver.recovery import recover
-from rcilab.makers.rokae.driver.settings import load_center
-from rcilab.makers.rokae.driver.transport import SocketTransport
-from rcilab.makers.rokae.wire import STATE_SIZE, Request, SetMotorPower
-from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
+from rcilab.execution.speed_scaled_stream import SpeedScaledStream
+from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
+from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
+from rcilab.motion.speed_scaling import require_pace
+from rcilab.recording.run import Run
 
 if TYPE_CHECKING:
+    from rcilab.conformance.certificate import Certificate
     from rcilab.model.robot_model import RobotModel
+    from rcilab.motion import Motion
+    from rcilab.motion.path import Path
+
+_sessions: weakref.WeakSet[RobotSession] = weakref.WeakSet()
+_sessions_lock = threading.Lock()
+
+
+def open_sessions() -> list[RobotSession]:
+    """Returns the sessions of this process that are not closed; for any thread."""
+    with _sessions_lock:
+        sessions = list(_sessions)
+    return [session for session in sessions if not session.is_closed]
 
 
 def connect(
@@ -82,129 +94,145 @@ def open_session(
         world: What surrounds a virtual robot; None where nothing of the kind is known.
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
-    place = parse_address(address)
     require_timeout(timeout)
     if model is not None:
         from rcilab.makers.maker import require_driver
         from rcilab.model.robot_model import require_model
 
         require_driver(require_model(model))
-    transport = SocketTransport(place, STATE_SIZE, timeout)
+    driver = open_driver(address, timeout, None if model is None else ExpectedArm.of(model))
     try:
-        link = RciConnection(transport, 7 if model is None else model.n, str(place), timeout)
         if model is None:
             from rcilab.model.robot_model import load_model
 
-            model = load_model(identify_robot(RciCommands(link).load_model().dh))
-            link.n = model.n
-        else:
-            require_arm_there(RciCommands(link), model.name, dh_lengths(model.description.dh), str(place))
-        await_first_state(link, place, transport.local_address, timeout)
-        model = with_tool_of(link, model)
-        if world is None and place.world_port is not None:
-            world = SimulationControl(place.host, place.world_port)
+            model = load_model(driver.arm_name)
+        model = driver.with_tool(model)
+        if world is None and driver.simulation_address is not None:
+            world = SimulationControl(*driver.simulation_address)
         closing = ExitStack()
         closing.callback(on_close)
         if world is not None:
             closing.callback(world.close)
-        closing.callback(link.close)
-        turns = SessionLock(closing.close)
+        closing.callback(driver.close)
+        lock = SessionLock(closing.close)
         if silence is None:
-            silence = SILENCE_HERE if place.is_here else SILENCE
-        runner = MotionRunner(link, turns, realtime=realtime, silence=silence, partner=partner, record_all=record_all)
-        return RobotSession(link, model, turns, runner, world)
+            silence = SILENCE_HERE if driver.is_local else SILENCE
+        arm = ConfiguredArm(model=model)
+        runner = MotionRunner(
+            driver, lock, arm, realtime=realtime, silence=silence, partner=partner, record_all=record_all
+        )
+        return RobotSession(driver, arm, lock, runner, world)
     except BaseException:
-        transport.close()
+        driver.close()
         raise
 
 
-class RobotSession(Motions, Closeable):
-    """A connected arm: its state, every RCI command, and motions at 1 kHz. Made by `connect` and `simulate`.
+class RobotSession(Closeable):
+    """A connected arm: its state, power, configuration, and motions at 1 kHz. Made by `connect` and `simulate`.
 
-    While a motion runs, `stop`, `close`, `state` and what a controller answers then may be called, from any thread and
-    from a callback: `set_do`, `get_di`, `safety_stop`, `motor_state`, `load_model`, `set_cart_imp_desired_tau`, and
-    `power_off`, which ends the motion. In a callback such a request takes about a millisecond. All else is refused and
-    does not disturb the motion. A session stays usable after faults: `recover()`.
+    The commands of the maker's own protocol are in the attribute named like the scheme of its addresses:
+    `robot.rci.set_filters(...)` for `rci://`.
+
+    While a motion runs, `stop`, `close`, `state`, `power_off`, which ends the motion, and those commands that the
+    controller answers then may be called, from any thread and from a callback. All else is refused and does not
+    disturb the motion. A session stays usable after faults: `recover()`.
 
     Args:
-        link: The connection.
-        model: The arm.
-        turns: Whose turn it is on the connection; ends it when the session is closed.
+        driver: The connection.
+        arm: What is configured on the robot.
+        lock: Who may use the connection; closes it with the session.
         runner: Runs motions on it.
-        world: What surrounds a virtual robot; None where nothing of the kind is known.
+        simulation: What surrounds a virtual robot; None where no simulation port is known.
     """
 
     def __init__(
         self,
-        link: RciConnection,
-        model: RobotModel,
-        turns: SessionLock,
+        driver: StreamingDriver,
+        arm: ConfiguredArm,
+        lock: SessionLock,
         runner: MotionRunner,
-        world: SimulationControl | None,
+        simulation: SimulationControl | None,
     ) -> None:
-        from rcilab.model.robot_model import load_model
+        self._driver = driver
+        self._arm = arm
+        self._lock = lock
+        self._runner = runner
+        self._simulation = simulation
+        self._commands = driver.open_commands(arm, lock)
+        self._streamed: SpeedScaledStream | None = None
+        """What `execute` streams just now."""
+        with _sessions_lock:
+            _sessions.add(self)
 
-        own = load_model(model.name).limits  # A model may have soft limits: they bound motions, not what may be set.
-        super().__init__(link, own, turns, runner)
-        self._model = model
-        self._safety_box: SafetyBox | None = None
-        self._world = world
-        enlist(self)
+    def __getattr__(self, name: str) -> Any:
+        """Gives the maker's own commands by the scheme of its addresses."""
+        commands, scheme = self.__dict__.get("_commands"), ""
+        if commands is not None:
+            scheme = self._driver.scheme
+            if name == scheme:
+                return commands
+        hint = f"; it is .{scheme}.{name}" if scheme and hasattr(type(commands), name) else ""
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}", name=name, obj=self)
 
     @property
     def model(self) -> RobotModel:
         """The arm, with the tool, the load and the soft limits that this session has set."""
-        return self._model
+        return self._arm.model
 
     @property
     def safety_box(self) -> SafetyBox | None:
         """The box that the tool must stay in, as far as this session has set one; motions are checked with it."""
-        return self._safety_box
+        return self._arm.safety_box
 
     @property
     def address(self) -> str:
         """Where the robot is."""
-        return self._link.name
+        return self._driver.name
 
     @property
-    def world(self) -> SimulationControl:
-        """What surrounds a virtual robot: `robot.world.push([0, 0, -20, 0, 0, 0])`.
+    def simulation(self) -> SimulationControl:
+        """What surrounds a virtual robot: `robot.simulation.push([0, 0, -20, 0, 0, 0])`.
 
         Raises:
             UsageError: It is a real robot, or the world port of the virtual one is not known.
         """
-        if self._world is None:
+        if self._simulation is None:
             raise UsageError(
-                f"{self._link.name}: no world port is known; simulate() always has one, and to connect() it is told: "
-                "rcilab controller prints it (world HOST:PORT), add ?world_port=PORT to the address"
+                f"{self._driver.name}: no world port is known; simulate() always has one, and connect() takes it "
+                "from the address: add ?world_port=PORT, which rcilab controller prints (world HOST:PORT)"
             )
-        return self._world
+        return self._simulation
+
+    @property
+    def world(self) -> SimulationControl:
+        """Short for `simulation`."""
+        return self.simulation
 
     @property
     def is_moving(self) -> bool:
-        """Whether a motion runs, in whichever thread; `under_way` tells more of one of `execute`."""
-        return self._turns.is_moving
+        """Whether a motion runs, in whichever thread; `progress` says more of a motion of `execute`."""
+        return self._lock.is_moving
 
     @property
     def is_closed(self) -> bool:
         """Whether it was closed; a new one is needed then."""
-        return self._turns.is_closing
+        return self._lock.is_closing
 
-    def hear_runs(self, ear: Ear) -> Callable[[], None]:
-        """Has somebody told what became of every motion, as soon as it has ended; returns what ends that.
+    def on_run(self, listener: RunListener) -> Callable[[], None]:
+        """Calls a listener with the result of every motion, as soon as it has ended; returns what removes it.
 
         Args:
-            ear: Called in the thread that ran the motion, with its run and the error that ended it, or None.
+            listener: Called in the thread that ran the motion, with its run and the error that ended it, or None.
         """
-        return self._runner.hear(ear)
+        return self._runner.on_run(listener)
 
     @property
     def state(self) -> RobotState:
         """The state of this very millisecond; inside a callback, the one that it was given."""
-        with self._turns.take_unless_moving() as is_mine:
-            if is_mine or self._link.latest is None:
+        with self._lock.take_unless_moving() as is_mine:
+            if is_mine or self._driver.latest is None:
                 return self.receive_state()
-        return self._link.latest
+        return self._driver.latest
 
     def receive_states(self, timeout: float = 1.0) -> list[RobotState]:
         """Returns every state that has arrived since the last look, oldest first; waits for the first one.
@@ -217,8 +245,8 @@ class RobotSession(Motions, Closeable):
             UsageError: The session is closed, or a motion runs.
         """
         require_timeout(timeout)
-        with self._turns.take("receive_states"):
-            states = self._link.poll(timeout)
+        with self._lock.take("receive_states"):
+            states = self._driver.poll(timeout)
         if not states:
             raise self._no_state(timeout)
         return states
@@ -238,45 +266,37 @@ class RobotSession(Motions, Closeable):
         require_timeout(timeout)
         if not as_number(max_age, "max_age", "s") >= 0.0:
             raise InvalidValueError("max_age", max_age, "must not be below 0 [s]")
-        with self._turns.take("receive_state"):
-            while self._link.poll(0.0):
+        with self._lock.take("receive_state"):
+            while self._driver.poll(0.0):
                 pass
-            if self._link.latest is not None and self._link.age <= max_age:
-                return self._link.latest
-            states = self._link.poll(timeout)
+            if self._driver.latest is not None and self._driver.age <= max_age:
+                return self._driver.latest
+            states = self._driver.poll(timeout)
         if not states:
             raise self._no_state(timeout)
         return states[-1]
 
-    def set_coor(self, T_flange_tool: Pose) -> None:
+    def power_on(self) -> None:
+        """Switches the motors on."""
+        with self._lock.take("power_on"):
+            self._driver.power(True)
+
+    def power_off(self) -> None:
+        """Switches the motors off; a motion that runs ends with it."""
+        with self._lock.take_unless_moving() as is_mine:
+            if is_mine:
+                self._driver.power(False)
+                return
+        self._driver.power(False, alongside=True)
+
+    def is_powered(self) -> bool:
+        """Returns whether the motors are on."""
+        with self._lock.take("is_powered"):
+            return self._driver.is_powered()
+
+    def set_tool(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; `model` has it from then on."""
-        with self._turns.take("SetCoor"):
-            model = self._model.with_tool(T_flange_tool)
-            super().set_coor(T_flange_tool)
-            self._model = model
-
-    def set_cartesian_limit(self, box: SafetyBox) -> None:
-        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
-        with self._turns.take("SetCartesianLimit"):
-            super().set_cartesian_limit(box)
-            self._safety_box = box
-
-    def set_collision_behavior(self, thresholds: ArrayLike) -> None:
-        """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
-        with self._turns.take("SetCollisionBehavior"):
-            super().set_collision_behavior(thresholds)
-            self._runner.collision_thresholds = as_vector(thresholds, self._model.n, "thresholds")
-
-    def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
-        """Sets soft limits of the joint angles; `model` has them from then on, so that motions are checked with them.
-
-        Args:
-            lower: Shape (n,), [rad], inside the arm's own range.
-            upper: Shape (n,), [rad].
-        """
-        with self._turns.take("SetJointLimit"):
-            super().set_joint_limit(lower, upper)
-            self._model = self._model.with_joint_limits(lower, upper)
+        self.configure(RobotConfiguration(tool=as_pose(T_flange_tool, "T_flange_tool")))
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange; `model` has it from then on.
@@ -286,14 +306,235 @@ class RobotSession(Motions, Closeable):
             center_of_mass: In the flange frame, shape (3,), [m].
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
-        from rcilab.model.dynamics.payload import Payload
+        self._commands.set_load(mass, center_of_mass, inertia)
 
-        with self._turns.take("SetLoad"):
-            center = load_center(center_of_mass)
-            load = Payload(mass=mass, center_of_mass=center, inertia=inertia)  # type: ignore[arg-type]
-            model = self._model.with_load(load)
-            super().set_load(load.mass, load.center_of_mass, load.inertia)
-            self._model = model
+    def set_safety_box(self, box: SafetyBox) -> None:
+        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        self.configure(RobotConfiguration(box=require_box(box)))
+
+    def configure(self, configuration: RobotConfiguration) -> None:
+        """Sends a configuration, part by part; after a refusal the parts before it are in force.
+
+        Raises:
+            CommandRejectedError: The controller refused a part; the error names it.
+            UsageError: A motion runs.
+        """
+        self._commands.configure(configuration)
+
+    def execute(
+        self,
+        motion: Motion,
+        certificate: Certificate | None = None,
+        progress: Progress | None = None,
+        *,
+        mode: Mode = "joint_position",
+        pace: float = 1.0,
+    ) -> Run:
+        """Streams a motion and returns what became of it. Checks it first, by the conditions of the mode.
+
+        From another thread, `pause`, `resume` and `set_pace` change how fast it runs, and `progress` tells how far it
+        is. In torque mode the arm follows softly, see `rcilab.execution.command_builder`.
+
+        Args:
+            motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
+            certificate: From an earlier `check(motion, model, mode=mode)`; then only its freshness is verified.
+            progress: Told how far it is, about 20 times a second.
+            mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques.
+            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
+
+        Raises:
+            InvalidValueError: The pace is out of range; nothing moved.
+            PlanningError: At this pace it would break a condition that it keeps as planned; nothing moved.
+            ConformanceError: The motion breaks a condition; nothing moved.
+            CertificateError: The certificate is for something else; nothing moved.
+            UsageError: The motion starts elsewhere than the arm is; nothing moved.
+            ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
+            ConnectionLostError: The controller is gone.
+        """
+        from rcilab.conformance.speed_scaling_check import plan_start
+
+        require_motion(motion, certificate)
+        require_mode(mode)
+        require_pace(pace)
+        with self._lock.begin_motion("execute"):
+            state = self.receive_state()
+            mismatch = describe_start_mismatch(motion.q[0], state.q_c)
+            if mismatch is not None:
+                raise UsageError(mismatch)
+            if certificate is None:
+                self._require_allowed(motion, state, mode)
+            else:
+                certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
+            paced = plan_start(motion, pace, self.model, mode)
+            streamed = SpeedScaledStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
+            self._streamed = streamed
+            try:
+                filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
+                return self._runner.run(streamed.stream, mode, streamed, filters)
+            finally:
+                self._streamed = None
+
+    @property
+    def progress(self) -> MotionProgress | None:
+        """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
+        streamed = self._streamed
+        return None if streamed is None else streamed.progress
+
+    def pause(self) -> None:
+        """Holds the motion that `execute` runs in another thread, along its way and within all limits.
+
+        Raises:
+            UsageError: No such motion runs.
+            PlanningError: It arrives before it could be held.
+        """
+        self._change_pace(0.0)
+
+    def resume(self, pace: float = 1.0) -> None:
+        """Goes on with a motion that is held; see `set_pace`."""
+        self.set_pace(pace)
+
+    def set_pace(self, pace: float) -> None:
+        """Runs the motion of `execute`, in another thread, at part of its planned speed, judged as the motion was.
+
+        Args:
+            pace: 0.1 to 1.
+
+        Raises:
+            InvalidValueError: The pace is out of range.
+            UsageError: No such motion runs.
+            PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
+        """
+        self._change_pace(require_pace(pace))
+
+    def _change_pace(self, pace: float) -> None:
+        streamed = self._streamed
+        if streamed is None:
+            raise UsageError("no motion of execute() runs whose pace could change").coded("no_pace")
+        streamed.change_pace(pace)
+
+    def control(
+        self,
+        callback: Callback,
+        mode: Mode = "joint_position",
+        *,
+        cut_off: float | None = None,
+        rate_limit: LimitTable | None = None,
+    ) -> Run:
+        """Runs a callback in every controller cycle until it returns a command with `finished=True`.
+
+        The first command must be where the arm is, `JointPosition(state.q_c)` or
+        `CartesianPosition(state.T_base_tool_c)`; torques begin within one cycle's rate of zero. t counts controller
+        cycles since the first call, in seconds, so a lost packet does not stretch time. With a filter or a limiter the
+        motion ends when what is sent has arrived at the last command.
+
+        A tool that starts outside its safety box may only be led into it, as with `execute`: the controller stops a
+        motion that goes farther out, or past a face that it did not start beyond.
+
+        Args:
+            callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, as the mode asks for.
+            mode: How the controller shall follow.
+            cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the vendor's client has one at 100.
+                None sends them as they are.
+            rate_limit: Keeps the commands inside the limits of velocity, acceleration, jerk or torque rate: those of
+                the manual, or "sdk", the Cartesian ones of the vendor's limiter. Poses keep the tool's limits, which
+                need not be enough for the joints. None leaves all of it to the callback.
+
+        Raises:
+            ControlError: The controller stopped the motion; `.faults` and `.record` say why. `recover()` leads on.
+            ConnectionLostError: The controller is gone.
+            InvalidValueError: A command was unusable; the arm was brought to rest.
+            Exception: Whatever the callback raised; the arm was brought to rest.
+        """
+        require_mode(mode)
+        filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
+        if rate_limit is not None:
+            filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit)))
+        if not callable(callback):
+            raise InvalidValueError("callback", described(callback), "is no function (state, t) -> command")
+        with self._lock.begin_motion("control"):
+            return self._runner.run(callback, mode, filters=filters)
+
+    def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
+        """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
+
+        From the commanded angles, not from a start that the caller has to know; a move to where the arm is ends at
+        once; the speed has a range; the motion is checked before it begins.
+
+        Args:
+            goal: Joint angles, shape (n,), [rad].
+            speed: Part of 1 rad/s (1.25 for the last three joints) and 2.5 rad/s^2, 0.001 to 1.
+            progress: Told how far it is, about 20 times a second.
+
+        Raises:
+            PlanningError: The goal, or the arm, is outside the joint limits.
+            ConformanceError: The motion breaks a condition; nothing moved.
+            ControlError: The controller stopped it. `recover()` leads on.
+        """
+        from rcilab.motion import plan_joint
+
+        with self._lock.begin_motion("move_j"):
+            state = self.receive_state()
+            motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
+            self._require_allowed(motion, state)
+            callback = follow(motion.q, report_progress(motion, progress))
+            return self._runner.run(callback, "joint_position", motion)
+
+    def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
+        """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.
+
+        The wire carries poses, the controller computes the joints (Cartesian position mode). Position, orientation and
+        arm angle run in proportion, so a large turn on a short way is fast. Where the tool only turns, the way is the
+        angle about any axis; the vendor's agrees for base z only. Identical start and goal, on which the vendor's never
+        returns, end at once. What the joints would do is planned and checked first.
+
+        Args:
+            goal: Pose of the tool in base.
+            speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1; of 1 rad/s and 2.5 rad/s^2 where the tool only turns.
+            psi: Arm angle of a 7-axis arm at the goal, [rad], 0 too; None leaves it to the controller, which holds it.
+            progress: Told how far it is, about 20 times a second.
+
+        Raises:
+            PlanningError: A pose on the way is out of reach or singular; the message says where and why.
+            ConformanceError: The joints would break a condition; nothing moved.
+            ControlError: The controller stopped it. `recover()` leads on.
+        """
+        from rcilab.motion.cartesian import arm_angles
+        from rcilab.motion.path import build_line
+
+        with self._lock.begin_motion("move_l"):
+            state = self.receive_state()
+            angles = arm_angles(self.model, state.q_c, psi)
+            path = build_line(self.model.forward(state.q_c), goal, *angles)
+            return self._move_along(path, state, speed, psi is not None, progress)
+
+    def move_c(
+        self, via: Pose, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None
+    ) -> Run:
+        """Moves the tool on the arc over `via` to a pose by the manual's S profile; returns when it is there: MOVEC.
+
+        As the vendor's, the orientation turns from start to goal and that of `via` is ignored. Three positions on a
+        line are an error here, not a return value. For the rest see `move_l`.
+
+        Args:
+            via: A pose whose position lies on the arc.
+            goal: Pose of the tool in base.
+            speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1.
+            psi: Arm angle of a 7-axis arm at the goal, [rad]; None leaves it to the controller, which holds it.
+            progress: Told how far it is, about 20 times a second.
+
+        Raises:
+            PlanningError: The positions make no circle, or a pose on the way is out of reach or singular.
+            ConformanceError: The joints would break a condition; nothing moved.
+            ControlError: The controller stopped it. `recover()` leads on.
+        """
+        from rcilab.motion.cartesian import arm_angles
+        from rcilab.motion.path import build_arc
+
+        with self._lock.begin_motion("move_c"):
+            state = self.receive_state()
+            angles = arm_angles(self.model, state.q_c, psi)
+            path = build_arc(self.model.forward(state.q_c), via, goal, *angles)
+            return self._move_along(path, state, speed, psi is not None, progress)
 
     def stop(self, reason: str = "on request") -> None:
         """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
@@ -303,7 +544,7 @@ class RobotSession(Motions, Closeable):
         Args:
             reason: What the run says in `stopped`; the first one counts.
         """
-        self._turns.stop(reason)
+        self._lock.stop(reason)
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone.
@@ -312,36 +553,37 @@ class RobotSession(Motions, Closeable):
             CommandRejectedError: The controller refuses; the message says what it waits for.
             DeadlineError: It agreed, and the faults stayed.
         """
-        with self._turns.take("recover"):
-            recover(self, self._link)
+        with self._lock.take("recover"):
+            self._driver.recover()
 
     def close(self) -> None:
         """Brings a running motion to rest within the limits and ends the connection. May be called twice.
 
         The call that runs the motion returns its run. From inside a callback, the connection ends with the motion.
         """
-        self._turns.close()
-
-    def reboot(self) -> None:
-        """Restarts the controller. The session is closed then: connect again once it is up."""
-        with self._turns.take("RebootRobot"):
-            super().reboot()
-        self.close()
+        self._lock.close()
 
     def __repr__(self) -> str:
-        return f"<RobotSession {self.model.name} at {self._link.name}{', closed' if self.is_closed else ''}>"
-
-    def _request(self, request: Request, timeout: float | None = None) -> Any:
-        if request.code in WHILE_MOVING or request == SetMotorPower(0):
-            with self._turns.take_unless_moving() as is_mine:
-                if is_mine:
-                    return super()._request(request, timeout)
-            return self._link.request_alongside(request, timeout)
-        with self._turns.take(type(request).__name__):
-            return super()._request(request, timeout)
+        return f"<RobotSession {self.model.name} at {self._driver.name}{', closed' if self.is_closed else ''}>"
 
     def _no_state(self, timeout: float) -> ConnectionLostError:
         return ConnectionLostError(
-            f"{self._link.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
+            f"{self._driver.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
             "in, then connect again"
         )
+
+    def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
+        from rcilab.conformance.check import check
+
+        check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
+
+    def _move_along(
+        self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
+    ) -> Run:
+        """Streams a path in Cartesian position mode once its joint motion is found good."""
+        from rcilab.motion.cartesian import follow_path, schedule
+
+        motion = follow_path(self.model, state.q_c, path, speed)
+        self._require_allowed(motion, state, "cartesian_position")
+        callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
+        return self._runner.run(callback, "cartesian_position", motion)

@@ -1,4 +1,4 @@
-"""Whose turn it is on a connection: a request's or a motion's, and nobody's once it closes."""
+"""The lock of a session: one request or one motion at a time uses the connection, and none once it closes."""
 
 from __future__ import annotations
 
@@ -9,42 +9,42 @@ from contextlib import contextmanager
 from rcilab.core.errors import UsageError
 
 _CLOSED = "the session was closed while a motion ran"
-_CLOSE_TIMEOUT = 10.0  # [s] for another thread to bring its motion to rest; the slowest joint needs 0.4 s.
-_LOOK = 0.02  # [s] Longest wait for another thread's request before it is looked at again what that thread does.
+_CLOSE_TIMEOUT = 10.0  # [s] for another thread to stop its motion; the slowest joint needs 0.4 s.
+_LOOK = 0.02  # [s] Longest wait for another thread's request before what that thread does is checked again.
 
 
 class SessionLock:
-    """Threads take turns with requests; while one runs a motion, only `stop` and `close` reach it.
+    """Threads take it in turn for requests; while one runs a motion, only `stop` and `close` are accepted.
 
     Attributes:
-        is_closing: Whether nobody gets a turn any more.
+        is_closing: Whether nothing may take it any more.
 
     Args:
-        disconnect: Ends the connection, once nobody needs it; may be called twice.
+        disconnect: Ends the connection, once it is not in use; may be called twice.
     """
 
     def __init__(self, disconnect: Callable[[], object]) -> None:
         self.is_closing = False
         self._disconnect = disconnect
-        self._busy = threading.RLock()  # Held by the thread whose turn it is.
+        self._busy = threading.RLock()  # Held by the thread that uses the connection.
         self._mover: int | None = None  # The thread that runs a motion.
         self._can_stop = False  # A motion is being checked, or runs.
-        self._reason: str | None = None  # Why the motion is to be brought to rest.
+        self._reason: str | None = None  # Why the motion is to stop.
 
     @property
     def is_moving(self) -> bool:
-        """Whether a motion runs, in whichever thread."""
+        """Whether a motion runs, in any thread."""
         return self._mover is not None
 
     def reason_to_stop(self, t: float) -> str | None:
-        """Returns why the motion that runs is to be brought to rest; asked by its control loop in every cycle."""
+        """Returns why the motion that runs is to stop; its control loop asks in every cycle."""
         if self.is_closing:
             return _CLOSED
         return self._reason
 
     @contextmanager
     def take(self, what: str) -> Iterator[None]:
-        """Has the connection for itself: waits for another thread's request, not for a motion.
+        """Takes the connection: waits for another thread's request, not for a motion.
 
         Args:
             what: What it is needed for.
@@ -63,7 +63,7 @@ class SessionLock:
 
     @contextmanager
     def take_unless_moving(self) -> Iterator[bool]:
-        """Has the connection for itself as `take`, or gives False: a motion runs, or began while it was waited for.
+        """Takes the connection as `take` does, or gives False: a motion runs, or began while it was waited for.
 
         Raises:
             UsageError: The connection closes.
@@ -79,8 +79,8 @@ class SessionLock:
                 self._busy.release()
 
     @contextmanager
-    def set_out(self, what: str) -> Iterator[None]:
-        """Has the connection for a motion; a stop while it is still being checked counts. Raises as `take` does."""
+    def begin_motion(self, what: str) -> Iterator[None]:
+        """Takes the connection for a motion; a stop while it is still being checked counts. Raises as `take` does."""
         with self.take(what):
             self._reason, self._can_stop = None, True
             try:
@@ -90,7 +90,7 @@ class SessionLock:
 
     @contextmanager
     def move(self) -> Iterator[None]:
-        """Runs the motion that has set out: from here on all others are refused, this thread's callback too."""
+        """Runs the motion of `begin_motion`: others are refused from here on, its callback's too."""
         self._mover = threading.get_ident()
         try:
             yield
@@ -100,7 +100,7 @@ class SessionLock:
                 self._disconnect()
 
     def stop(self, reason: str) -> None:
-        """Has the motion brought to rest that runs or is about to; does nothing when there is none.
+        """Stops the motion that runs or is about to; does nothing when there is none.
 
         Args:
             reason: What its run says; the first one counts.
@@ -109,7 +109,7 @@ class SessionLock:
             self._reason = self._reason or reason
 
     def close(self) -> None:
-        """Ends the connection after the turn that somebody has; a callback's own motion does so when it has ended."""
+        """Ends the connection once it is free; called from a callback, when the motion has ended."""
         self.is_closing = True
         if self._mover == threading.get_ident():
             return

@@ -57,7 +57,7 @@ class SpeedScaledStream:
         return self.paced.as_motion()
 
     @property
-    def under_way(self) -> MotionProgress:
+    def progress(self) -> MotionProgress:
         """Its place and pace."""
         paced, cycle = self.paced, self.stream.cycle
         return MotionProgress(

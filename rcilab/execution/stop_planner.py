@@ -16,9 +16,9 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import SingularError
 from rcilab.core.limits import JointLimits, Limits
+from rcilab.core.rotation import rotation_matrix, rotation_vector
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
-from rcilab.execution.rotation import rotation_matrix, rotation_vector
 from rcilab.motion import LIMIT_MARGIN, plan_stop
 
 if TYPE_CHECKING:

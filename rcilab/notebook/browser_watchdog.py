@@ -62,5 +62,5 @@ class BrowserWatchdog:
 
 
 def _sessions() -> list[RobotSession]:
-    module = sys.modules.get("rcilab.execution.open_sessions")  # Where it is not, nobody can have opened one.
+    module = sys.modules.get("rcilab.execution.session")  # Where it is not, nobody can have opened one.
     return [] if module is None else module.open_sessions()

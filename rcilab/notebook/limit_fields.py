@@ -13,7 +13,7 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import RcilabError
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Text, message
-from rcilab.makers.rokae.driver.configuration import SoftJointLimits
+from rcilab.makers.configuration import SoftJointLimits
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.state import LabState

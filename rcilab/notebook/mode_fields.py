@@ -18,12 +18,8 @@ from rcilab.app.run.mode_parameters import (
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import Text
-from rcilab.makers.rokae.driver.controller_parameters import (
-    ControllerParameters,
-    ControlPart,
-    control_ranges,
-    standard_control,
-)
+from rcilab.makers.configuration import ControllerParameters, ControlPart
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.parameter_sync import ParameterSync
 from rcilab.notebook.state import LabState

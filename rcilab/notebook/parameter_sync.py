@@ -9,7 +9,8 @@ from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, is_contr
 from rcilab.control_process.status_messages import tell_error
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.i18n.translator import Message
-from rcilab.makers.rokae.driver.controller_parameters import ControlPart, standard_control
+from rcilab.makers.configuration import ControlPart
+from rcilab.makers.rokae.driver.controller_parameters import standard_control
 from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.state import LabState
 

@@ -19,8 +19,7 @@ from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.makers.rokae.driver.commands import SIGNALS
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, give_control
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
+from rcilab.makers.driver import SIGNALS
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
 
@@ -44,7 +43,7 @@ class SessionRobot:
         self._way: MotionProgress | None = None  # Of the running or last motion.
         self._run: Run | None = None  # What came of the last one that was started here.
         self._is_cells = False
-        self._deafen = session.hear_runs(self._hear_run)
+        self._remove_listener = session.on_run(self._hear_run)
         self._powered: bool | None = None
         self._held = RobotConfiguration()  # What it was told from here.
         self._inputs: tuple[bool, ...] | None = None
@@ -76,7 +75,7 @@ class SessionRobot:
         if self._session.is_closed:
             self._is_cells = False
             return SupervisorStatus(phase="closed", code="closed", target=self.name)
-        way, is_ours = self._session.under_way, self._is_busy and self._what == "execute"
+        way, is_ours = self._session.progress, self._is_busy and self._what == "execute"
         is_moving = way is not None or is_ours or self._session.is_moving
         self._is_cells = is_moving and not is_ours
         if self._is_cells and way is None:
@@ -131,7 +130,7 @@ class SessionRobot:
         """Tells the controller parameters of the modes."""
 
         def tell() -> None:
-            give_control(self._session, control)
+            self._session.configure(RobotConfiguration(control=control))
             self._held = self._held.updated(RobotConfiguration(control=control))
 
         self._do("control", tell)
@@ -140,7 +139,7 @@ class SessionRobot:
         """Tells the controller soft limits of the joint angles."""
 
         def tell() -> None:
-            self._session.set_joint_limit(joints.lower, joints.upper)
+            self._session.configure(RobotConfiguration(joints=joints))
             self._held = self._held.updated(RobotConfiguration(joints=joints))
 
         self._do("limits", tell)
@@ -158,7 +157,7 @@ class SessionRobot:
         """Sets a digital output."""
 
         def tell() -> None:
-            self._session.set_do(signal, level)
+            self._session.rci.set_do(signal, level)
             self._outputs = (*self._outputs[:signal], level, *self._outputs[signal + 1 :])
             self._read()
 
@@ -170,10 +169,10 @@ class SessionRobot:
 
     def reboot(self) -> None:
         """Restarts the controller, which closes the session."""
-        self._do("reboot", self._session.reboot)
+        self._do("reboot", self._session.rci.reboot)
 
     def _read(self) -> None:
-        self._inputs = tuple(self._session.get_di(signal) for signal in SIGNALS)
+        self._inputs = tuple(self._session.rci.get_di(signal) for signal in SIGNALS)
 
     def set_pace(self, pace: float) -> None:
         """Runs the motion under way at part of its planned speed; 0 holds it."""
@@ -201,7 +200,7 @@ class SessionRobot:
 
     def close(self) -> None:
         """Brings to rest what was started here; the session stays."""
-        self._deafen()
+        self._remove_listener()
         worker = self._worker
         if worker is not None and worker.is_alive():
             self._session.stop()
@@ -237,7 +236,7 @@ class SessionRobot:
 
     def _ask_power(self) -> None:
         if time.monotonic() - self._power_seen > _POWER_LOOK and not self._is_busy:
-            self._powered = self._session.motor_state()
+            self._powered = self._session.is_powered()
             self._power_seen = time.monotonic()
 
 

@@ -9,7 +9,7 @@ import ipywidgets
 
 from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
-from rcilab.makers.rokae.driver.commands import SIGNALS
+from rcilab.makers.driver import SIGNALS
 from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.style import block, esc, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcilab.app.fault_lab.demo_motion import DemoMotion
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
-    from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
+    from rcilab.makers.configuration import ControllerParameters
     from rcilab.motion.motion import Motion
     from rcilab.notebook.cell_run import CellRun
     from rcilab.notebook.robot_side import RobotBackend

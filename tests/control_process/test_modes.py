@@ -11,8 +11,7 @@ from rcilab.conformance.check import check
 from rcilab.control_process import Supervisor
 from rcilab.core.errors import CertificateError, CommandRejectedError, InvalidValueError, UsageError
 from rcilab.core.state import ControllerMode
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from tests.waiting import SOON, wait_for

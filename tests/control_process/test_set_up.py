@@ -14,7 +14,7 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import CertificateError, ControlError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
+from rcilab.makers.configuration import ForceControlFrame, RobotConfiguration
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
@@ -102,7 +102,7 @@ def test_a_motion_out_of_the_box_that_runs_all_the_same_is_stopped_by_the_virtua
         motion = plan_joint(MODEL, start, start + np.array((0.5, 0, 0, 0, 0, 0, 0)), speed=0.5)
         box = box_around(MODEL.forward(start).position, 0.1)
         assert not check(motion, MODEL, box=box).ok
-        robot.set_cartesian_limit(box)
+        robot.rci.set_cartesian_limit(box)
         with pytest.raises(ControlError) as caught:
             robot.control(lambda state, t: JointPosition(q=motion.at(t).q), "joint_position")
         assert set(caught.value.faults) & {

@@ -202,7 +202,7 @@ def test_settings_pass_through_the_block():
     settings = ControlBlock(os.dup(block.descriptor)).settings
     block.close()
     assert isinstance(settings, Settings)
-    assert (settings.n, settings.name) == (6, "xMate3")
+    assert (settings.arm.n, settings.arm.name) == (6, "xMate3")
     assert settings.T_flange_tool.is_close(model.T_flange_tool, 0.0)
     assert np.array_equal(settings.limits.joint.jerk, model.limits.joint.jerk)
     assert settings.limits.cartesian == model.limits.cartesian

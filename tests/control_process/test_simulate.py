@@ -202,7 +202,7 @@ def test_every_arm_runs_with_its_tool_and_knows_its_name(name):
         run = robot.execute(plan_joint(model, robot.state.q_c, goal, speed=1.0))
         assert np.abs(run.q[-1] - goal).max() <= 1e-12
         assert np.allclose(robot.state.T_base_tool, model.forward(goal).matrix, atol=1e-9)
-        assert identify_robot(robot.load_model().dh) == name
+        assert identify_robot(robot.rci.load_model().dh) == name
 
 
 def test_an_unknown_plant_or_model_is_refused_before_anything_starts(monkeypatch):

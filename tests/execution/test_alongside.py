@@ -26,11 +26,11 @@ def robot():
     "ask",
     [
         lambda robot: robot.state,
-        lambda robot: robot.safety_stop(),
-        lambda robot: robot.motor_state(),
-        lambda robot: robot.get_di(0),
-        lambda robot: robot.set_do(0, True),
-        lambda robot: robot.set_cart_imp_desired_tau(np.zeros(6)),
+        lambda robot: robot.rci.safety_stop(),
+        lambda robot: robot.rci.motor_state(),
+        lambda robot: robot.rci.get_di(0),
+        lambda robot: robot.rci.set_do(0, True),
+        lambda robot: robot.rci.set_cart_imp_desired_tau(np.zeros(6)),
     ],
     ids=["state", "safety_stop", "motor_state", "get_di", "set_do", "set_cart_imp_desired_tau"],
 )
@@ -73,5 +73,5 @@ def test_power_off_ends_a_motion_that_is_about_to_begin(robot, delay):
     robot.power_off()
     mover.join(20.0)
     assert isinstance(ended[0], RcilabError)
-    assert not robot.motor_state()
+    assert not robot.rci.motor_state()
     assert np.abs(robot.state.q_c - MODEL.home).max() < 0.4

@@ -18,7 +18,7 @@ MODEL = load_model("xMatePro7")
 def test_an_arm_angle_that_a_filter_holds_back_is_waited_for_or_reported():
     with simulate(MODEL) as robot:
         robot.power_on()
-        robot.set_filters(0.5, 0.5, 0.5)
+        robot.rci.set_filters(0.5, 0.5, 0.5)
         robot.execute(plan_nullspace(MODEL, robot.state.q_c, 0.5), mode="cartesian_position")
         assert robot.state.psi_c == pytest.approx(0.5, abs=1e-5)
         robot.move_l(robot.state.T_base_tool_c, psi=0.2)
@@ -50,7 +50,7 @@ def test_soft_limits_of_the_model_reach_the_controller_and_can_be_widened():
         robot.power_off()
         robot.power_on()
         robot.execute(plan_recovery(robot.model, robot.state.q_c))
-        robot.set_joint_limit(joint.lower - 1e-10, joint.upper + 1e-10)
+        robot.rci.set_joint_limit(joint.lower - 1e-10, joint.upper + 1e-10)
         robot.move_j(robot.state.q_c + 0.4 * np.eye(7)[0])
 
 
@@ -60,7 +60,7 @@ def test_a_desired_moment_builds_up_and_throws_nothing(axis):
     wrench[axis] = 5.0
     with simulate(MODEL, plant="mujoco") as robot:
         robot.power_on()
-        robot.set_cart_imp_desired_tau(wrench)
+        robot.rci.set_cart_imp_desired_tau(wrench)
         T = robot.state.T_base_tool_c
         run = robot.control(lambda state, t: CartesianPosition(T, finished=t >= 0.4), "cartesian_impedance")
         assert run.faults == ()
@@ -80,7 +80,7 @@ def test_a_tool_that_passes_a_face_of_its_box_is_told_which_and_how_far(mode):
     with simulate(MODEL) as robot:
         robot.power_on()
         T = robot.state.T_base_tool_c
-        robot.set_cartesian_limit(SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose(T.position), active=True))
+        robot.rci.set_cartesian_limit(SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose(T.position), active=True))
 
         def callback(state, t):
             share = min(t / 0.5, 1.0)
@@ -99,7 +99,7 @@ def test_limits_that_another_session_has_narrowed_are_guessed_from_the_fault():
     upper[0] = 0.2
     with simulate(MODEL) as robot:
         robot.power_on()
-        robot.set_joint_limit(joint.lower, upper)
-        robot._model = MODEL  # As a session that does not know of it.
+        robot.rci.set_joint_limit(joint.lower, upper)
+        robot._arm.model = MODEL  # As a session that does not know of it.
         with pytest.raises(ControlError, match="the controller has narrower ones"):
             robot.move_j(MODEL.home + 0.5 * np.eye(7)[0])

@@ -22,31 +22,31 @@ REST = plan_joint(MODEL, MODEL.home, MODEL.home)
 def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_robot):
     peer, robot = make_robot(Script(safety_stop=rci.SafetyStop.GSTOP))
     robot.power_on()
-    assert robot.motor_state() is True
-    robot.connect()
+    assert robot.rci.motor_state() is True
+    robot.rci.connect()
     box = SafetyBox(size=(1.0, 2.0, 3.0), T_base_box=Pose((0.0, 0.0, 1.0)), active=False)
-    robot.set_cartesian_limit(box)
+    robot.rci.set_cartesian_limit(box)
     assert robot.safety_box is box
-    robot.set_joint_limit(MODEL.limits.joint.lower, MODEL.limits.joint.upper)
-    robot.set_collision_behavior(MODEL.limits.joint.collision_threshold)
-    robot.set_joint_impedance(MODEL.limits.joint.stiffness)
-    robot.set_cartesian_impedance([3000, 3000, 3000, 300, 300, 300])
-    robot.set_coor(Pose((0.0, 0.0, 0.1)))
+    robot.rci.set_joint_limit(MODEL.limits.joint.lower, MODEL.limits.joint.upper)
+    robot.rci.set_collision_behavior(MODEL.limits.joint.collision_threshold)
+    robot.rci.set_joint_impedance(MODEL.limits.joint.stiffness)
+    robot.rci.set_cartesian_impedance([3000, 3000, 3000, 300, 300, 300])
+    robot.rci.set_coor(Pose((0.0, 0.0, 0.1)))
     robot.set_load(1.0, [0.0, 0.0, 0.05], np.eye(3) * 0.01)
-    robot.set_cart_imp_desired_tau([1, 2, 3, 4, 5, 6])
-    robot.set_filters(100.0, 200.0, 300.0)
-    robot.set_torque_filter_cut_off_frequency(50.0)
-    robot.automatic_error_recovery()
-    assert robot.load_model().dh[2] == 404.0
-    robot.set_fc_coor(Pose(), rci.ForceFrame.WORLD)
-    robot.enable_virtual_guide(True)
-    robot.set_do(5, True)
-    assert robot.get_di(0) is True
-    robot.start_drag(rci.DragSpace.CARTESIAN, rci.DragType.TRANSLATION)
-    robot.stop_drag()
-    assert robot.safety_stop() is rci.SafetyStop.GSTOP
+    robot.rci.set_cart_imp_desired_tau([1, 2, 3, 4, 5, 6])
+    robot.rci.set_filters(100.0, 200.0, 300.0)
+    robot.rci.set_torque_filter_cut_off_frequency(50.0)
+    robot.rci.automatic_error_recovery()
+    assert robot.rci.load_model().dh[2] == 404.0
+    robot.rci.set_fc_coor(Pose(), rci.ForceFrame.WORLD)
+    robot.rci.enable_virtual_guide(True)
+    robot.rci.set_do(5, True)
+    assert robot.rci.get_di(0) is True
+    robot.rci.start_drag(rci.DragSpace.CARTESIAN, rci.DragType.TRANSLATION)
+    robot.rci.stop_drag()
+    assert robot.rci.safety_stop() is rci.SafetyStop.GSTOP
     robot.power_off()
-    robot.reboot()
+    robot.rci.reboot()
     sent = [type(request) for request in peer.requests]
     assert set(sent) == set(rci.REQUESTS.values()) - {rci.StartMove, rci.StopMove}
     assert peer.requests[-2] == rci.SetMotorPower(0)
@@ -57,16 +57,16 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
 @pytest.mark.parametrize(
     ("call", "hint"),
     [
-        (lambda r: r.set_joint_impedance([1.0] * 6), r"needs \(7,\)"),
-        (lambda r: r.set_joint_impedance([np.nan] * 7), "finite"),
+        (lambda r: r.rci.set_joint_impedance([1.0] * 6), r"needs \(7,\)"),
+        (lambda r: r.rci.set_joint_impedance([np.nan] * 7), "finite"),
         (
-            lambda r: r.set_joint_impedance([1, 1, 1, 1, 1, 1, 301]),
+            lambda r: r.rci.set_joint_impedance([1, 1, 1, 1, 1, 1, 301]),
             r"stiffness, joint 7: 301.0 is outside 0 to 300 \[N m/rad\]",
         ),
-        (lambda r: r.set_cartesian_limit([1, 0, 1]), "is no SafetyBox"),
-        (lambda r: r.set_joint_limit([1] * 7, [0] * 7), "below upper"),
-        (lambda r: r.set_filters(1001, 1, 1), "0.1 to 1000"),
-        (lambda r: r.set_do(6, True), "0 to 5"),
+        (lambda r: r.rci.set_cartesian_limit([1, 0, 1]), "is no SafetyBox"),
+        (lambda r: r.rci.set_joint_limit([1] * 7, [0] * 7), "below upper"),
+        (lambda r: r.rci.set_filters(1001, 1, 1), "0.1 to 1000"),
+        (lambda r: r.rci.set_do(6, True), "0 to 5"),
         (lambda r: r.set_load(-1, [0, 0, 0], np.eye(3)), "from 0 to"),
         (lambda r: RciSettings.set_load(r, 0, [0, 0, 0], np.eye(3)), "a load without mass has none"),
         (
@@ -75,28 +75,31 @@ def test_every_command_reaches_the_controller_as_the_protocol_spells_it(make_rob
         ),
         (lambda r: r.set_load(1, [0, 0, 10], np.eye(3)), r"10\.0 m from the flange is farther than 2 m; give metres"),
         (lambda r: r.set_load(100, [0, 0, 0], np.eye(3)), "load mass: 100.* kg is above 7 kg for xMatePro7"),
-        (lambda r: r.set_coor(None), "Pose"),
-        (lambda r: r.set_coor(Pose((0.0, 0.0, 99.0))), r"99\.0 m from the flange is farther than 2 m; give metres"),
-        (lambda r: r.set_cartesian_impedance([1, 1, 1, 1, 301, 1]), "stiffness, about y: 301.0 is outside 0 to 300"),
+        (lambda r: r.rci.set_coor(None), "Pose"),
+        (lambda r: r.rci.set_coor(Pose((0.0, 0.0, 99.0))), r"99\.0 m from the flange is farther than 2 m; give metres"),
         (
-            lambda r: r.set_cart_imp_desired_tau([0, 0, -61, 0, 0, 0]),
+            lambda r: r.rci.set_cartesian_impedance([1, 1, 1, 1, 301, 1]),
+            "about y: 301.0 is outside 0 to 300",
+        ),
+        (
+            lambda r: r.rci.set_cart_imp_desired_tau([0, 0, -61, 0, 0, 0]),
             r"wrench, z: -61.0 is outside -60 to 60 \[N, N m\]",
         ),
-        (lambda r: r.set_collision_behavior([1, 1, 1, 1, 1, 1, 21]), r"joint 7: 21.0 is outside 0 to 20 \[N m\]"),
+        (lambda r: r.rci.set_collision_behavior([1, 1, 1, 1, 1, 1, 21]), r"joint 7: 21.0 is outside 0 to 20 \[N m\]"),
         (
-            lambda r: r.set_joint_limit([-3.0] * 7, [1] * 7),
+            lambda r: r.rci.set_joint_limit([-3.0] * 7, [1] * 7),
             r"lower, joint 1: -3.0 is outside -2.9\d+ to 2.9\d+ \[rad\]",
         ),
-        (lambda r: r.set_torque_filter_cut_off_frequency(math.nan), r"frequency: nan must be finite \[Hz\]"),
-        (lambda r: r.set_fc_coor(Pose(), "flange"), "type: 'flange' is unknown; known: 'world', 'tool', 'path'"),
-        (lambda r: r.set_fc_coor(None), "is no Pose"),
-        (lambda r: r.start_drag("elbow"), "space: 'elbow' is unknown; known: 'joint', 'cartesian'"),
-        (lambda r: r.enable_virtual_guide("off"), "True or False"),
+        (lambda r: r.rci.set_torque_filter_cut_off_frequency(math.nan), r"frequency: nan must be finite \[Hz\]"),
+        (lambda r: r.rci.set_fc_coor(Pose(), "flange"), "type: 'flange' is unknown; known: 'world', 'tool', 'path'"),
+        (lambda r: r.rci.set_fc_coor(None), "is no Pose"),
+        (lambda r: r.rci.start_drag("elbow"), "space: 'elbow' is unknown; known: 'joint', 'cartesian'"),
+        (lambda r: r.rci.enable_virtual_guide("off"), "True or False"),
         (lambda r: r.receive_state(max_age=-1), "max_age: -1 must not be below 0"),
         (lambda r: r.control(None, cut_off=0.0), "cut_off: 0.0 must be above 0"),
         (lambda r: r.control(None, rate_limit="mine"), "'mine' is unknown; known: manual, sdk"),
         (lambda r: r.control(None, mode="velocity"), "mode: 'velocity' is unknown; known: joint_position"),
-        (lambda r: r.set_motor_power("no"), "True or False"),
+        (lambda r: r.rci.set_motor_power("no"), "True or False"),
         (lambda r: r.receive_state(0), "timeout: 0 must be above 0"),
         (lambda r: r.execute(None), "motion: None is no motion"),
         (lambda r: r.execute(REST, check(REST, MODEL)), r"pass report\.certificate, not the report"),
@@ -119,19 +122,19 @@ def test_a_refusal_says_what_to_do(make_robot):
 def test_a_missing_answer_is_a_deadline_error_and_the_session_goes_on(make_robot):
     _, robot = make_robot(Script(silent_requests=(rci.SetDO,)))
     with pytest.raises(DeadlineError, match=r"did not answer SetDO within 1 s"):
-        robot.set_do(0, True)
-    assert robot.motor_state() is True
+        robot.rci.set_do(0, True)
+    assert robot.rci.motor_state() is True
 
 
 def test_split_and_stale_answers_are_put_together_and_told_apart(make_robot):
     _, robot = make_robot(Script(split_responses=True, stale_responses=True))
-    assert robot.motor_state() is True
-    assert robot.load_model().dh[2] == 404.0
-    assert robot.motor_state() is True
+    assert robot.rci.motor_state() is True
+    assert robot.rci.load_model().dh[2] == 404.0
+    assert robot.rci.motor_state() is True
 
 
 @pytest.mark.parametrize(
-    "change", [lambda r: r.set_coor(Pose((0.0, 0.0, 0.1))), lambda r: r.set_load(2, [0, 0, 0], np.eye(3))]
+    "change", [lambda r: r.rci.set_coor(Pose((0.0, 0.0, 0.1))), lambda r: r.set_load(2, [0, 0, 0], np.eye(3))]
 )
 def test_another_tool_or_load_makes_a_certificate_stale(make_robot, change):
     peer, robot = make_robot()
@@ -147,7 +150,7 @@ def test_a_refused_tool_leaves_the_model_as_it_is(make_robot):
     _, robot = make_robot(Script(statuses={rci.SetCoor: rci.SettingStatus.INVALID_ARGUMENT}))
     before = robot.model.fingerprint
     with pytest.raises(CommandRejectedError):
-        robot.set_coor(Pose((0.0, 0.0, 0.1)))
+        robot.rci.set_coor(Pose((0.0, 0.0, 0.1)))
     assert robot.model.fingerprint == before
 
 
@@ -182,7 +185,7 @@ def test_a_refusal_as_not_possible_asks_the_controller_for_its_reason(make_robot
     statuses = {rci.SetFilters: rci.SettingStatus.NOT_POSSIBLE}
     _, robot = make_robot(Script(statuses=statuses, safety_stop=stop))
     with pytest.raises(CommandRejectedError, match=f"SetFilters was refused: not possible; {words}") as caught:
-        robot.set_filters(100, 100, 100)
+        robot.rci.set_filters(100, 100, 100)
     assert caught.value.facts["status"] == stop.name.lower()
 
 
@@ -190,13 +193,13 @@ def test_a_reason_that_cannot_be_asked_for_does_not_replace_the_refusal(make_rob
     statuses = {rci.SetFilters: rci.SettingStatus.NOT_POSSIBLE}
     _, robot = make_robot(Script(statuses=statuses, silent_requests=(rci.GetSafetyStopState,)))
     with pytest.raises(CommandRejectedError, match="SetFilters was refused: not possible"):
-        robot.set_filters(100, 100, 100)
+        robot.rci.set_filters(100, 100, 100)
 
 
 @pytest.mark.parametrize("name", ["joint", "cartesian"])
 def test_names_will_do_for_enumerations(make_robot, name):
     peer, robot = make_robot()
-    robot.start_drag(name, "rotation")
-    robot.set_fc_coor(Pose(), "path")
+    robot.rci.start_drag(name, "rotation")
+    robot.rci.set_fc_coor(Pose(), "path")
     assert peer.requests[-2] == rci.StartDrag(rci.DragSpace[name.upper()], rci.DragType.ROTATION)
     assert peer.requests[-1].type == rci.ForceFrame.PATH

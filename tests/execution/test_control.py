@@ -98,7 +98,7 @@ def test_an_unusable_command_brings_the_arm_to_rest_first(make_robot, bad, hint)
     with pytest.raises(InvalidValueError, match=hint):
         robot.control(lambda state, t: bad(state.q_c) if t > 0.2 else good(state, t))
     assert_controlled_stop(peer)
-    assert robot.motor_state() is True
+    assert robot.rci.motor_state() is True
 
 
 def test_an_exception_in_the_callback_brings_the_arm_to_rest_and_comes_out_again(make_robot):

@@ -70,7 +70,7 @@ def test_a_leap_with_one_of_the_first_commands_has_its_joint_and_numbers(before)
 
 
 def test_a_collision_has_its_joint_its_torque_and_the_threshold_that_was_set(robot):
-    robot.set_collision_behavior([5.0] + [20.0] * 6)
+    robot.rci.set_collision_behavior([5.0] + [20.0] * 6)
     push = lambda: robot.world.push([0.0, 20.0, 0.0, 0.0, 0.0, 0.0], duration=1.0)  # noqa: E731
     said = fault_of(robot, stand_while(robot, push))
     assert "kCollision" in said
@@ -90,7 +90,7 @@ def test_a_push_on_an_arm_that_stands_is_not_blamed_on_the_plan():
 
 
 def test_a_push_under_joint_impedance_names_the_bound_that_was_judged(robot):
-    robot.set_joint_impedance([20.0] * 7)
+    robot.rci.set_joint_impedance([20.0] * 7)
     push = lambda: robot.world.push([0.0, 60.0, 0.0, 0.0, 0.0, 0.0], duration=1.0)  # noqa: E731
     said = fault_of(robot, stand_while(robot, push), "joint_impedance")
     assert "joint 5: measured velocity 2." in said
@@ -99,8 +99,8 @@ def test_a_push_under_joint_impedance_names_the_bound_that_was_judged(robot):
 
 
 def test_a_desired_wrench_that_throws_the_arm_is_named_and_not_the_plan(robot):
-    robot.set_cartesian_impedance([50.0] * 3 + [5.0] * 3)
-    robot.set_cart_imp_desired_tau([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    robot.rci.set_cartesian_impedance([50.0] * 3 + [5.0] * 3)
+    robot.rci.set_cart_imp_desired_tau([60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     T = robot.state.T_base_tool_c
     said = fault_of(robot, lambda state, t: CartesianPosition(T, finished=t > 3.0), "cartesian_impedance")
     assert "tool: measured rotational velocity 2.75" in said

@@ -211,7 +211,7 @@ def test_a_motion_that_was_judged_for_another_mode_is_refused(robot):
 def test_motions_are_checked_with_the_safety_box_that_was_set(robot):
     away = plan_joint(MODEL, HOME, HOME + [0.6, 0, 0, 0, 0, 0, 0])
     certificate = check(away, MODEL).certificate
-    robot.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(T_HOME.position)))
+    robot.rci.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(T_HOME.position)))
     try:
         with pytest.raises(ConformanceError, match="box"):
             robot.execute(away)
@@ -221,4 +221,4 @@ def test_motions_are_checked_with_the_safety_box_that_was_set(robot):
             robot.execute(away, certificate)
         assert robot.move_l(Pose(T_HOME.position + [0.0, 0.1, 0.0], T_HOME.wxyz)).stopped is None
     finally:
-        robot.set_cartesian_limit(SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))
+        robot.rci.set_cartesian_limit(SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))

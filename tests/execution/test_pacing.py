@@ -45,7 +45,7 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         robot.power_on()
         with pytest.raises(UsageError, match="pace"):
             robot.pause()
-        assert robot.under_way is None
+        assert robot.progress is None
         motion = plan_joint(model, model.home, model.home + np.array([0.2, 0.1, 0.0, 0.0, 0.0, 0.2]), speed=0.03)
         runs: list[rcilab.Run] = []
         moved: list[float] = []
@@ -58,8 +58,8 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         wait_for(lambda: moved)
         with pytest.raises(InvalidValueError, match="pace"):
             robot.set_pace(0.01)
-        wait_for(lambda: robot.under_way.place > 0.05)  # It moves by then.
-        before = robot.under_way
+        wait_for(lambda: robot.progress.place > 0.05)  # It moves by then.
+        before = robot.progress
         assert before is not None
         assert (before.pace, before.mode) == (1.0, "joint_impedance")
         assert before.duration == pytest.approx(motion.duration, abs=CYCLE_TIME)
@@ -67,16 +67,16 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         assert before.time >= moved[0]
         robot.pause()
         wait_for(lambda: not robot.state.dq_c.any())
-        held = robot.under_way
+        held = robot.progress
         assert held.pace == 0.0
         assert before.place < held.place < held.time
-        wait_for(lambda: robot.under_way.time > held.time)
-        assert robot.under_way.place == held.place
+        wait_for(lambda: robot.progress.time > held.time)
+        assert robot.progress.place == held.place
         robot.resume(0.7)
-        wait_for(lambda: robot.under_way.place > held.place)
-        assert robot.under_way.pace == 0.7
+        wait_for(lambda: robot.progress.place > held.place)
+        assert robot.progress.pace == 0.7
         mover.join(30.0)
-        assert robot.under_way is None
+        assert robot.progress is None
     run = runs[0]
     assert run.setup.mode == "joint_impedance"
     assert run.plan is not motion

@@ -37,8 +37,8 @@ def test_a_tool_that_was_stopped_outside_its_box_is_led_back_by_what_the_error_s
     with simulate(model, plant=plant) as robot:
         robot.power_on()
         start = robot.state.T_base_tool_c
-        robot.set_cartesian_limit(SafetyBox(size=(0.04, 0.04, 0.04), T_base_box=Pose(start.position), active=True))
-        robot.set_cartesian_impedance([100.0] * 3 + [100.0] * 3)
+        robot.rci.set_cartesian_limit(SafetyBox(size=(0.04, 0.04, 0.04), T_base_box=Pose(start.position), active=True))
+        robot.rci.set_cartesian_impedance([100.0] * 3 + [100.0] * 3)
 
         def hold(state, t):
             if t == 0.2:

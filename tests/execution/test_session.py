@@ -24,8 +24,8 @@ def test_whoever_calls_in_mid_motion_is_refused_and_the_motion_goes_on(make_robo
     refused = []
 
     def disturb():
-        for call in (robot.receive_state, robot.recover, robot.power_on, lambda: robot.set_coor(Pose()),
-                     lambda: robot.set_filters(100, 100, 100), lambda: robot.control(wave(10))):  # fmt: skip
+        for call in (robot.receive_state, robot.recover, robot.power_on, lambda: robot.rci.set_coor(Pose()),
+                     lambda: robot.rci.set_filters(100, 100, 100), lambda: robot.control(wave(10))):  # fmt: skip
             with pytest.raises(UsageError, match="a motion is running already") as caught:
                 call()
             refused.append(caught.value)
@@ -101,8 +101,9 @@ def test_a_closed_session_says_so(make_robot):
     _, robot = make_robot()
     robot.close()
     robot.close()
-    for call in (robot.receive_state, robot.power_on, robot.motor_state, robot.recover, lambda: robot.state,
-                 lambda: robot.set_do(0, 1), lambda: robot.control(wave(10)), lambda: robot.execute(REST)):  # fmt: skip
+    for call in (robot.receive_state, robot.power_on, robot.rci.motor_state, robot.recover, lambda: robot.state,
+                 lambda: robot.rci.set_do(0, 1), lambda: robot.control(wave(10)),
+                 lambda: robot.execute(REST)):  # fmt: skip
         with pytest.raises(UsageError, match="closed; connect again"):
             call()
 
@@ -143,4 +144,4 @@ def test_whoever_has_closed_may_connect_again():
     with Peer() as peer:
         for _ in range(3):
             with connect(peer.url, MODEL) as robot:
-                assert robot.motor_state() is True
+                assert robot.rci.motor_state() is True

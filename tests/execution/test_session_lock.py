@@ -19,7 +19,7 @@ def test_a_request_waits_for_another_threads_turn() -> None:
             seen.append("asked")
 
     asker = threading.Thread(target=ask)
-    with turns.set_out("a motion"):
+    with turns.begin_motion("a motion"):
         asker.start()
         with turns.take("its own question"):  # Who sets out may still ask.
             assert seen == []
@@ -29,7 +29,7 @@ def test_a_request_waits_for_another_threads_turn() -> None:
 
 def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> None:
     turns = SessionLock(lambda: None)
-    with turns.set_out("a motion"), turns.move():
+    with turns.begin_motion("a motion"), turns.move():
         with pytest.raises(UsageError, match="no question meanwhile"), turns.take("question"):
             pass
     with turns.take("question"):
@@ -39,20 +39,20 @@ def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> Non
 def test_a_stop_counts_from_setting_out_on_and_for_one_motion() -> None:
     turns = SessionLock(lambda: None)
     turns.stop("too early")
-    with turns.set_out("a motion"):
+    with turns.begin_motion("a motion"):
         assert turns.reason_to_stop(0.0) is None
         turns.stop("now")
         turns.stop("later")
         with turns.move():
             assert turns.reason_to_stop(0.0) == "now"
-    with turns.set_out("the next one"):
+    with turns.begin_motion("the next one"):
         assert turns.reason_to_stop(0.0) is None
 
 
 def test_a_motion_that_closes_its_own_connection_comes_to_its_end_first() -> None:
     said: list[str] = []
     turns = SessionLock(lambda: said.append("disconnected"))
-    with turns.set_out("a motion"), turns.move():
+    with turns.begin_motion("a motion"), turns.move():
         turns.close()
         assert turns.reason_to_stop(0.0) is not None
         assert said == []
@@ -65,7 +65,7 @@ def test_another_thread_that_closes_waits_for_the_motion() -> None:
     said: list[str] = []
     turns = SessionLock(lambda: said.append("disconnected"))
     closer = threading.Thread(target=turns.close)
-    with turns.set_out("a motion"):
+    with turns.begin_motion("a motion"):
         with turns.move():
             closer.start()
             wait_for(lambda: turns.is_closing)

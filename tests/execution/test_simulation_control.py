@@ -95,21 +95,21 @@ def test_the_status_counts_and_names(robot):
 
 def test_inputs_are_set_from_outside_and_by_loop_back(robot):
     robot.world.set_input(3, True)
-    assert [robot.get_di(k) for k in range(6)] == [False, False, False, True, False, False]
+    assert [robot.rci.get_di(k) for k in range(6)] == [False, False, False, True, False, False]
     robot.world.set_input(3, False)
     robot.world.set_loop_back()
-    robot.set_do(5, True)
-    assert robot.get_di(5)
-    robot.set_do(5, False)
+    robot.rci.set_do(5, True)
+    assert robot.rci.get_di(5)
+    robot.rci.set_do(5, False)
     robot.world.set_loop_back(False)
-    assert not any(robot.get_di(k) for k in range(6))
+    assert not any(robot.rci.get_di(k) for k in range(6))
 
 
 @pytest.mark.parametrize(("button", "kind"), [("estop", SafetyStop.ESTOP), ("gstop", SafetyStop.GSTOP)])
 def test_a_safety_stop_in_mid_motion_ends_it_and_holds_until_it_is_put_right(robot, button, kind):
     with pytest.raises(ControlError):
         hold(robot, lambda k: robot.world.press(button) if k == 20 else None)
-    assert robot.safety_stop() is kind
+    assert robot.rci.safety_stop() is kind
     assert robot.world.status().button == button
     with pytest.raises(CommandRejectedError):
         robot.recover()
@@ -153,7 +153,7 @@ def test_a_motion_whose_commands_are_all_lost_says_that_it_did_not_arrive(is_fre
 def test_a_motion_that_a_filter_delays_is_waited_for(frequency):
     with simulate(MODEL) as robot:
         robot.power_on()
-        robot.set_filters(frequency, frequency, frequency)
+        robot.rci.set_filters(frequency, frequency, frequency)
         motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
         run = robot.execute(motion)
         assert np.abs(robot.state.q_c - motion.goal).max() <= 1e-6
@@ -171,7 +171,7 @@ def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):
         k = min(round(t * 1000), len(motion.q) - 1)
         return JointPosition(motion.q[k], finished=k == len(motion.q) - 1)
 
-    robot.set_joint_limit(MODEL.limits.joint.lower, upper)
+    robot.rci.set_joint_limit(MODEL.limits.joint.lower, upper)
     robot.world.set_auto_limit()
     try:
         with pytest.raises(ControlError, match=r"did not arrive: joint 1 is \d\.\d+ deg from its end; .* soft limits"):
@@ -180,7 +180,7 @@ def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):
         assert start[0] + 0.03 < reached[0] < upper[0]
     finally:
         robot.world.set_auto_limit(False)
-        robot.set_joint_limit(MODEL.limits.joint.lower, MODEL.limits.joint.upper)
+        robot.rci.set_joint_limit(MODEL.limits.joint.lower, MODEL.limits.joint.upper)
         robot.execute(plan_joint(MODEL, robot.state.q_c, start))
 
 
@@ -234,15 +234,15 @@ def test_the_walls_of_a_safety_box_hold_an_arm_that_is_led_against_them():
     with simulate(MODEL, plant="mujoco") as robot:
         robot.power_on()
         tool = robot.state.T_base_tool.position
-        robot.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(tool)))
+        robot.rci.set_cartesian_limit(SafetyBox(size=(0.3, 0.3, 0.3), T_base_box=Pose(tool)))
 
         def pull(newtons):
-            robot.start_drag("cartesian", "free")
+            robot.rci.start_drag("cartesian", "free")
             robot.world.push([0.0, newtons, 0.0, 0.0, 0.0, 0.0])
             for _ in range(1500):
                 robot.receive_state()
             robot.world.release()
-            robot.stop_drag()
+            robot.rci.stop_drag()
             return abs(robot.state.T_base_tool.matrix[1, 3] - tool[1])
 
         robot.world.set_walls()

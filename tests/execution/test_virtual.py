@@ -51,51 +51,51 @@ def hold(state, t):
 
 def test_every_setting_is_taken_in_rest(robot):
     joint = MODEL.limits.joint
-    robot.connect()
-    robot.set_joint_limit(0.9 * joint.lower, 0.9 * joint.upper)
-    robot.set_joint_limit(joint.lower, joint.upper)
-    robot.set_collision_behavior(joint.collision_threshold)
-    robot.set_joint_impedance(0.5 * joint.stiffness)
-    robot.set_cartesian_impedance([1000.0] * 3 + [100.0] * 3)
-    robot.set_cart_imp_desired_tau(np.zeros(6))
-    robot.set_filters(1000.0, 1000.0, 1000.0)
-    robot.set_torque_filter_cut_off_frequency(200.0)
-    robot.set_fc_coor(Pose(), "world")
-    robot.enable_virtual_guide(False)
-    figures = robot.load_model()
+    robot.rci.connect()
+    robot.rci.set_joint_limit(0.9 * joint.lower, 0.9 * joint.upper)
+    robot.rci.set_joint_limit(joint.lower, joint.upper)
+    robot.rci.set_collision_behavior(joint.collision_threshold)
+    robot.rci.set_joint_impedance(0.5 * joint.stiffness)
+    robot.rci.set_cartesian_impedance([1000.0] * 3 + [100.0] * 3)
+    robot.rci.set_cart_imp_desired_tau(np.zeros(6))
+    robot.rci.set_filters(1000.0, 1000.0, 1000.0)
+    robot.rci.set_torque_filter_cut_off_frequency(200.0)
+    robot.rci.set_fc_coor(Pose(), "world")
+    robot.rci.enable_virtual_guide(False)
+    figures = robot.rci.load_model()
     assert [len(part) for part in (figures.dh, figures.dimensions)] == [28, 21]
     assert [len(part) for part in (figures.dynamics_with_friction, figures.dynamics)] == [66, 45]
-    assert robot.motor_state() is True
+    assert robot.rci.motor_state() is True
 
 
 def test_outputs_come_back_as_inputs_when_looped(robot):
     robot.world.set_loop_back(True)
     for level in (True, False):
-        robot.set_do(3, level)
-        assert robot.get_di(3) is level
+        robot.rci.set_do(3, level)
+        assert robot.rci.get_di(3) is level
 
 
 def test_a_drag_shows_in_the_mode_and_refuses_settings_until_it_ends(robot):
-    robot.start_drag("cartesian", "free")
+    robot.rci.start_drag("cartesian", "free")
     assert robot.state.robot_mode is RobotMode.GUIDING
     with pytest.raises(CommandRejectedError, match="not possible; the arm is guided by hand") as caught:
-        robot.set_joint_impedance(MODEL.limits.joint.stiffness)
+        robot.rci.set_joint_impedance(MODEL.limits.joint.stiffness)
     assert caught.value.status is SettingStatus.NOT_POSSIBLE
-    robot.stop_drag()
+    robot.rci.stop_drag()
     assert robot.state.robot_mode is RobotMode.IDLE
     assert robot.control(hold).stopped is None
 
 
 @pytest.mark.parametrize(("button", "shown"), [("estop", SafetyStop.ESTOP), ("gstop", SafetyStop.GSTOP)])
 def test_a_safety_stop_is_shown_and_recovery_waits_for_its_release(robot, button, shown):
-    assert robot.safety_stop() is SafetyStop.NONE
+    assert robot.rci.safety_stop() is SafetyStop.NONE
     robot.world.press(button)
-    assert robot.safety_stop() is shown
+    assert robot.rci.safety_stop() is shown
     with pytest.raises(CommandRejectedError, match=r"(release|close) it first") as caught:
         robot.recover()
     assert caught.value.status is RecoveryStatus.USER_STOP
     words = {"estop": "an emergency stop is pressed", "gstop": "the safety gate is open"}[button]
-    for refused in (robot.power_on, robot.start_drag, lambda: robot.set_filters(100.0, 100.0, 100.0)):
+    for refused in (robot.power_on, robot.rci.start_drag, lambda: robot.rci.set_filters(100.0, 100.0, 100.0)):
         with pytest.raises(CommandRejectedError, match=words):
             refused()
     robot.world.press("none")
@@ -106,7 +106,7 @@ def test_a_safety_stop_is_shown_and_recovery_waits_for_its_release(robot, button
 
 def test_a_joint_limit_takes_the_motor_power_and_recovery_does_not_give_it_back(robot):
     limits, q = MODEL.limits.joint, robot.state.q_c
-    robot.set_joint_limit(q - 0.05, q + 0.05)
+    robot.rci.set_joint_limit(q - 0.05, q + 0.05)
 
     def swing(state, t):
         away = 0.03 * (1.0 - np.cos(2.0 * t)) * np.eye(MODEL.n)[0]
@@ -114,33 +114,33 @@ def test_a_joint_limit_takes_the_motor_power_and_recovery_does_not_give_it_back(
 
     with pytest.raises(ControlError, match="kCommandJointPositionLimitsViolation"):
         robot.control(swing)
-    assert robot.motor_state() is False
+    assert robot.rci.motor_state() is False
     with pytest.raises(CommandRejectedError, match="a fault has stopped the arm: recover"):
         robot.power_on()
     robot.recover()
-    assert robot.motor_state() is False
+    assert robot.rci.motor_state() is False
     with pytest.raises(CommandRejectedError, match="the motors are off"):
         robot.control(hold)
     robot.power_on()
-    robot.set_joint_limit(limits.lower, limits.upper)
+    robot.rci.set_joint_limit(limits.lower, limits.upper)
     assert robot.control(hold).stopped is None
 
 
 def test_with_auto_limit_the_motors_stay_on(robot):
     limits, q = MODEL.limits.joint, robot.state.q_c
-    robot.set_joint_limit(q - 0.05, q + 0.05)
+    robot.rci.set_joint_limit(q - 0.05, q + 0.05)
     robot.world.set_auto_limit(True)
     away = np.eye(MODEL.n)[0]
     robot.control(lambda state, t: JointPosition(q + 0.03 * (1.0 - np.cos(2.0 * t)) * away, finished=t >= np.pi))
-    assert robot.motor_state() is True
+    assert robot.rci.motor_state() is True
     robot.world.set_auto_limit(False)
-    robot.set_joint_limit(limits.lower, limits.upper)
+    robot.rci.set_joint_limit(limits.lower, limits.upper)
 
 
 def test_without_power_a_drag_and_a_motion_are_refused_for_that(robot):
     robot.power_off()
     with pytest.raises(CommandRejectedError, match="StartDrag was refused: not possible; the motors are off"):
-        robot.start_drag()
+        robot.rci.start_drag()
     with pytest.raises(CommandRejectedError, match="StartMove was refused: not possible; the motors are off"):
         robot.control(hold)
     robot.power_on()
@@ -150,17 +150,17 @@ def test_without_power_a_drag_and_a_motion_are_refused_for_that(robot):
 def test_a_collision_that_presses_on_is_left_by_higher_thresholds(plant):
     with simulate(MODEL, plant=plant) as robot:
         robot.power_on()
-        robot.set_collision_behavior([5.0] * MODEL.n)
+        robot.rci.set_collision_behavior([5.0] * MODEL.n)
         robot.world.push([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], duration=60.0)
         with pytest.raises(ControlError, match="kCollision"):
             robot.control(lambda state, t: JointPosition(state.q_c))
         with pytest.raises(
             CommandRejectedError, match="StartDrag was refused: not possible; a fault has stopped the arm"
         ):
-            robot.start_drag()
+            robot.rci.start_drag()
         with pytest.raises(CommandRejectedError, match=r"the cause is still there: .*set_collision_behavior"):
             robot.recover()
-        robot.set_collision_behavior(MODEL.limits.joint.collision_threshold)
+        robot.rci.set_collision_behavior(MODEL.limits.joint.collision_threshold)
         robot.recover()
         assert robot.control(hold).stopped is None
 
@@ -184,9 +184,9 @@ def test_a_safety_stop_in_mid_motion_ends_it_with_a_record_and_the_session_goes_
 
 def test_a_reboot_closes_the_session():
     with simulate(MODEL) as robot:
-        robot.reboot()
+        robot.rci.reboot()
         with pytest.raises(UsageError, match="closed; connect again"):
-            robot.motor_state()
+            robot.rci.motor_state()
 
 
 @pytest.mark.parametrize("plant", ["ideal", "mujoco"])
@@ -233,7 +233,7 @@ def test_soft_limits_of_the_session_count_in_plan_check_and_certificate():
         joint = MODEL.limits.joint
         upper = np.array(joint.upper)
         upper[0] = start[0] + 0.2
-        robot.set_joint_limit(joint.lower, upper)
+        robot.rci.set_joint_limit(joint.lower, upper)
         with pytest.raises(PlanningError, match="joint 1"):
             plan_joint(robot.model, start, goal)
         assert not check(motion, robot.model).ok
@@ -242,7 +242,7 @@ def test_soft_limits_of_the_session_count_in_plan_check_and_certificate():
         with pytest.raises(CertificateError, match="limits"):
             robot.execute(motion, certificate)
         assert "SetJointLimit" in robot.model.limits.source("joint.upper")
-        robot.set_joint_limit(joint.lower, joint.upper)
+        robot.rci.set_joint_limit(joint.lower, joint.upper)
         robot.execute(motion)
 
 
@@ -258,16 +258,16 @@ def test_a_callback_and_another_thread_switch_outputs_and_ramp_a_force_while_the
             cycle = round(t * 1000)
             moving.set()
             if cycle % 50 == 10:
-                robot.set_cart_imp_desired_tau([0, 0, -cycle / 100, 0, 0, 0])
-                robot.set_do(1, cycle % 100 == 10)
-                seen.append((robot.get_di(1), robot.safety_stop(), robot.motor_state()))
+                robot.rci.set_cart_imp_desired_tau([0, 0, -cycle / 100, 0, 0, 0])
+                robot.rci.set_do(1, cycle % 100 == 10)
+                seen.append((robot.rci.get_di(1), robot.rci.safety_stop(), robot.rci.motor_state()))
             return CartesianPosition(start, finished=cycle >= 500)
 
         def ask():
             moving.wait(10.0)
             while not done.is_set():
-                robot.set_do(2, len(others) % 2 == 0)
-                others.append(robot.get_di(2))
+                robot.rci.set_do(2, len(others) % 2 == 0)
+                others.append(robot.rci.get_di(2))
 
         thread = threading.Thread(target=ask)
         thread.start()
@@ -280,7 +280,7 @@ def test_a_callback_and_another_thread_switch_outputs_and_ramp_a_force_while_the
         assert seen[:2] == [(True, SafetyStop.NONE, True), (False, SafetyStop.NONE, True)]
         assert others[:4] == [True, False, True, False]
         with pytest.raises(UsageError, match="a motion is running"):
-            robot.control(lambda state, t: robot.set_filters(100, 100, 100), "cartesian_impedance")
+            robot.control(lambda state, t: robot.rci.set_filters(100, 100, 100), "cartesian_impedance")
 
 
 def test_what_the_session_allows_while_moving_is_what_the_controller_grants():
@@ -373,7 +373,7 @@ def test_from_outside_its_box_the_tool_may_only_be_led_in(way):
         robot.power_on()
         q = robot.state.q_c
         below = model.forward(q).position - [0.0, 0.0, 0.06]
-        robot.set_cartesian_limit(SafetyBox(size=(0.04, 0.04, 0.04), T_base_box=Pose(below)))
+        robot.rci.set_cartesian_limit(SafetyBox(size=(0.04, 0.04, 0.04), T_base_box=Pose(below)))
         lead_in, lead_out = (plan_joint(model, q, q + turn * np.eye(7)[3]) for turn in (0.02, -0.02))
         if way == "execute":
             with pytest.raises(ConformanceError, match="outside the safety box"):
@@ -443,9 +443,9 @@ def test_motors_that_are_switched_off_end_a_motion_and_the_error_says_so(after):
 
 def test_the_manual_s_numbers_are_answered_with_the_name_they_mean(robot):
     with pytest.raises(InvalidValueError, match="the manual's 1 is 'world'"):
-        robot.set_fc_coor(Pose(), 1)
+        robot.rci.set_fc_coor(Pose(), 1)
     with pytest.raises(InvalidValueError, match="the manual's 2 is 'cartesian'"):
-        robot.start_drag(2, "free")
+        robot.rci.start_drag(2, "free")
 
 
 def test_a_session_has_the_tool_of_its_controller_and_says_where_the_model_has_another():
@@ -457,7 +457,7 @@ def test_a_session_has_the_tool_of_its_controller_and_says_where_the_model_has_a
     controller = start_controller("xMate3", lockstep=True)
     try:
         with connect(controller.address) as first:
-            first.set_coor(tool)
+            first.rci.set_coor(tool)
         with connect(controller.address) as second:
             assert second.model.T_flange_tool.is_close(tool, 1e-9)
             state = second.state
@@ -472,7 +472,7 @@ def test_power_comes_back_to_an_arm_that_stands():
     """Guided, pushed, stopped and released while it still moves."""
     with simulate(MODEL, plant="mujoco") as robot:
         robot.power_on()
-        robot.start_drag("joint", "free")
+        robot.rci.start_drag("joint", "free")
         robot.world.push([20.0, 0.0, 0.0, 0.0, 0.0, 0.0], duration=0.3)
         until = time.monotonic() + 5.0
         while np.abs(robot.state.dq).max() < 0.5 and time.monotonic() < until:

@@ -413,8 +413,8 @@ def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later()
     upper[1] = PRO7.home[1] - 0.1
     with rcilab.simulate(PRO7) as robot, notebook.JogPanel(robot) as jog:
         state = jog.state
-        robot.set_joint_limit(lower, upper)
-        robot.set_coor(rcilab.Pose([0.0, 0.0, 0.1]))
+        robot.rci.set_joint_limit(lower, upper)
+        robot.rci.set_coor(rcilab.Pose([0.0, 0.0, 0.1]))
         assert state.model.limits.joint.upper[1] == upper[1]
         assert state.model.forward(PRO7.home).is_close(PRO7.forward(PRO7.home) @ rcilab.Pose([0.0, 0.0, 0.1]))
         with pytest.raises(InvalidValueError, match="q of joint 2"):

@@ -15,7 +15,8 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, standard_control
+from rcilab.makers.configuration import ControllerParameters
+from rcilab.makers.rokae.driver.controller_parameters import standard_control
 from rcilab.notebook import robot_words
 from rcilab.notebook.robot_side import BusyError, Outcome
 from tests.waiting import wait_for

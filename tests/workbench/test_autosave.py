@@ -24,7 +24,7 @@ from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import ForceControlFrame, RobotConfiguration
+from rcilab.makers.configuration import ForceControlFrame, RobotConfiguration
 from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model

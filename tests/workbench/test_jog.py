@@ -34,7 +34,7 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ControlError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from tests.workbench.opened import opened, wait
 

@@ -24,7 +24,7 @@ from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.workbench.panels.program import read_row

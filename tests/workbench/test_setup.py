@@ -27,8 +27,8 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import CommandRejectedError
 from rcilab.core.spatial import Pose
+from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.program_list import list_html

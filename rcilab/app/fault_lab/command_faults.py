@@ -86,7 +86,7 @@ def soften_joint_1(scene: Scene) -> Scene:
     """Sets a soft limit of joint 1 just beside where it stands."""
     upper = np.array(scene.limits.joint.upper)
     upper[0] = scene.start.q_c[0] + _SOFT_LIMIT
-    scene.robot.set_joint_limit(scene.limits.joint.lower, upper)
+    scene.robot.rci.set_joint_limit(scene.limits.joint.lower, upper)
     return scene.narrowed(upper)
 
 
@@ -94,7 +94,7 @@ def box_around_tool(scene: Scene) -> Scene:
     """Sets a small safety box around the tool."""
     edge = 2.0 * _HALF_BOX
     box = SafetyBox(size=(edge, edge, edge), T_base_box=Pose(scene.start.T_base_tool_c.position), active=True)
-    scene.robot.set_cartesian_limit(box)
+    scene.robot.set_safety_box(box)
     return replace(scene, box=box)
 
 

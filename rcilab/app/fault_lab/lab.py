@@ -144,7 +144,7 @@ class FaultLab(Closeable):
             self._wait_for_calm(robot)
         done += self._recover(robot)
         self._widen(robot)
-        robot.set_collision_behavior(self.model.limits.joint.collision_threshold)
+        robot.rci.set_collision_behavior(self.model.limits.joint.collision_threshold)
         nudged = np.array(robot.receive_state().q_c)
         nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
         self._go(robot, nudged)
@@ -157,8 +157,8 @@ class FaultLab(Closeable):
 
     def _widen(self, robot: RobotSession) -> None:
         limits = self.model.limits.joint
-        robot.set_joint_limit(limits.lower, limits.upper)
-        robot.set_cartesian_limit(_OPEN)
+        robot.rci.set_joint_limit(limits.lower, limits.upper)
+        robot.set_safety_box(_OPEN)
 
     def _wait_for_calm(self, robot: RobotSession) -> None:
         """Returns once the controller feels nothing any more: its estimate takes a moment to forget a push."""
@@ -176,7 +176,7 @@ class FaultLab(Closeable):
             self._widen(robot)
             robot.power_on()
             return ["refused", "power_off", "widen", "power_on"]
-        if robot.motor_state():
+        if robot.rci.motor_state():
             return ["recover"]
         robot.power_on()  # A joint limit and an emergency stop take the motor power.
         return ["recover", "power_on"]

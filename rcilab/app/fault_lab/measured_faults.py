@@ -52,24 +52,24 @@ def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> 
 
 def _soft_joints(scene: Scene) -> Scene:
     n = scene.robot.n
-    scene.robot.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
+    scene.robot.rci.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
     return scene.yielding()
 
 
 def _loose_tool(scene: Scene) -> Scene:
     """The tool keeps its place and turns freely."""
-    scene.robot.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
+    scene.robot.rci.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
     return scene.yielding()
 
 
 def _firm_tool(scene: Scene) -> Scene:
-    scene.robot.set_cartesian_impedance([3000.0] * 3 + [300.0] * 3)
+    scene.robot.rci.set_cartesian_impedance([3000.0] * 3 + [300.0] * 3)
     return scene.yielding()
 
 
 def _touchy(scene: Scene) -> Scene:
     thresholds = np.full(scene.robot.n, 10.0)
-    scene.robot.set_collision_behavior(thresholds)
+    scene.robot.rci.set_collision_behavior(thresholds)
     return scene.guarded(thresholds)
 
 

@@ -8,12 +8,8 @@ from typing import TYPE_CHECKING, Literal
 from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending, with_number
 from rcilab.app.text import Message
 from rcilab.core.state import Mode
-from rcilab.makers.rokae.driver.controller_parameters import (
-    ControllerParameters,
-    ControlPart,
-    control_ranges,
-    standard_control,
-)
+from rcilab.makers.configuration import ControllerParameters, ControlPart
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

@@ -19,7 +19,7 @@ from rcilab.control_process.requested_speed import RequestedSpeed, is_running, t
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 

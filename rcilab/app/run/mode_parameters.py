@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.state import Mode
 from rcilab.i18n.translator import Message, message
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, ControlPart, Range, standard_control
+from rcilab.makers.configuration import ControllerParameters, ControlPart
+from rcilab.makers.rokae.driver.controller_parameters import Range, standard_control
 
 if TYPE_CHECKING:
     from rcilab.core.limits import Limits

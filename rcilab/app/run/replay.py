@@ -13,7 +13,7 @@ from rcilab.app.run.run_recorder import whole_recording
 from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

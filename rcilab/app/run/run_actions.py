@@ -34,7 +34,7 @@ from rcilab.model.robot_model import load_model
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
-    from rcilab.makers.rokae.driver.configuration import RobotConfiguration, SetupPart
+    from rcilab.makers.configuration import RobotConfiguration, SetupPart
     from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 _SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.

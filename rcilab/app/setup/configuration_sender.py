@@ -12,7 +12,7 @@ from rcilab.core.errors import RcilabError
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest
-    from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+    from rcilab.makers.configuration import RobotConfiguration
 
 
 class SetupPost:

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.app.text import Message, message
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose
-from rcilab.makers.rokae.driver.configuration import (
+from rcilab.makers.configuration import (
     SETUP_PARTS,
     ForceControlFrame,
     RobotConfiguration,

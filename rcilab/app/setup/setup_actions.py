@@ -42,7 +42,7 @@ from rcilab.app.text import Message, message
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
+from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:

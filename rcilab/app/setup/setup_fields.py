@@ -12,7 +12,7 @@ from rcilab.app.text import Message, message
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.driver.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.rokae.wire.bounds import LONGEST_TOOL
 from rcilab.model.dynamics.payload import Payload
 

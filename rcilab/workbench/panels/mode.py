@@ -10,12 +10,8 @@ from rcilab.app.run.mode_parameters import PARTS_OF_MODE, held_rows, name_number
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text, message
 from rcilab.core.state import MODES, Mode
-from rcilab.makers.rokae.driver.controller_parameters import (
-    ControllerParameters,
-    ControlPart,
-    control_ranges,
-    standard_control,
-)
+from rcilab.makers.configuration import ControllerParameters, ControlPart
+from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 

@@ -17,7 +17,7 @@ from rcilab.app.setup.configuration_state import (
 )
 from rcilab.app.setup.setup_actions import PressSetup, SetSetup
 from rcilab.app.text import Text
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
+from rcilab.makers.configuration import SETUP_PARTS
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 

@@ -8,7 +8,7 @@ from rcilab.app.setup.configuration_state import FORCE_AXES
 from rcilab.app.setup.setup_actions import SetSetup
 from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
 from rcilab.app.text import Text
-from rcilab.makers.rokae.driver.configuration import SETUP_PARTS
+from rcilab.makers.configuration import SETUP_PARTS
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 

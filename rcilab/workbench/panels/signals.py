@@ -8,7 +8,7 @@ from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
-from rcilab.makers.rokae.driver.commands import SIGNALS
+from rcilab.makers.driver import SIGNALS
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:

@@ -1,16 +1,14 @@
-"""Every other command of the RCI as a method: power, motion, drag, inputs and outputs; refusals turned into errors."""
+"""The commands of the RCI as methods: power, motion, drag, inputs and outputs; refusals become errors."""
 
 from __future__ import annotations
 
 from typing import Literal
 
-from rcilab.core.arrays import described
-from rcilab.core.errors import CommandRejectedError, InvalidValueError
+from rcilab.core.errors import CommandRejectedError
 from rcilab.core.state import ControllerMode
+from rcilab.makers.driver import require_signal
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.driver.settings import RciSettings, flag, member
-
-SIGNALS = range(6)  # RCI manual 3.1.13: DO0_0 to DO0_3, DO1_0, DO1_1; and 3.1.14 the same for inputs.
 
 
 class RciCommands(RciSettings):
@@ -22,16 +20,8 @@ class RciCommands(RciSettings):
     """
 
     def connect(self) -> None:
-        """Names our UDP port to the controller. Nobody needs it: the vendor's client never sends this command."""
+        """Sends our UDP port to the controller. Not needed: the vendor's client never sends this command."""
         self._ask(rci.Connect(self._link.local_address[1]))
-
-    def power_on(self) -> None:
-        """Switches the motors on."""
-        self._ask(rci.SetMotorPower(1))
-
-    def power_off(self) -> None:
-        """Switches the motors off."""
-        self._ask(rci.SetMotorPower(0))
 
     def set_motor_power(self, power: bool) -> None:
         """Switches the motors on or off."""
@@ -100,14 +90,3 @@ class RciCommands(RciSettings):
     def reboot(self) -> None:
         """Restarts the controller; the connection ends with it, `rcilab.connect` makes the next one."""
         self._ask(rci.RebootRobot())
-
-
-def require_signal(signal: object) -> int:
-    """Returns the number of a digital signal, 0 to 5.
-
-    Raises:
-        InvalidValueError: There is no such signal.
-    """
-    if isinstance(signal, bool) or not isinstance(signal, int) or signal not in SIGNALS:
-        raise InvalidValueError("signal", described(signal), "does not exist; there are 0 to 5")
-    return signal

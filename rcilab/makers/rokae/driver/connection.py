@@ -71,8 +71,8 @@ class RciConnection:
         return []
 
     @property
-    def is_heard(self) -> bool:
-        """Whether somebody takes the states that arrive while an answer is waited for."""
+    def has_listener(self) -> bool:
+        """Whether `on_states` is set."""
         return self.on_states is not _ignore
 
     def send(self, packet: CommandPacket) -> None:
@@ -136,4 +136,4 @@ class RciConnection:
 
 
 def _ignore(states: list[RobotState]) -> None:
-    """States nobody asked for."""
+    """States that no listener takes."""

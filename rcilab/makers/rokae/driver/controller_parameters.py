@@ -6,39 +6,16 @@ The settings of the RCI that belong to the five modes: `setJointImpedance`, `set
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.makers.configuration import ControllerParameters, ControlPart, RobotConfiguration, require_control
 from rcilab.makers.rokae.wire.bounds import FILTER_OFF, LOWEST_FREQUENCY
 
 if TYPE_CHECKING:
     from rcilab.core.limits import Limits
     from rcilab.makers.rokae.driver.settings import RciSettings
 
-ControlPart: TypeAlias = Literal[
-    "joint_stiffness", "cartesian_stiffness", "desired_wrench", "collision_thresholds", "filters", "report_filter"
-]
-
 REPORT_FREQUENCY = 100.0  # [Hz] What a controller wakes up with for the torques that it reports.
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerParameters:
-    """Parameters of the modes; what is None is left as the controller has it. Ranges: `control_ranges`."""
-
-    joint_stiffness: tuple[float, ...] | None = None
-    """Of joint impedance, n numbers, [N m/rad]."""
-    cartesian_stiffness: tuple[float, ...] | None = None
-    """Of Cartesian impedance: three [N/m], three [N m/rad]."""
-    desired_wrench: tuple[float, ...] | None = None
-    """What Cartesian impedance presses with: three [N], three [N m]."""
-    collision_thresholds: tuple[float, ...] | None = None
-    """Torques from outside that are a collision, n numbers, [N m]."""
-    filters: tuple[float, ...] | None = None
-    """Cut-off frequencies for commanded angles, poses and torques, [Hz]; 1000 switches one off."""
-    report_filter: tuple[float, ...] | None = None
-    """Cut-off frequency for reported torques, one number, [Hz]."""
 
 
 class Range(NamedTuple):
@@ -70,23 +47,12 @@ def standard_control(limits: Limits) -> ControllerParameters:
     return ControllerParameters(**top | {"desired_wrench": (0.0,) * 6, "report_filter": (REPORT_FREQUENCY,)})
 
 
-def require_control(control: object) -> ControllerParameters:
-    """Returns `control` if these are settings of control.
-
-    Raises:
-        InvalidValueError: They are not.
-    """
-    if isinstance(control, ControllerParameters):
-        return control
-    raise InvalidValueError("control", control, "are none; ControllerParameters(joint_stiffness=...) makes some")
-
-
-def give_control(settings: RciSettings, control: ControllerParameters) -> None:
-    """Tells a controller; nothing may move meanwhile. A refusal leaves what came before it in force.
+def send_parameters(settings: RciSettings, control: ControllerParameters) -> None:
+    """Sends parameters to a controller; nothing may move meanwhile. After a refusal those before it are in force.
 
     Args:
-        settings: The commands of a connection, or a session.
-        control: What to tell.
+        settings: The commands of a connection.
+        control: What to send.
 
     Raises:
         InvalidValueError: A number is outside its range; it was not sent.
@@ -105,3 +71,27 @@ def give_control(settings: RciSettings, control: ControllerParameters) -> None:
         settings.set_filters(*control.filters)
     if control.report_filter is not None:
         settings.set_torque_filter_cut_off_frequency(control.report_filter[0])
+
+
+def send_configuration(settings: RciSettings, setup: RobotConfiguration) -> None:
+    """Sends a configuration to a controller; nothing may move meanwhile. A refusal leaves earlier parts in force.
+
+    Args:
+        settings: The commands of a connection.
+        setup: What to send.
+
+    Raises:
+        CommandRejectedError: The controller refused a part; the error names it.
+    """
+    if setup.tool is not None:
+        settings.set_coor(setup.tool)
+    if setup.load is not None:
+        settings.set_load(setup.load.mass, setup.load.center_of_mass, setup.load.inertia)
+    if setup.box is not None:
+        settings.set_cartesian_limit(setup.box)
+    if setup.force is not None:
+        settings.set_fc_coor(setup.force.T_flange_force, setup.force.type)
+    if setup.joints is not None:
+        settings.set_joint_limit(setup.joints.lower, setup.joints.upper)
+    if setup.control is not None:
+        send_parameters(settings, setup.control)

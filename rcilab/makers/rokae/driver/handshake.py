@@ -1,4 +1,4 @@
-"""What is asked of a new connection: a usable timeout, the right arm at the other end, and states that arrive."""
+"""What a new connection must have: the right arm at the other end, and states that arrive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.core.errors import CommandRejectedError, ConnectionLostError, InvalidValueError
+from rcilab.core.errors import CommandRejectedError, ConnectionLostError
 from rcilab.core.spatial import IDENTITY, as_pose, turn_between
 from rcilab.makers.rokae.driver.address import RobotAddress
 from rcilab.makers.rokae.driver.commands import RciCommands
@@ -19,19 +19,6 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 _SAME_TOOL = 1e-3  # [m], [rad] Less is how well the arm's own geometry is known.
-
-
-def require_timeout(timeout: object) -> None:
-    """Makes sure that a timeout is a finite number above 0, [s].
-
-    Raises:
-        InvalidValueError: It is not.
-    """
-    is_number = isinstance(timeout, int | float) and not isinstance(timeout, bool) and math.isfinite(timeout)
-    if not is_number:
-        raise InvalidValueError("timeout", timeout, "must be a finite number above 0 [s]")
-    if timeout <= 0:  # type: ignore[operator]  # A number, see above.
-        raise InvalidValueError("timeout", timeout, "must be above 0 [s]")
 
 
 def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, address: str) -> None:
@@ -78,7 +65,7 @@ def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
     if not mine.is_close(IDENTITY, 0.0):
         warnings.warn(
             f"the tool of {link.name} is {1e3 * off:.1f} mm and {math.degrees(turned):.1f} deg from the model's; the "
-            "session goes on with the controller's. robot.set_coor(model.T_flange_tool) sets the model's",
+            "session goes on with the controller's. robot.set_tool(model.T_flange_tool) sets the model's",
             stacklevel=4,
         )
     return model.with_tool(tool)

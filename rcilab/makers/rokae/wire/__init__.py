@@ -1,5 +1,6 @@
 """The wire protocol of the ROKAE Control Interface: bytes to values and back, no sockets, no clocks."""
 
+from rcilab.makers.configuration import ForceFrame
 from rcilab.makers.rokae.wire.command_packet import (
     COMMAND,
     COMMAND_SIZE,
@@ -69,7 +70,6 @@ from rcilab.makers.rokae.wire.statuses import (
     CommandCode,
     DragSpace,
     DragType,
-    ForceFrame,
     GuideStatus,
     RecoveryStatus,
     SafetyStop,

@@ -133,14 +133,6 @@ _SHOWN_AS = {
 }
 
 
-class ForceFrame(IntEnum):
-    """Which frame SetFcCoor names; the manual counts from 1, the wire from 0."""
-
-    WORLD = 0
-    TOOL = 1
-    PATH = 2
-
-
 class DragSpace(IntEnum):
     """Where a drag keeps its constraints; the manual counts from 1, the wire from 0."""
 

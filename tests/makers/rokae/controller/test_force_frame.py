@@ -44,21 +44,21 @@ def hold(robot, seconds: float = 2.0) -> tuple[np.ndarray, np.ndarray]:
 def robot(request):
     with simulate(MODEL, plant=request.param) as robot:
         robot.power_on()
-        robot.set_cartesian_impedance(SOFT)
+        robot.rci.set_cartesian_impedance(SOFT)
         yield robot
 
 
 def test_a_desired_force_presses_along_the_turned_frame_of_the_tool(robot):
-    robot.set_fc_coor(TURNED, "tool")
-    robot.set_cart_imp_desired_tau([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    robot.rci.set_fc_coor(TURNED, "tool")
+    robot.rci.set_cart_imp_desired_tau([10.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     moved, R = hold(robot)
     wanted = R @ TURNED.rotation @ [10.0 / SOFT[0], 0.0, 0.0]
     assert moved == pytest.approx(wanted, abs=2e-3)
 
 
 def test_the_soft_direction_is_that_of_the_turned_frame(robot):
-    robot.set_fc_coor(TURNED, "tool")
-    robot.set_cartesian_impedance([200.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
+    robot.rci.set_fc_coor(TURNED, "tool")
+    robot.rci.set_cartesian_impedance([200.0, 3000.0, 3000.0, 300.0, 300.0, 300.0])
     R = robot.state.T_base_tool_c.rotation
     soft = R @ TURNED.rotation @ [1.0, 0.0, 0.0]
     robot.world.push([*(6.0 * soft), 0.0, 0.0, 0.0], duration=10.0)
@@ -67,8 +67,8 @@ def test_the_soft_direction_is_that_of_the_turned_frame(robot):
 
 
 def test_in_the_frame_of_the_world_both_act_in_base_axes(robot):
-    robot.set_fc_coor(TURNED, "world")
-    robot.set_cart_imp_desired_tau([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
+    robot.rci.set_fc_coor(TURNED, "world")
+    robot.rci.set_cart_imp_desired_tau([0.0, 10.0, 0.0, 0.0, 0.0, 0.0])
     moved, _ = hold(robot)
     assert moved == pytest.approx([0.0, 10.0 / SOFT[1], 0.0], abs=2e-3)
 
@@ -76,9 +76,9 @@ def test_in_the_frame_of_the_world_both_act_in_base_axes(robot):
 @pytest.mark.parametrize("direction", [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], ids=["across", "along the tool"])
 def test_a_path_that_reverses_does_not_throw_the_arm_that_presses(robot, direction):
     """What it presses with goes round with the path's axes, within half a second and not within a cycle."""
-    robot.set_fc_coor(Pose(), "path")
-    robot.set_cartesian_impedance([1000.0] * 3 + [200.0] * 3)
-    robot.set_cart_imp_desired_tau([8.0, 0.0, 8.0, 0.0, 4.0, 0.0])
+    robot.rci.set_fc_coor(Pose(), "path")
+    robot.rci.set_cartesian_impedance([1000.0] * 3 + [200.0] * 3)
+    robot.rci.set_cart_imp_desired_tau([8.0, 0.0, 8.0, 0.0, 4.0, 0.0])
     start = robot.state.T_base_tool_c.matrix
     seen = []
 

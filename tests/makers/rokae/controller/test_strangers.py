@@ -56,12 +56,12 @@ def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
 def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs():
     with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         for port in (0, 9, LOWEST_CLIENT_PORT - 1):
-            answer = robot._link.request(rci.Connect(port))
+            answer = robot._driver.connection.request(rci.Connect(port))
             assert answer.status is rci.SettingStatus.INVALID_ARGUMENT
             assert robot.receive_states(), "they still come here"
-        udp.bind((robot._link.local_address[0], 0))
+        udp.bind((robot._driver.connection.local_address[0], 0))
         udp.settimeout(10.0)
-        robot._link.request(rci.Connect(udp.getsockname()[1]))
+        robot._driver.connection.request(rci.Connect(udp.getsockname()[1]))
         assert len(udp.recv(2000)) == rci.STATE_SIZE
 
 

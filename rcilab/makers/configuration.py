@@ -1,31 +1,40 @@
-"""What is fixed to the arm, where its tool may be, and how it follows: the settings of the RCI that stay for a while.
+"""What a robot is configured with: tool, load, safety box, force-control frame, soft joint limits, mode parameters.
 
-Tool (`setCoor`), load (`setLoad`), safety box (`setCartesianLimit`), force-control frame (`setFcCoor`), soft joint
-limits (`setJointLimit`), and the parameters of the modes (`ControllerParameters`).
+Values that every maker understands; what is None is left as the controller has it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
-from rcilab.makers.rokae.driver.controller_parameters import ControllerParameters, give_control
-from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import Payload
 
 if TYPE_CHECKING:
-    from rcilab.makers.rokae.driver.settings import RciSettings
     from rcilab.model.robot_model import RobotModel
+
+ControlPart: TypeAlias = Literal[
+    "joint_stiffness", "cartesian_stiffness", "desired_wrench", "collision_thresholds", "filters", "report_filter"
+]
 
 SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "joints", "control"]
 
 SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
 """The parts that have a place in space."""
 _ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints", "control")
+
+
+class ForceFrame(IntEnum):
+    """What the axes of a force-control frame follow."""
+
+    WORLD = 0
+    TOOL = 1
+    PATH = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -45,9 +54,27 @@ class SoftJointLimits:
     upper: tuple[float, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControllerParameters:
+    """Parameters of the modes; what is None is left as the controller has it. Ranges: `control_ranges`."""
+
+    joint_stiffness: tuple[float, ...] | None = None
+    """Of joint impedance, n numbers, [N m/rad]."""
+    cartesian_stiffness: tuple[float, ...] | None = None
+    """Of Cartesian impedance: three [N/m], three [N m/rad]."""
+    desired_wrench: tuple[float, ...] | None = None
+    """What Cartesian impedance presses with: three [N], three [N m]."""
+    collision_thresholds: tuple[float, ...] | None = None
+    """Torques from outside that are a collision, n numbers, [N m]."""
+    filters: tuple[float, ...] | None = None
+    """Cut-off frequencies for commanded angles, poses and torques, [Hz]; 1000 switches one off."""
+    report_filter: tuple[float, ...] | None = None
+    """Cut-off frequency for reported torques, one number, [Hz]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotConfiguration:
-    """A set-up, or a part of one: what is None is left as the controller has it."""
+    """A configuration, or parts of one: what is None is left as the controller has it."""
 
     box: SafetyBox | None = None
     tool: Pose | None = None
@@ -64,15 +91,15 @@ class RobotConfiguration:
         return tuple(part for part in _ALL_PARTS if getattr(self, part) is not None)
 
     def only(self, parts: Iterable[str]) -> RobotConfiguration:
-        """Returns a set-up of these parts alone."""
+        """Returns a configuration of these parts alone."""
         return RobotConfiguration(**{part: getattr(self, part) for part in _ALL_PARTS if part in parts})
 
     def without(self, parts: Iterable[str]) -> RobotConfiguration:
-        """Returns a set-up that leaves these parts alone."""
+        """Returns a configuration without these parts."""
         return self.only(set(_ALL_PARTS) - set(parts))
 
     def updated(self, newer: RobotConfiguration) -> RobotConfiguration:
-        """Returns this set-up with the parts of a newer one in it."""
+        """Returns this configuration with the parts of a newer one in it."""
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})
 
     def applied_to(self, model: RobotModel) -> RobotModel:
@@ -94,28 +121,19 @@ def require_setup(setup: object) -> RobotConfiguration:
     """
     if isinstance(setup, RobotConfiguration):
         return setup
-    raise InvalidValueError("setup", setup, "is no RobotConfiguration; RobotConfiguration(tool=..., box=...) makes one")
+    raise InvalidValueError(
+        "setup", setup, "is not a RobotConfiguration; RobotConfiguration(tool=..., box=...) makes one"
+    )
 
 
-def give_setup(settings: RciSettings, setup: RobotConfiguration) -> None:
-    """Tells a controller; nothing may move meanwhile. A refusal leaves the parts before it in force.
-
-    Args:
-        settings: The commands of a connection, or a session.
-        setup: What to tell.
+def require_control(control: object) -> ControllerParameters:
+    """Returns `control` if it is a ControllerParameters.
 
     Raises:
-        CommandRejectedError: The controller refused a part; the error names it.
+        InvalidValueError: It is something else.
     """
-    if setup.tool is not None:
-        settings.set_coor(setup.tool)
-    if setup.load is not None:
-        settings.set_load(setup.load.mass, setup.load.center_of_mass, setup.load.inertia)
-    if setup.box is not None:
-        settings.set_cartesian_limit(setup.box)
-    if setup.force is not None:
-        settings.set_fc_coor(setup.force.T_flange_force, setup.force.type)
-    if setup.joints is not None:
-        settings.set_joint_limit(setup.joints.lower, setup.joints.upper)
-    if setup.control is not None:
-        give_control(settings, setup.control)
+    if isinstance(control, ControllerParameters):
+        return control
+    raise InvalidValueError(
+        "control", control, "is not a ControllerParameters; ControllerParameters(joint_stiffness=...) makes some"
+    )

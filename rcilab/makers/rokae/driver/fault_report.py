@@ -17,12 +17,12 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
+from rcilab.core.rotation import nine
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode
-from rcilab.execution.measured_report import YIELDING_MODES, describe_measured, describe_passed_face
-from rcilab.execution.rotation import nine
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
+from rcilab.makers.rokae.driver.measured_report import YIELDING_MODES, describe_measured, describe_passed_face
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 
 if TYPE_CHECKING:
