@@ -30,7 +30,7 @@ def low_pass_gain(frequency: float) -> float:
 
 
 class LowPass:
-    """A low pass on several numbers. Owned by the controller's cycle.
+    """A low pass on several numbers. Owned by the virtual arm.
 
     Args:
         frequency: Cut-off frequency, [Hz].
@@ -53,7 +53,7 @@ class LowPass:
 class PoseLowPass:
     """A low pass on a pose and an arm angle: the position on the line, the orientation by slerp, psi the short way.
 
-    Owned by the controller's cycle.
+    Owned by the virtual arm.
 
     Args:
         frequency: Cut-off frequency, [Hz].

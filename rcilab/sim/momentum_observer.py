@@ -26,7 +26,7 @@ _DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singu
 
 
 class MomentumObserver:
-    """Estimates outside torques cycle by cycle. Owned by the controller's cycle.
+    """Estimates outside torques cycle by cycle. Owned by the virtual arm.
 
     Args:
         model: The arm as the controller knows it: a load that was not set shows as an outside torque.

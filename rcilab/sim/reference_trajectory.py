@@ -1,4 +1,4 @@
-"""The commanded motion of the arm: where it is told to be, how that changes, and the one way to bring it to rest."""
+"""The commanded motion of the arm: joint angles, their differences, and the one path on which it stops."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from rcilab.core.limits import JointLimits
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.stop import plan_stop
 
-JOIN_SHARE = 2.0  # Of the arm's limits: what a stop starts from at most, however hard the arm was thrown; a choice.
+JOIN_SHARE = (
+    2.0  # Of the arm's limits: what a stop starts from at most, however fast the arm was pushed; a tuning value.
+)
 
 
 class ReferenceTrajectory:
-    """Commanded joint angles and their backward differences over one cycle. Owned by the controller's cycle.
+    """Commanded joint angles and their backward differences over one cycle. Owned by the virtual arm.
 
     Attributes:
         q: Commanded joint angles, n plain floats, [rad].
@@ -28,8 +30,8 @@ class ReferenceTrajectory:
         version: Rises with every change.
 
     Args:
-        limits: Bounds of the joints, for coming to rest.
-        q: Where the arm stands, n numbers, [rad].
+        limits: Bounds of the joints, for stopping.
+        q: Present joint angles, n numbers, [rad].
     """
 
     def __init__(self, limits: JointLimits, q: Sequence[float]) -> None:
@@ -46,7 +48,7 @@ class ReferenceTrajectory:
 
     @property
     def arrays(self) -> tuple[JointVector, JointVector, JointVector]:
-        """q, dq and ddq as read-only arrays, made once a cycle for all who compute with them."""
+        """q, dq and ddq as read-only arrays, made once a cycle shared by all readers."""
         if self._arrays is None or self._arrays_version != self.version:
             n = len(self.q)
             rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # numpy looks at each float of a list twice.
@@ -54,7 +56,7 @@ class ReferenceTrajectory:
         return self._arrays
 
     def place(self, q: Sequence[float]) -> None:
-        """Puts the commanded angles somewhere, at rest: while the brakes or a person's hand decide where the arm is."""
+        """Sets the commanded angles, stationary: while the brakes or a hand determine where the arm is."""
         self.q = list(q)
         self.dq = [0.0] * len(self.q)
         self.ddq = [0.0] * len(self.q)
@@ -67,12 +69,12 @@ class ReferenceTrajectory:
 
         Args:
             q: n plain floats, [rad].
-            differences: Their first and second backward difference, [rad/s], [rad/s^2], from whoever took them already.
+            differences: Their first and second backward difference, [rad/s], [rad/s^2], if they are known already.
         """
         self._stop = None
         self._advance(q, differences)
 
-    def come_to_rest(self) -> None:
+    def stop(self) -> None:
         """Takes one cycle of the fastest stop inside the limits; planned at the first call, repeated calls play it.
 
         When standing still at once is itself inside the limits, as at the end of any decent motion, it stands still.
@@ -82,7 +84,7 @@ class ReferenceTrajectory:
         self._advance(next(self._stop, self.q))
 
     def join(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
-        """Puts the commanded angles on an arm that moves by itself, and along with it: before it is brought to rest.
+        """Puts the commanded angles on an arm that moves by itself, and moves along with it: before it stops.
 
         Args:
             q: Measured joint angles, n plain floats, [rad].

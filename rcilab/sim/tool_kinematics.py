@@ -18,7 +18,7 @@ _REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class ToolKinematics:
-    """Follows one motion of the joints, commanded or measured. Owned by the controller's cycle.
+    """Follows one motion of the joints, commanded or measured. Owned by the virtual arm.
 
     The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
     value stays, and at first 0. Without redundancy it is 0.

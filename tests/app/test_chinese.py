@@ -27,7 +27,6 @@ from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
-from rcilab.makers.rokae.controller.modes.generator import lost_motion
 from rcilab.makers.rokae.driver.address import RobotAddress
 from rcilab.makers.rokae.driver.identify import dh_lengths, require_same_arm
 from rcilab.makers.rokae.driver.transport import SocketTransport
@@ -44,6 +43,7 @@ from rcilab.recording.run_file import RunFile, decode_run, load_run
 from rcilab.robots import ROBOT_NAMES
 from rcilab.sim.api import Refused, WorldStatus
 from rcilab.sim.api.lines import decode_world_answer, encode_world_answer
+from rcilab.sim.generators.generator import lost_motion
 from rcilab.sim.ideal_plant import IdealPlant
 
 MODEL = load_model("xMatePro7")
@@ -207,7 +207,9 @@ REASONS: dict[str, Remark] = {
     "a tool outside": LimitViolation(RCI_CONDITIONS.find("cartesian.position"), 0, 0.02, 1e-3).remark,
     "no pose": LimitViolation(RCI_CONDITIONS.find("cartesian.frame"), 0, 2.0, 1.0).remark,
     "two at once": describe_breaches([LimitViolation(RCI_CONDITIONS.find("joint.jerk"), 1, 9e3, 8e3)] * 2),
-    "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2")).reason,
+    "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2"))
+    .violations[0]
+    .remark,
 }
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.server import ControllerServer
 from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_affinity import one_core
@@ -39,15 +39,15 @@ class Arena:
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
         self.server = ControllerServer(config, plant=self.plant, log=self.lines.append)
-        self.cycle: ControlCycle = self.server.cycle
+        self.cycle: RciController = self.server.cycle
         self.host, port = re.match(r"rci://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
         self.port = int(port)
-        self._actions: deque[Callable[[ControlCycle], object]] = deque()
+        self._actions: deque[Callable[[RciController], object]] = deque()
         self._step = self.cycle.step
         self.cycle.step = self._stepping  # type: ignore[method-assign]
         self.thread = threading.Thread(target=self.server.run)
 
-    def between(self, action: Callable[[ControlCycle], object]) -> None:
+    def between(self, action: Callable[[RciController], object]) -> None:
         """Lets the controller's own thread do something before its next step."""
         self._actions.append(action)
 

@@ -23,7 +23,7 @@ from rcilab.diagnostics.bench.measure import Measurement, summarise
 from rcilab.diagnostics.host import probe_realtime
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import PLANT_KINDS, PlantKind
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.sim.plants import build_plant
@@ -140,7 +140,7 @@ def _line_commands(model: RobotModel, duration: float) -> Command:
 
 
 def _measure(name: str, model: RobotModel, plant: PlantKind, start: rci.StartMove, command: Command) -> Measurement:
-    cycle = ControlCycle(model, build_plant(plant, model), mode_delay=0, prefill=0)
+    cycle = RciController(model, build_plant(plant, model), mode_delay=0, prefill=0)
     cycle.handle(rci.SetMotorPower(1))
     resting = _times(cycle, lambda message_id, k: None, 1000)
     cycle.handle(start)
@@ -158,7 +158,7 @@ def _mode_name(start: rci.StartMove) -> str:
     return ControllerMode(start.controller_mode).name.lower().replace("_", " ")
 
 
-def _times(cycle: ControlCycle, command: Callable[[int, int], bytes | None], count: int) -> Array:
+def _times(cycle: RciController, command: Callable[[int, int], bytes | None], count: int) -> Array:
     """Returns what each cycle took, from the command's bytes to the state's, shape (count,), [s]."""
     times = np.empty(count)
     for k in range(count):

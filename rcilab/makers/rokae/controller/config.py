@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.makers.rokae.controller.client_motion import PREFILL
 from rcilab.sim.api import LIMIT_TABLES, LimitTable, NetworkFaults, Stall
+from rcilab.sim.streamed_motion import PREFILL
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)

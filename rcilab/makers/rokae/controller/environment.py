@@ -16,8 +16,8 @@ from rcilab.core.clock import CYCLE_TIME, Clock
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.wire import SafetyStop
 from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api import (
@@ -69,7 +69,7 @@ class Environment:
 
     def __init__(
         self,
-        cycle: ControlCycle,
+        cycle: RciController,
         network: FaultyNetwork,
         stalls: StallSchedule,
         clock: Clock,

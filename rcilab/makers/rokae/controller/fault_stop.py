@@ -14,10 +14,12 @@ the condition, and where the stop begins. A joint limit without auto_limit also 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
 from typing import Final, NamedTuple
 
-from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.faults import RANGE_FAULTS, Fault
+from rcilab.sim.violations import ArmCondition, Violation
 
 
 class FaultSource(Enum):
@@ -84,6 +86,34 @@ FAULT_STOP: Final = {
     Fault.INSTABILITY_DETECTION: FaultStop(FaultSource.ABSENCE, _ALL, "none; after an emergency stop, its release"),
 }
 """Every fault. While a person guides the arm by hand nothing is judged."""
+
+ARM_FAULTS: Final = {
+    ArmCondition.FINITE_ANGLES: Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,
+    ArmCondition.FINITE_TORQUES: Fault.COMMAND_TORQUE_RANGE_VIOLATION,
+    ArmCondition.VALID_POSE: Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,
+    ArmCondition.ARM_ANGLE_RANGE: Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
+    ArmCondition.START_TOLERANCE: None,
+    ArmCondition.COMMANDS_ARRIVE: Fault.INSTABILITY_DETECTION,
+    ArmCondition.NO_COLLISION: Fault.COLLISION,
+}
+"""The fault of every condition that is no row of the condition table; those name their own."""
+
+
+def fault_of(violation: Violation) -> Fault | None:
+    """Returns the fault that a violation raises."""
+    condition = violation.condition
+    fault = ARM_FAULTS[condition] if isinstance(condition, ArmCondition) else condition.fault
+    return fault if isinstance(fault, Fault) else None
+
+
+def faults_of(violations: Iterable[Violation]) -> tuple[Fault, ...]:
+    """Returns the faults that violations raise, in wire order and once each."""
+    return tuple(sorted({fault for violation in violations if (fault := fault_of(violation)) is not None}))
+
+
+def is_beyond_range(violation: Violation) -> bool:
+    """Returns whether a joint is beyond its range, which costs motor power; no number is in no place."""
+    return violation.condition is not ArmCondition.FINITE_ANGLES and fault_of(violation) in RANGE_FAULTS
 
 
 def as_text() -> str:

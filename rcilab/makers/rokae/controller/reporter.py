@@ -22,42 +22,24 @@ What this virtual arm knows and how (each documented here because a state must n
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointVector, make_readonly, readonly_copy, scalar
+from rcilab.core.arrays import Array, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Rotation9
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
-from rcilab.makers.rokae.controller.force_frame import ForceAxes
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.drive_report import DriveReport
-from rcilab.sim.plant import Measurement
-from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.force_frame import ForceAxes
 from rcilab.sim.tool_kinematics import ToolKinematics
+from rcilab.sim.virtual_arm import CycleSignals
 
 _CYCLE = scalar(CYCLE_TIME)  # [s]
-
-
-class CycleSignals(NamedTuple):
-    """What one cycle came to, inside the controller."""
-
-    commanded: ReferenceTrajectory
-    tool_c: ToolKinematics
-    """The tool of the commanded motion."""
-    measured: Measurement
-    tool: ToolKinematics
-    """The tool as measured."""
-    tau_c: list[float] | None
-    """Commanded torques, [N m]; None while none are commanded."""
-    tau_ext: JointVector
-    """Outside joint torques, [N m]."""
-    wrench: Array
-    """Outside wrench on the tool, base axes, [N, N m]."""
 
 
 class StateReporter:
@@ -84,7 +66,7 @@ class StateReporter:
         self._drives = DriveReport(model, settings.torque_report_filter)
         self._body: tuple[Any, ...] | None = None
         self._tau_c = self._zeros
-        self._readings: CycleSignals | None = None
+        self._last_signals: CycleSignals | None = None
         self._version = -1
         self._is_settled = False
         self.has_repeated = False
@@ -93,7 +75,7 @@ class StateReporter:
     def report(
         self,
         message_id: int,
-        readings: CycleSignals,
+        signals: CycleSignals,
         *,
         faults: tuple[Fault, ...],
         success_rate: float,
@@ -104,10 +86,10 @@ class StateReporter:
         """Returns the state of this cycle."""
         body = self._body
         is_settled = self._is_settled and self._axes.is_settled
-        self.has_repeated = body is not None and is_settled and self._is_same(readings)
+        self.has_repeated = body is not None and is_settled and self._is_same(signals)
         if body is None or not self.has_repeated:
-            body = self._body = self._compute(readings)
-            self._readings, self._version = readings, readings.commanded.version
+            body = self._body = self._compute(signals)
+            self._last_signals, self._version = signals, signals.commanded.version
         self._rest = (*body, faults, success_rate, motion_generator_mode, controller_mode, robot_mode)
         return self.repeat(message_id)
 
@@ -115,20 +97,20 @@ class StateReporter:
         """Returns the state of a cycle that differs from the last one in its number only."""
         return build_state((message_id, *self._rest))
 
-    def _is_same(self, readings: CycleSignals) -> bool:
-        last = self._readings
+    def _is_same(self, signals: CycleSignals) -> bool:
+        last = self._last_signals
         return (
             last is not None
-            and readings.measured is last.measured
-            and readings.tau_ext is last.tau_ext
-            and readings.tau_c == last.tau_c
-            and readings.commanded.version == self._version
+            and signals.measured is last.measured
+            and signals.tau_ext is last.tau_ext
+            and signals.tau_c == last.tau_c
+            and signals.commanded.version == self._version
         )
 
-    def _compute(self, readings: CycleSignals) -> tuple[Any, ...]:
+    def _compute(self, signals: CycleSignals) -> tuple[Any, ...]:
         """Returns the fields of a state between its number and its faults, in their order."""
-        commanded, tool_c, measured, tool, tau_commanded, _, wrench = readings
-        before = self._readings
+        commanded, tool_c, measured, tool, tau_commanded, _, wrench = signals
+        before = self._last_signals
         q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is not None:
             tau_c = readonly_copy(tau_commanded)

@@ -9,9 +9,6 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import active_box
 from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.actuator import guiding_box
-from rcilab.makers.rokae.controller.arm import Arm
-from rcilab.makers.rokae.controller.measured_state import MeasuredStateMonitor
 from rcilab.makers.rokae.controller.modes import MODES
 from rcilab.makers.rokae.controller.settings import SIGNAL_COUNT, Settings, apply_request
 from rcilab.makers.rokae.controller.state_machine import (
@@ -25,7 +22,9 @@ from rcilab.makers.rokae.controller.state_machine import (
 )
 from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.measured_state import MeasuredStateMonitor
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.virtual_arm import VirtualArm
 
 
 class Reply(NamedTuple):
@@ -61,7 +60,7 @@ def answer_query(
             return None
 
 
-def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: Arm) -> Transition | rci.Status:
+def check_request(request: rci.Request, phase: Phase, settings: Settings, arm: VirtualArm) -> Transition | rci.Status:
     """Returns what a request does, or the status that refuses it whatever its values do to the settings."""
     cell = transition(phase, request.code)
     refusal: rci.Status | None = None
@@ -72,15 +71,15 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
             refusal = None if port >= LOWEST_CLIENT_PORT else rci.SettingStatus.INVALID_ARGUMENT
         case rci.SetMotorPower(power=power):
             refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
-            if refusal is None and phase is Phase.OFF and not arm.stands:  # The brakes have not stopped it yet.
+            if refusal is None and phase is Phase.OFF and not arm.is_standstill:  # The brakes have not stopped it yet.
                 return cell._replace(when=When.AT_REST)
         case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.
-            refusal = _judge_start(request, arm.model, arm.commanded)
+            refusal = _check_start(request, arm.model, arm.commanded)
         case rci.StartDrag(space=space, type=kind):
             is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
             refusal = None if is_known else rci.SettingStatus.INVALID_ARGUMENT
         case rci.AutomaticErrorRecovery() if phase in (Phase.REFLEX, Phase.CUT_OFF):
-            refusal = judge_recovery(settings, arm.watch)
+            refusal = check_recovery(settings, arm.measured_state)
         case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_at_rest:
             refusal = rci.SettingStatus.NOT_POSSIBLE
         case _:
@@ -88,7 +87,7 @@ def judge_request(request: rci.Request, phase: Phase, settings: Settings, arm: A
     return cell if refusal is None else refusal
 
 
-def _judge_start(request: rci.StartMove, model: RobotModel, commanded: ReferenceTrajectory) -> rci.StartStatus | None:
+def _check_start(request: rci.StartMove, model: RobotModel, commanded: ReferenceTrajectory) -> rci.StartStatus | None:
     controller_mode, motion_mode = request.controller_mode, request.motion_mode
     if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
         return rci.StartStatus.INVALID_ARGUMENT
@@ -100,7 +99,7 @@ def _judge_start(request: rci.StartMove, model: RobotModel, commanded: Reference
     return None
 
 
-def judge_recovery(settings: Settings, watch: MeasuredStateMonitor) -> rci.RecoveryStatus | None:
+def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.RecoveryStatus | None:
     """Returns why a stopped arm cannot recover by itself, or None when it can.
 
     Beyond a soft limit or the safety box by more than a measurement may be, a person has to bring it back (power off
@@ -109,19 +108,21 @@ def judge_recovery(settings: Settings, watch: MeasuredStateMonitor) -> rci.Recov
 
     Args:
         settings: With soft limits, box and thresholds.
-        watch: Where the arm is, and what presses on it.
+        sensors: Where the arm is, and what presses on it.
     """
-    for q, lower, upper in zip(watch.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
+    for q, lower, upper in zip(sensors.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
         if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     box = active_box(settings.safety_box)
-    if box is not None and guiding_box(settings) is None:
-        if box.excess(watch.tool.position) > BOX_ALLOWANCE:
+    if box is not None and settings.guiding_box is None:
+        if box.excess(sensors.tool.position) > BOX_ALLOWANCE:
             return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
-    return None if watch.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
+    return None if sensors.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
 
 
-def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: Arm) -> str:
+def describe_refusal(
+    request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: VirtualArm
+) -> str:
     """Returns why a request was refused, for whoever looks at the controller and not at its answers."""
     name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
     why: object = f"the robot is {mode}"
@@ -131,7 +132,7 @@ def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, set
     elif status is rci.StartStatus.SINGULAR_START_POSE:
         why = arm.model.solver.singularity(arm.commanded.q)
     elif status is rci.RecoveryStatus.REFLEX:
-        why = arm.watch.find_collision(settings.collision_thresholds)
+        why = arm.measured_state.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
         why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
     elif status.name == "INVALID_ARGUMENT":
@@ -139,7 +140,7 @@ def describe_refusal(request: rci.Request, status: rci.Status, phase: Phase, set
     return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
 
 
-def _describe_argument(request: rci.Request, settings: Settings, arm: Arm) -> str:
+def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm) -> str:
     """Returns which value of a request is out of its bounds."""
     try:
         apply_request(settings, request, arm.model.description)

@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Callable
 
 from rcilab.core.errors import DecodeError
-from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import Endpoint
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_handlers import Reply
 from rcilab.makers.rokae.controller.state_machine import When
 from rcilab.makers.rokae.wire import Connect, Request, decode_request, encode_response
@@ -26,7 +26,7 @@ class RequestQueue:
     """
 
     def __init__(
-        self, cycle: ControlCycle, endpoint: Endpoint, network: FaultyNetwork, log: Callable[[str], None]
+        self, cycle: RciController, endpoint: Endpoint, network: FaultyNetwork, log: Callable[[str], None]
     ) -> None:
         self._log = log
         self._cycle = cycle

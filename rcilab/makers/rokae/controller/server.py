@@ -23,7 +23,6 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.makers.maker import require_simulator
 from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import (
     Arrival,
     ClientConnected,
@@ -37,6 +36,7 @@ from rcilab.makers.rokae.controller.endpoint import (
 )
 from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_queue import RequestQueue
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
 from rcilab.makers.rokae.faults import Fault
@@ -92,7 +92,7 @@ class ControllerServer:
         self.config = config
         model = require_simulator(load_model(config.model))
         self._plant = plant if plant is not None else build_plant(config.plant, model)
-        self.cycle = ControlCycle(
+        self.cycle = RciController(
             model,
             self._plant,
             mode_delay=config.mode_delay_cycles,
@@ -116,7 +116,7 @@ class ControllerServer:
         self._next_look = 0.0
         self._cores = CpuLatencyLock()
         self._missed_before = 0
-        self._told: tuple[Fault, ...] = ()
+        self._told: tuple[FaultCode, ...] = ()
         self._seldom = SeldomLines(log, self._clock.now)
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
@@ -230,10 +230,10 @@ class ControllerServer:
     def _say_farewell(self) -> int:
         """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
         if self.cycle.phase is not Phase.MOVING:
-            self.cycle.happen(Event.CLIENT_LOST)
+            self.cycle.on_event(Event.CLIENT_LOST)
             return 0
         self.cycle.reason = Remark("the controller was told to end in mid-motion", "told_to_end")
-        self.cycle.happen(Event.FAULT, Fault.INSTABILITY_DETECTION)
+        self.cycle.on_event(Event.FAULT, Fault.INSTABILITY_DETECTION)
         return FAREWELL
 
     def _stand_still(self, duration: float) -> None:
@@ -403,7 +403,7 @@ class ControllerServer:
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
         self._desk.clear()
-        self.cycle.happen(Event.CLIENT_LOST)
+        self.cycle.on_event(Event.CLIENT_LOST)
         if was_moving:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":

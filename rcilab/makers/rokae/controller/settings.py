@@ -13,11 +13,9 @@ from math import hypot
 
 import numpy as np
 
-from rcilab.core.arrays import readonly_copy
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.wire.bounds import (
     FARTHEST_BOX,
@@ -27,58 +25,35 @@ from rcilab.makers.rokae.wire.bounds import (
     LONGEST_TOOL,
     LOWEST_FREQUENCY,
 )
-from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
+from rcilab.sim.arm_parameters import ArmParameters, Floats, ForceAxesKind
+from rcilab.sim.hand_guiding import GuidedFreedom
 
 SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
-
-Floats = tuple[float, ...]
+_FORCE_AXES = {
+    rci.ForceFrame.WORLD: ForceAxesKind.WORLD,
+    rci.ForceFrame.TOOL: ForceAxesKind.TOOL,
+    rci.ForceFrame.PATH: ForceAxesKind.PATH,
+}
+_FREEDOMS = {
+    rci.DragType.FREE: GuidedFreedom.ALL,
+    rci.DragType.TRANSLATION: GuidedFreedom.TRANSLATION,
+    rci.DragType.ROTATION: GuidedFreedom.ROTATION,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """All values that commands set; vectors have n plain floats."""
+class Settings(ArmParameters):
+    """All values that commands set: those of the arm, and those of the controller alone."""
 
-    joint_lower: Floats
-    """Soft limits, [rad]."""
-    joint_upper: Floats
-    """[rad]."""
-    collision_thresholds: Floats
-    """[N m]."""
-    joint_stiffness: Floats
-    """[N m/rad]."""
-    cartesian_stiffness: Floats
-    """Three translations [N/m], three rotations [N m/rad]."""
-    desired_wrench: Floats = (0.0,) * 6
-    """What Cartesian impedance presses with, [N, N m]."""
-    T_flange_tool: Pose = IDENTITY
-    load: Payload = NO_LOAD
-    joint_filter: float = FILTER_OFF
-    """Cut-off frequency of the low pass on commanded joint angles, [Hz]. It wakes up switched off, a choice: the
-    vendor's client filters before it sends, and whoever does not is followed exactly."""
-    cartesian_filter: float = FILTER_OFF
-    """The same for commanded poses, [Hz]."""
-    torque_filter: float = FILTER_OFF
-    """The same for commanded torques, [Hz]."""
     torque_report_filter: float = 100.0
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
-    safety_box: SafetyBox | None = None
-    T_flange_force: Pose = IDENTITY
-    """Force-control frame."""
-    force_frame: rci.ForceFrame = rci.ForceFrame.WORLD
-    virtual_guide: bool = False
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
-    auto_limit: bool = False
-    """Whether commanded joint angles are led to rest inside the soft limits instead of raising a fault beyond them.
-    `auto_limit` of setJointLimit is not on the wire: it is set from outside."""
-
-    def soft_limits(self, joint: JointLimits) -> JointLimits:
-        """Returns the limits of an arm's joints with the soft limits as position bounds."""
-        return replace(joint, lower=readonly_copy(self.joint_lower), upper=readonly_copy(self.joint_upper))
 
     def with_input(self, signal: int, level: bool) -> Settings:
         """Returns the settings with another level at a digital input.
@@ -126,6 +101,11 @@ def apply_request(settings: Settings, request: rci.Request, arm: RobotDescriptio
     return replace(settings, **_changes(request, arm, settings))
 
 
+def guided_freedom(request: rci.StartDrag) -> GuidedFreedom:
+    """Returns what a drag leaves free: in joint space every joint, whatever its type, as with the vendor's client."""
+    return GuidedFreedom.ALL if request.space == rci.DragSpace.JOINT else _FREEDOMS[rci.DragType(request.type)]
+
+
 def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object]:
     """Returns the fields to change."""
     n, joint, cartesian = arm.n, arm.limits.joint, arm.limits.cartesian
@@ -171,7 +151,10 @@ def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) ->
         case rci.SetFcCoor(frame=numbers, type=kind):
             if kind not in tuple(rci.ForceFrame):
                 raise InvalidValueError("type", kind, "is no force-control frame; there are 0 to 2")
-            return {"T_flange_force": _pose_at_flange("frame", numbers), "force_frame": rci.ForceFrame(kind)}
+            return {
+                "T_flange_force": _pose_at_flange("frame", numbers),
+                "force_axes": _FORCE_AXES[rci.ForceFrame(kind)],
+            }
         case rci.SetLoad():
             return {"load": _load(request, arm)}
         case rci.EnableVirtualGuide(enable=enable):

@@ -11,7 +11,7 @@ import pytest
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.sim.plants import build_plant
 
@@ -20,7 +20,7 @@ class Hand:
     """Sends requests and commands to a cycle, one step a command, and keeps every state."""
 
     def __init__(self, model: RobotModel, plant: str = "ideal", **options: object) -> None:
-        self.cycle = ControlCycle(model, build_plant(plant, model), mode_delay=3, **{"prefill": 0, **options})  # type: ignore[arg-type]
+        self.cycle = RciController(model, build_plant(plant, model), mode_delay=3, **{"prefill": 0, **options})  # type: ignore[arg-type]
         self.states: list[RobotState] = [self.cycle.state]
 
     @property

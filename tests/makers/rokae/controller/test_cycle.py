@@ -193,7 +193,7 @@ def test_a_client_that_vanishes_in_mid_motion_leaves_one_controlled_stop(hand) -
     hand.play(rows[:-30])
     for row in rows[-30:]:  # These are in the queue when the connection ends; nobody watches over them any more.
         hand.cycle.receive(rci.CommandPacket(0, tuple(row)))
-    hand.cycle.happen(Event.CLIENT_LOST)
+    hand.cycle.on_event(Event.CLIENT_LOST)
     before = hand.state.q_c[0]
     hand.rest()
     hand.assert_smooth()

@@ -105,7 +105,7 @@ def test_a_client_that_vanishes_while_guiding_leaves_one_controlled_stop(make_ha
     hand = make_hand()
     drag(hand, JOINT, FREE, (0.0, 8.0, 0.0, 0.0, 0.0, 0.0))
     hand.cycle.plant.push((0.0,) * 6)
-    hand.cycle.happen(Event.CLIENT_LOST)
+    hand.cycle.on_event(Event.CLIENT_LOST)
     hand.step(500)
     assert not hand.state.dq.any()
     assert hand.state.robot_mode is RobotMode.IDLE

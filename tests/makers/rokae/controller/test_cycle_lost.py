@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.jitter_buffer import FIRST_COMMAND_TIMEOUT
 from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
+from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT
 from tests.makers.rokae.controller.conftest import smooth
 
 F = Fault

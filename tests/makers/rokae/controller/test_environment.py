@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from rcilab.core.clock import ManualClock
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.cycle import ControlCycle
 from rcilab.makers.rokae.controller.endpoint import Endpoint
 from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
 from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import load_model
 from rcilab.sim import api as world
 from rcilab.sim.api import NetworkFaults, WorldStatus
@@ -29,7 +29,7 @@ class Place:
 
     def __init__(self, kind: str) -> None:
         self.clock = ManualClock()
-        self.cycle = ControlCycle(MODEL, build_plant(kind, MODEL))
+        self.cycle = RciController(MODEL, build_plant(kind, MODEL))
         self.cycle.handle(rci.SetMotorPower(1))
         self.endpoint = Endpoint(ControllerConfig(model=MODEL.name, port=0))
         network = FaultyNetwork(self.endpoint, self.clock, NetworkFaults(), NetworkFaults())

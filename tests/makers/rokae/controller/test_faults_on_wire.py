@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.state_machine import Phase
 from rcilab.makers.rokae.wire import SafetyStop, SetMotorPower
 from tests.peers import faults, programs, wire
@@ -161,7 +161,7 @@ def test_a_line_towards_the_stretched_arm_ends_in_an_invalid_frame(robot: Robot)
     recover_and_move(robot)
 
 
-def push(wrench: tuple[float, ...]) -> Callable[[ControlCycle], object]:
+def push(wrench: tuple[float, ...]) -> Callable[[RciController], object]:
     return lambda cycle: cycle.plant.push(wrench)
 
 
@@ -283,7 +283,7 @@ def test_a_wrist_or_shoulder_that_is_straight_is_singular_too(robot: Robot, join
 def test_what_stops_the_arm_before_the_modes_ends_the_clients_wait_for_them(
     robot: Robot, place: Arena, what: str
 ) -> None:
-    def stop(cycle: ControlCycle) -> None:
+    def stop(cycle: RciController) -> None:
         if what == "estop":
             cycle.press_safety_stop(SafetyStop.ESTOP)
         else:

@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.ideal_plant import IdealPlant
@@ -76,7 +76,7 @@ MEASURED = [
 def test_what_the_sensors_say_is_judged_in_that_cycle(model: RobotModel, mode, act, fault: Fault) -> None:
     hand = Hand(model)
     plant = SlippingPlant(model)
-    hand.cycle = ControlCycle(model, plant, mode_delay=3, prefill=0)
+    hand.cycle = RciController(model, plant, mode_delay=3, prefill=0)
     hand.states = [hand.cycle.state]
     hand.ask(rci.SetJointLimit(tuple(model.home + 0.1), tuple(model.home - 0.1)))
     hand.ask(hand.box(0.04))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.actuator import ControlLaw
-from rcilab.makers.rokae.controller.modes.start import StartOffset, start_tolerance
 from rcilab.makers.rokae.controller.settings import default_settings
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.generators.start import StartOffset, start_tolerance
 
 MODEL = load_model("xMatePro7")
 POSITION_MODES = [(0, 1), (1, 2), (2, 1), (3, 2)]

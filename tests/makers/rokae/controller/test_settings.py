@@ -11,6 +11,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.settings import Settings, apply_request, default_settings
 from rcilab.robots import RobotDescription, describe_robot
+from rcilab.sim.arm_parameters import ForceAxesKind
 
 NAN = math.nan
 POSE = (1.0, 0.0, 0.0, 0.25, 0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 1.0, 0.75, 0.0, 0.0, 0.0, 1.0)
@@ -141,7 +142,7 @@ def test_taken_values_are_in_the_settings(settings, arm) -> None:
     assert settings.desired_wrench == WRENCH
     assert (settings.joint_filter, settings.cartesian_filter, settings.torque_filter) == (0.1, 1000.0, 55.5)
     assert settings.T_flange_tool.position.tolist() == [0.25, 0.5, 0.75]
-    assert settings.force_frame is rci.ForceFrame.PATH
+    assert settings.force_axes is ForceAxesKind.PATH
     assert settings.safety_box is not None
     assert settings.safety_box.size == (0.1, 2.0, 1e-3)
     assert settings.outputs == (False,) * 5 + (True,)

@@ -10,25 +10,25 @@ import numpy as np
 import pytest
 
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.cycle import ControlCycle
+from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.sim.plants import build_plant
 
-Act = Callable[[ControlCycle, Random], None]
+Act = Callable[[RciController, Random], None]
 
 _POSE = (1.0, 0.0, 0.0, 0.02, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 0.0, 0.0, 0.0, 1.0)
 _MODES = ((0, 1), (1, 2), (2, 1), (3, 2), (4, 1))
 
 
-def start(cycle: ControlCycle, random: Random) -> None:
+def start(cycle: RciController, random: Random) -> None:
     cycle.handle(rci.SetMotorPower(1))
     cycle.handle(rci.StartMove(*random.choice(_MODES)))
 
 
-def set_something(cycle: ControlCycle, random: Random) -> None:
+def set_something(cycle: RciController, random: Random) -> None:
     requests = (
         rci.SetCoor(_POSE),
         rci.SetLoad(random.uniform(0.1, 1.0), (0.0, 0.01, 0.05), (0.001, 0, 0, 0, 0.001, 0, 0, 0, 0.001)),
@@ -41,24 +41,24 @@ def set_something(cycle: ControlCycle, random: Random) -> None:
     cycle.handle(random.choice(requests))
 
 
-def press_on_the_arm(cycle: ControlCycle, random: Random) -> None:
+def press_on_the_arm(cycle: RciController, random: Random) -> None:
     wrench = [random.uniform(-20.0, 20.0) for _ in range(3)] + [0.0] * 3
     cycle.plant.push(wrench, random.choice((None, 3, 5)))
 
 
-def press_a_button(cycle: ControlCycle, random: Random) -> None:
+def press_a_button(cycle: RciController, random: Random) -> None:
     kind = random.choice((rci.SafetyStop.ESTOP, rci.SafetyStop.GSTOP, rci.SafetyStop.NONE))
     cycle.press_safety_stop(kind)
     if kind is not rci.SafetyStop.NONE and random.random() < 0.7:
         cycle.press_safety_stop(rci.SafetyStop.NONE)
 
 
-def put_elsewhere(cycle: ControlCycle, random: Random) -> None:
+def put_elsewhere(cycle: RciController, random: Random) -> None:
     if cycle.is_settled and not cycle.is_moving:
         cycle.reset(cycle.model.home + random.uniform(-0.1, 0.1))
 
 
-def mount(cycle: ControlCycle, random: Random) -> None:
+def mount(cycle: RciController, random: Random) -> None:
     kilos = random.uniform(0.1, 1.0)
     load = Payload(mass=kilos, center_of_mass=np.array((0.0, 0.0, 0.05)), inertia=1e-3 * np.eye(3))
     cycle.plant.mount(random.choice((None, load)))
@@ -81,14 +81,14 @@ ACTS: tuple[Act, ...] = (
     lambda cycle, _: cycle.handle(rci.AutomaticErrorRecovery()),
     lambda cycle, _: cycle.handle(rci.RebootRobot()),
     lambda cycle, random: cycle.set_input(random.randrange(4), True),
-    lambda cycle, _: cycle.happen(Event.CLIENT_LOST),
-    lambda cycle, _: cycle.happen(Event.FAULT, Fault.COLLISION),
+    lambda cycle, _: cycle.on_event(Event.CLIENT_LOST),
+    lambda cycle, _: cycle.on_event(Event.FAULT, Fault.COLLISION),
     lambda cycle, _: setattr(cycle, "loop_back", not cycle.loop_back),
     lambda cycle, _: cycle.receive(rci.CommandPacket(cycle.state.message_id)),
 )
 
 
-def lead(cycle: ControlCycle, count: int, random: Random) -> None:
+def lead(cycle: RciController, count: int, random: Random) -> None:
     """Sends what a client would send in this cycle of its motion; one of forty is missing."""
     if cycle.phase is not Phase.MOVING or random.random() < 0.025:
         return
@@ -105,7 +105,7 @@ def lead(cycle: ControlCycle, count: int, random: Random) -> None:
 @pytest.mark.parametrize("name", ["xMatePro7", "xMate3"])
 def test_whatever_happens_the_datagrams_are_those_of_a_controller_that_computes_each(name: str, plant: str):
     model = load_model(name)
-    quick, thorough = (ControlCycle(model, build_plant(plant, model), mode_delay=5, prefill=2) for _ in range(2))
+    quick, thorough = (RciController(model, build_plant(plant, model), mode_delay=5, prefill=2) for _ in range(2))
     seed = len(name) + len(plant)
     random = Random(seed)
     still = 0

@@ -1,4 +1,4 @@
-"""What the controller makes of its sensors: where the tool is, what presses on the arm, and whether that is allowed."""
+"""What follows from the sensors: the pose of the tool, the external forces, and the conditions that they violate."""
 
 from __future__ import annotations
 
@@ -6,43 +6,40 @@ from collections.abc import Sequence
 from operator import gt
 
 from rcilab.conformance.common_conditions import yielding_limits
-from rcilab.conformance.limit_violation import describe_breaches
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.conditions import rci_faults
-from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.tool_kinematics import ToolKinematics
+from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
 _ANYWHERE = (0.0, 0.0, 0.0)
-_NO_REASON = Remark("")
-_LEAST = 1e-3  # [N m] So that a threshold of zero divides nothing by zero; the client has it too.
+_LEAST = 1e-3  # [N m] Divisor for a threshold of zero; the client uses the same.
 
 
 class MeasuredStateMonitor:
-    """Follows the measured arm. Owned by the controller's cycle.
+    """Follows the measured arm. Owned by the virtual arm.
 
     Attributes:
         measured: The last measurement.
         tool: The tool as measured.
-        tau_ext: Outside joint torques, shape (n,), [N m].
-        wrench: Outside wrench on the tool, base axes, shape (6,), [N, N m].
+        tau_ext: External joint torques, shape (n,), [N m].
+        wrench: External wrench on the tool, base axes, shape (6,), [N, N m].
 
     Args:
         model: The arm with its tool and load.
-        measured: Where it rests.
+        measured: The measurement at standstill.
     """
 
     def __init__(self, model: RobotModel, measured: Measurement) -> None:
         self.configure(model, measured)
 
     def configure(self, model: RobotModel, measured: Measurement) -> None:
-        """Takes another tool or load, or an arm that was put elsewhere; only at rest."""
+        """Takes another tool or load, or an arm that was placed elsewhere; only at standstill."""
         self._model = model
         self.tool = ToolKinematics(model, measured.q.tolist())
         self._observer = MomentumObserver(model)
@@ -51,7 +48,7 @@ class MeasuredStateMonitor:
         self.tau_ext, self.wrench = self._observer.step(measured)
         self._monitor: MeasuredMonitor | None = None
         self._thresholds: Sequence[float] = ()
-        self._judges_tool = False
+        self._checks_tool = False
         self._tool_version: int = -1
         self._q: list[float] = measured.q.tolist()
         self._dq: list[float] = measured.dq.tolist()
@@ -62,25 +59,25 @@ class MeasuredStateMonitor:
         box: SafetyBox | EntryBox | None,
         thresholds: Sequence[float],
         *,
-        judges_tool: bool,
-        yields: bool,
+        checks_tool: bool,
+        is_compliant: bool,
     ) -> None:
-        """Begins to judge a motion.
+        """Begins to check a motion.
 
         Args:
             limits: Bounds of the arm, soft limits included.
-            box: Where the tool shall stay; None is anywhere.
-            thresholds: Outside joint torques that are a collision, n numbers, [N m].
-            judges_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
-            yields: Whether forces move the arm, and not its commands alone.
+            box: Where the tool must stay; None does not bound it.
+            thresholds: External joint torques that are a collision, n numbers, [N m].
+            checks_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
+            is_compliant: Whether forces move the arm, and not its commands alone.
         """
-        self._monitor = MeasuredMonitor(yielding_limits(limits) if yields else limits, box)
+        self._monitor = MeasuredMonitor(yielding_limits(limits) if is_compliant else limits, box)
         self._monitor.reset(self.measured.q.tolist())
         self._thresholds = thresholds
-        self._judges_tool = judges_tool
+        self._checks_tool = checks_tool
 
     def observe(self, measured: Measurement, commanded: ReferenceTrajectory, tool_c: ToolKinematics) -> None:
-        """Takes the measurement of this cycle; where the arm is exactly where it was told, so is the tool."""
+        """Takes the measurement of this cycle; where the joints are exactly at their reference, so is the tool."""
         if measured is not self.measured or commanded.version != self._tool_version:
             self.measured, self._tool_version = measured, commanded.version
             self._q, self._dq = q, dq = measured.q.tolist(), measured.dq.tolist()
@@ -90,27 +87,22 @@ class MeasuredStateMonitor:
                 self.tool.observe(q, self._model.rigid_body.tool_terms(measured.q, measured.dq))
         self.tau_ext, self.wrench = self._observer.step(measured)
 
-    def judge(self, *, is_commanded: bool = True) -> tuple[tuple[Fault, ...], Remark]:
-        """Returns the faults that the measurement of this cycle raises, in wire order, and why.
+    def check(self, *, is_commanded: bool = True) -> Violations:
+        """Returns what the measurement of this cycle violates.
 
         Args:
             is_commanded: Whether a client's commands are followed; without, tool speed and arm angle do not count.
         """
         monitor, tool = self._monitor, self.tool
         assert monitor is not None
-        twist, psi = (tool.twist, tool.psi) if self._judges_tool and is_commanded else (None, None)
+        twist, psi = (tool.twist, tool.psi) if self._checks_tool and is_commanded else (None, None)
         position = tool.position if monitor.has_box else _ANYWHERE
-        breaches = monitor.step(self._q, self._dq, position, twist, psi)
-        faults = rci_faults(breaches) if breaches else ()
-        reasons = [describe_breaches(breaches)] if breaches else []
+        violations: Violations = tuple(monitor.step(self._q, self._dq, position, twist, psi))
         collision = self.find_collision(self._thresholds)
-        if collision is not None:
-            faults = (*faults, Fault.COLLISION)
-            reasons.append(collision)
-        return faults, Remark.all(reasons) if reasons else _NO_REASON
+        return violations if collision is None else (*violations, ArmViolation(ArmCondition.NO_COLLISION, collision))
 
     def find_collision(self, thresholds: Sequence[float]) -> Remark | None:
-        """Returns which outside torque is farthest above its threshold, in words, or None."""
+        """Returns which external torque is farthest above its threshold, as a sentence, or None."""
         torques: list[float] = self.tau_ext.tolist()
         if not any(map(gt, map(abs, torques), thresholds)):
             return None

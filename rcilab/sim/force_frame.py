@@ -1,4 +1,4 @@
-"""The axes of setFcCoor: in which outside forces are reported, and in which Cartesian impedance yields and presses."""
+"""The axes of the force-control frame: of reported external forces, and of the springs of Cartesian impedance."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose, Rotation9, rotation_from_wxyz, turn_between
-from rcilab.makers.rokae.controller.settings import Settings
-from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.arm_parameters import ArmParameters, ForceAxesKind
 
 _TURN_STEP = 2.0 * math.pi * CYCLE_TIME  # [rad] in a cycle: half a turn takes 0.5 s, as long as the largest wrench does
-# to be reached; a path at 1 m/s is followed without delay round any arc wider than 16 cm. A choice.
+# to be reached; a path at 1 m/s is followed without delay round any arc wider than 16 cm. A tuning value.
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
 _ORIGIN = (0.0, 0.0, 0.0)
 _ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
@@ -32,17 +31,17 @@ class ForceAxes:
 
     Args:
         model: The arm with its tool.
-        settings: What the client has set.
+        parameters: What the client has configured.
     """
 
-    def __init__(self, model: RobotModel, settings: Settings) -> None:
+    def __init__(self, model: RobotModel, parameters: ArmParameters) -> None:
         self._path = (0.0, 0.0, 0.0)
-        self.configure(model, settings)
+        self.configure(model, parameters)
 
-    def configure(self, model: RobotModel, settings: Settings) -> None:
+    def configure(self, model: RobotModel, parameters: ArmParameters) -> None:
         """Takes another tool or force-control frame; the direction of the path stays."""
-        self.T_tool_force = model.T_flange_tool.inverse() @ settings.T_flange_force
-        self._kind = settings.force_frame
+        self.T_tool_force = model.T_flange_tool.inverse() @ parameters.T_flange_force
+        self._kind = parameters.force_axes
         self.begin()
 
     def begin(self) -> None:
@@ -53,7 +52,7 @@ class ForceAxes:
     @property
     def is_world(self) -> bool:
         """Whether the axes are those of the base."""
-        return self._kind is ForceFrame.WORLD
+        return self._kind is ForceAxesKind.WORLD
 
     def follow(self, velocity: Sequence[float], T_base_tool: Pose) -> None:
         """Takes how the tool's origin is commanded to move in this cycle, base axes, [m/s], and where the tool is."""
@@ -61,13 +60,13 @@ class ForceAxes:
         if speed > _STANDING:
             x, y, z = velocity
             self._path = (x / speed, y / speed, z / speed)
-        if self._kind is ForceFrame.PATH:
+        if self._kind is ForceAxesKind.PATH:
             wanted = _path_axes(self._path, self._frame(T_base_tool))
             self._axes, self.is_settled = (wanted, True) if self._axes is None else _approach(self._axes, wanted)
 
     def rotation(self, T_base_tool: Pose) -> Rotation9:
         """Returns the axes in base, as the columns of a rotation; the base's own need not be asked for."""
-        if self._kind is ForceFrame.PATH and self._axes is not None:
+        if self._kind is ForceAxesKind.PATH and self._axes is not None:
             return self._axes
         return self._frame(T_base_tool)
 

@@ -18,25 +18,28 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.actuator import ControlLaw
-from rcilab.makers.rokae.controller.arm import Arm
-from rcilab.makers.rokae.controller.client_motion import LOST_LIMIT, PREFILL, ClientMotion
+from rcilab.makers.rokae.controller.fault_stop import faults_of, is_beyond_range
 from rcilab.makers.rokae.controller.model_download import model_response
 from rcilab.makers.rokae.controller.modes import MODES
 from rcilab.makers.rokae.controller.reporter import StateReporter
 from rcilab.makers.rokae.controller.request_handlers import (
     Reply,
     answer_query,
+    check_request,
     conclude,
     describe_refusal,
-    judge_request,
 )
-from rcilab.makers.rokae.controller.settings import apply_request, default_settings
+from rcilab.makers.rokae.controller.settings import apply_request, default_settings, guided_freedom
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.limit_tables import LimitTable
+from rcilab.makers.rokae.limit_tables import LimitTable, cartesian_limits
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.plant import Plant
+from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL
+from rcilab.sim.violations import Violations, describe_violations
+from rcilab.sim.virtual_arm import VirtualArm
 
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
@@ -45,11 +48,12 @@ _PRESSED = {
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
 }
 _POWER_OFF = Remark("the client switched motor power off in mid-motion", "power_off")
-_JOINT_RANGE = frozenset((Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION))
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
 _STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED)
 _BRAKED = (Phase.OFF, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED, Phase.RECOVERING)
+_RESTING_LAWS = {**dict.fromkeys(_BRAKED, ControlLaw.BRAKED), Phase.GUIDING: ControlLaw.GUIDE}
+"""The control law while no command is followed; POSITION in all other phases."""
 _IDLE_MODES = (ControllerMode.OTHER, MotionGeneratorMode.IDLE)
 _REPORTED = (
     rci.CommandCode.SET_COOR,
@@ -60,7 +64,7 @@ _REPORTED = (
 """Setters that change how states are reported."""
 
 
-class ControlCycle:
+class RciController:
     """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
 
     Attributes:
@@ -105,10 +109,11 @@ class ControlCycle:
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
         self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
-        self._arm = Arm(model, plant, self.settings)
+        self._arm = VirtualArm(
+            model, plant, self.settings, prefill=prefill, torque_prefill=torque_prefill, lost_limit=lost_limit
+        )
         self._reporter = StateReporter(model, self.settings)
-        self._motion = ClientMotion(self._arm, prefill, torque_prefill, lost_limit)
-        self.playout = self._motion.playout
+        self.playout = self._arm.playout
         self._requested = self._shown = _IDLE_MODES
         self._countdown = 0
         self._is_still = False
@@ -136,7 +141,7 @@ class ControlCycle:
     @property
     def is_settled(self) -> bool:
         """Whether the arm rests and no phase is under way that ends by itself: deferred replies are due."""
-        return self._arm.stands and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
+        return self._arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
     def is_moving(self) -> bool:
@@ -186,17 +191,14 @@ class ControlCycle:
 
     def receive(self, packet: rci.CommandPacket) -> None:
         """Takes a command that came from the network; it is kept while a motion is under way."""
-        if self._motion.is_followed:
-            self.playout.push(packet)
-        else:
-            self.ignored += 1
+        self.ignored += not self._arm.receive(ArmCommand(*packet))
 
     def handle(self, request: rci.Request) -> Reply:
         """Takes a request and returns the answer to it."""
         content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
         if content is not None:
             return Reply(content)
-        cell = judge_request(request, self.phase, self.settings, self._arm)
+        cell = check_request(request, self.phase, self.settings, self._arm)
         if not isinstance(cell, Transition):
             return self._refuse(request, cell)
         if Action.APPLY in cell.actions and not self._apply(request):
@@ -217,7 +219,7 @@ class ControlCycle:
         """Returns what to answer now that a reply is due: meanwhile a recovery may have been overtaken."""
         return conclude(reply, self.phase)
 
-    def happen(self, event: Event, *faults: Fault) -> None:
+    def on_event(self, event: Event, *faults: Fault) -> None:
         """Takes an event that is not a client's request; `faults` are the bits that it may set."""
         self._enter(transition(self.phase, event), faults=faults)
 
@@ -232,7 +234,7 @@ class ControlCycle:
             if kind is not rci.SafetyStop.NONE:
                 self.reason = _PRESSED[kind]
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
-            self.happen(event, Fault.INSTABILITY_DETECTION)
+            self.on_event(event, Fault.INSTABILITY_DETECTION)
 
     def step(self, *, is_seen: bool = True) -> RobotState:
         """Lives through one millisecond and returns the state at its end.
@@ -243,35 +245,26 @@ class ControlCycle:
         """
         self._message_id += is_seen
         if not self._is_still:
-            self._live()
-        elif self._arm.stay():
+            self._advance()
+        elif self._arm.hold():
             return self._repeat()
         self.state, self._datagram = self._report(), None
         self._is_still = self._reporter.has_repeated and self._may_stay_still()
         return self.state
 
-    def _live(self) -> None:
-        motion = self._motion
+    def _advance(self) -> None:
         self._count_down()
-        step = motion.follow() if motion.is_followed else None
-        has_moved = step is not None and not step.faults
-        if step is not None and step.faults:
-            self._raise(step.faults, step.reason, is_number=step.is_number)
-        law = self._current_law()
-        if law is not ControlLaw.TORQUE:
-            motion.tau = None
-        self._arm.move(law, motion.tau, has_moved=has_moved)
-        if self.phase in _MOVING:
-            # Our own stop is one of the joints: how the tool turns meanwhile is nobody's command.
-            faults, reason = self._arm.watch.judge(is_commanded=motion.is_followed)
-            if faults:
-                self._raise(faults, reason)
-        if self.phase is Phase.STOPPING and self._arm.stands and not motion.is_followed:
-            self.happen(Event.AT_REST)
+        command_violations, measured_violations = self._arm.step()
+        if command_violations:
+            self._raise(command_violations)
+        elif measured_violations:
+            self._raise(measured_violations)
+        if self.phase is Phase.STOPPING and self._arm.is_standstill and not self._arm.is_following:
+            self.on_event(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
         """Returns whether the next cycle will be like this one, unless somebody asks for something or moves the arm."""
-        return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled(self._current_law())
+        return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled
 
     def _repeat(self) -> RobotState:
         self.state = self._reporter.repeat(self._message_id)
@@ -285,27 +278,20 @@ class ControlCycle:
         if self._countdown > 0 or self.phase not in _WAITING:
             return
         if self.phase is Phase.STARTING:
-            self.happen(Event.MODES_SHOWN)
+            self.on_event(Event.MODES_SHOWN)
         elif self._arm.commanded.is_at_rest:
-            self.happen(Event.RECOVERED)
+            self.on_event(Event.RECOVERED)
 
-    def _raise(self, faults: tuple[Fault, ...], reason: Remark, *, is_number: bool = True) -> None:
-        self.reason = reason
-        is_limit = is_number and not self.settings.auto_limit and not _JOINT_RANGE.isdisjoint(faults)
-        self.happen(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults)
-
-    def _current_law(self) -> ControlLaw:
-        if self._motion.is_followed:
-            return self._motion.law
-        if self.phase is Phase.GUIDING:
-            return ControlLaw.GUIDE
-        return ControlLaw.BRAKED if self.phase in _BRAKED and self._arm.may_be_braked else ControlLaw.POSITION
+    def _raise(self, violations: Violations) -> None:
+        self.reason = describe_violations(violations)
+        is_limit = not self.settings.auto_limit and any(map(is_beyond_range, violations))
+        self.on_event(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults_of(violations))
 
     def _report(self) -> RobotState:
         controller_mode, motion_mode = self._shown
         return self._reporter.report(
             self._message_id,
-            self._arm.read(self._motion.tau),
+            self._arm.signals,
             faults=self.faults,
             success_rate=self.playout.success_rate,
             motion_generator_mode=motion_mode,
@@ -320,6 +306,8 @@ class ControlCycle:
         if cell.phase is Phase.RECOVERING and self.phase is not Phase.RECOVERING:
             self._countdown = self._recovery_time
         self.phase = cell.phase
+        self._arm.is_monitored = cell.phase in _MOVING
+        self._arm.resting_law = _RESTING_LAWS.get(cell.phase, ControlLaw.POSITION)
 
     def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:
@@ -327,26 +315,25 @@ class ControlCycle:
                 assert isinstance(request, rci.StartMove)
                 modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
                 self._requested, self._countdown = (modes[0], modes[1].shown_as), self._mode_delay
-                self._motion.prepare(MODES[modes])
+                self._arm.prepare_motion(MODES[modes])
             case Action.SHOW_MODES:
                 self._shown = self._requested
-                self._motion.begin(self.settings, self.limit_table)
+                self._arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table))
             case Action.REVEAL_MODES:
                 self._shown = self._requested
             case Action.HIDE_MODES:
                 self._shown = _IDLE_MODES
             case Action.DRAIN:
-                self._motion.drain()
+                self._arm.drain_motion()
             case Action.DISCARD:
-                self._motion.discard()
+                self._arm.discard_motion()
             case Action.SET_FAULTS:
                 self.faults = tuple(sorted({*self.faults, *faults}))
             case Action.CLEAR_FAULTS:
                 self.faults = ()
             case Action.GUIDE:
                 assert isinstance(request, rci.StartDrag)
-                space, kind = rci.DragSpace(request.space), rci.DragType(request.type)
-                self._arm.actuator.begin_guiding(space, kind, self._arm.watch.measured)
+                self._arm.begin_guiding(guided_freedom(request))
             case Action.REBOOT:
                 self.settings = self.settings.rebooted(self.model.description)
                 self._arm.configure(self.settings)

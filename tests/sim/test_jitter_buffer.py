@@ -4,22 +4,22 @@ import itertools
 
 import pytest
 
-from rcilab.makers.rokae.controller.jitter_buffer import CAPACITY, SLACK, JitterBuffer, Playback
-from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.jitter_buffer import CAPACITY, SLACK, JitterBuffer, Playback
 
 _numbers = itertools.count()
 
 
-def command(message_id: int, *, finished: bool = False) -> CommandPacket:
+def command(message_id: int, *, finished: bool = False) -> ArmCommand:
     """A command unlike any other."""
-    return CommandPacket(message_id, psi_c=next(_numbers), finished=finished)
+    return ArmCommand(message_id, psi=next(_numbers), finished=finished)
 
 
-def by_whole_gap(packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+def by_whole_gap(packet: ArmCommand, steps: int, in_doubt: bool) -> bool:
     return in_doubt
 
 
-def by_one_step(packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+def by_one_step(packet: ArmCommand, steps: int, in_doubt: bool) -> bool:
     return True
 
 
@@ -30,10 +30,10 @@ def take_ids(playout: JitterBuffer, cycles: int) -> list[int | str]:
         playback = playout.take(by_whole_gap)
         if playback.is_lost:
             found.append("lost")
-        elif playback.packet is None:
+        elif playback.command is None:
             found.append("wait")
         else:
-            found.append(playback.packet.message_id)
+            found.append(playback.command.number)
     return found
 
 
@@ -141,8 +141,8 @@ def test_answers_with_swapped_ids_are_played_as_the_motion_goes_on(prefill: int)
     for k in (5, 7, 6, 8, 11, 9, 10, 12, 13, 14, 15):
         playout.push(command(k))
         playback = playout.take(by_one_step)
-        if playback.packet is not None:
-            played.append(playback.packet.message_id)
+        if playback.command is not None:
+            played.append(playback.command.number)
     assert played == [5, 7, 6, 8, 11, 9, 10, 12, 13, 14, 15][: len(played)]
     assert len(played) == 11 - prefill
     assert (playout.late, playout.lost) == (0, 0)
@@ -164,7 +164,7 @@ def test_a_gap_of_ids_without_a_gap_of_the_motion_is_no_loss() -> None:
     playout = JitterBuffer(prefill=0)
     for k in (5, 8, 9):
         playout.push(command(k))
-    ids = [packet.message_id for _ in range(3) if (packet := playout.take(by_one_step).packet) is not None]
+    ids = [played.number for _ in range(3) if (played := playout.take(by_one_step).command) is not None]
     assert ids == [5, 8, 9]
     assert playout.lost == 0
 
@@ -241,8 +241,8 @@ def test_commands_that_close_a_loop_are_fresh() -> None:
         for _ in range(3 if k < 8 else 1):  # For a while three a cycle.
             playout.push(command(next(ids)))
         played += [playout.take(by_whole_gap)]
-    assert [playback.packet is None for playback in played[:3]] == [True, True, False]
-    assert all(playback.packet is not None for playback in played[2:])
+    assert [playback.command is None for playback in played[:3]] == [True, True, False]
+    assert all(playback.command is not None for playback in played[2:])
     assert len(playout) <= 2
     assert sum(playback.skipped for playback in played) >= 10
     assert playout.lost == 0

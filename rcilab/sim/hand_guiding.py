@@ -1,11 +1,13 @@
 """Hand guiding and the walls of the safety box: torques that let a person lead the arm, and where they end.
 
-A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. Cartesian drags hold
-what the person shall not change with the stiffest springs of the Cartesian impedance: TRANSLATION the orientation of
-the tool, ROTATION its position. Before a joint limit a spring pushes back with the joint's torque limit.
+A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. What is not free
+is held with the stiffest springs of the Cartesian impedance: TRANSLATION holds the orientation of the tool, ROTATION
+its position. Before a joint limit a spring pushes back with the joint's torque limit.
 """
 
 from __future__ import annotations
+
+from enum import Enum
 
 import numpy as np
 
@@ -13,23 +15,34 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, turn_between
-from rcilab.makers.rokae import wire as rci
 from rcilab.model.dynamics.rigid_body import ToolTerms
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import design_damping
 from rcilab.sim.plant import Measurement
 
 GUIDE_DAMPING = 1.5  # [rad/s] slowest mode that damping is computed with: a guided arm loses speed in some 0.5 s
-JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition: light links must not race; a choice
-STOP_ZONE = 0.05  # [rad] before a joint limit in which its spring grows from nothing to the torque limit; a choice
+JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition: light links must not race; a tuning value
+STOP_ZONE = (
+    0.05  # [rad] before a joint limit in which its spring grows from nothing to the torque limit; a tuning value
+)
 _DAMPED_OUTWARD = 1e-6  # [rad/s] walls damp nothing along themselves
+
+
+class GuidedFreedom(Enum):
+    """What a person may change while guiding the arm."""
+
+    ALL = "all"
+    """Every joint."""
+    TRANSLATION = "translation"
+    """The tool's position; its orientation is held."""
+    ROTATION = "rotation"
+    """The tool's orientation; its position is held."""
 
 
 def guide_torque(
     model: RobotModel,
     measured: Measurement,
-    space: rci.DragSpace,
-    kind: rci.DragType,
+    freedom: GuidedFreedom,
     T_held: Pose,
     limits: JointLimits | None = None,
 ) -> JointVector:
@@ -38,17 +51,16 @@ def guide_torque(
     Args:
         model: The arm as the controller knows it.
         measured: Where the arm is.
-        space: In joint space every joint is free, and `kind` has no effect, as with the vendor's client.
-        kind: What a Cartesian drag leaves free.
-        T_held: Pose of the tool in base at the start of the drag.
+        freedom: What the person may change.
+        T_held: Pose of the tool in base at the start of guiding.
         limits: Where the joints end; the arm's own limits when absent.
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     stiffness, spring = _limit_springs(measured.q, model.limits.joint if limits is None else limits)
-    if space is rci.DragSpace.CARTESIAN and kind is not rci.DragType.FREE:
-        held = slice(3, 6) if kind is rci.DragType.TRANSLATION else slice(0, 3)
+    if freedom is not GuidedFreedom.ALL:
+        held = slice(3, 6) if freedom is GuidedFreedom.TRANSLATION else slice(0, 3)
         J = terms.jacobian[held]
-        hold, error = _held(model, terms, kind, T_held)
+        hold, error = _held(model, terms, freedom, T_held)
         stiffness = stiffness + hold * (J.T @ J)
         spring = spring + J.T @ (hold * error)
     spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
@@ -82,10 +94,10 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     return design_damping(terms.mass_inverse, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
 
 
-def _held(model: RobotModel, terms: ToolTerms, kind: rci.DragType, T_held: Pose) -> tuple[float, Array]:
-    """Returns stiffness and error of what a Cartesian drag holds, the error of shape (3,) in base axes."""
+def _held(model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: Pose) -> tuple[float, Array]:
+    """Returns stiffness and error of what guiding holds, the error of shape (3,) in base axes."""
     cartesian = model.limits.cartesian
-    if kind is rci.DragType.ROTATION:
+    if freedom is GuidedFreedom.ROTATION:
         return cartesian.translation_stiffness, T_held.position - terms.pose.position
     return cartesian.rotation_stiffness, np.array(turn_between(terms.pose.parts[0], T_held.parts[0]))
 

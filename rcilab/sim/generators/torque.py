@@ -10,54 +10,53 @@ from __future__ import annotations
 
 from math import isfinite
 
-from rcilab.conformance.limit_violation import describe_breaches
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.conditions import rci_faults
-from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, MissedCycles, MotionLimits
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
+from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
+from rcilab.sim.generators.motion_limits import MotionLimits
+from rcilab.sim.jitter_buffer import Playback
+from rcilab.sim.violations import ArmCondition, ArmViolation
 
 
 class TorqueGenerator:
     """Follows commanded joint torques.
 
     Args:
-        terms: Of the motion.
+        bounds: Filters and limits of the motion.
     """
 
-    def __init__(self, terms: MotionLimits) -> None:
-        nothing = [0.0] * terms.model.n
-        self._n = terms.model.n
+    def __init__(self, bounds: MotionLimits) -> None:
+        nothing = [0.0] * bounds.model.n
+        self._n = bounds.model.n
         self._tau = nothing
         self._gap = MissedCycles()
         self._stream = CommandExtrapolator(nothing)
-        self._filter = LowPass(terms.settings.torque_filter, nothing)
-        self._monitor = TorqueMonitor(terms.limits.joint)
+        self._filter = LowPass(bounds.parameters.torque_filter, nothing)
+        self._monitor = TorqueMonitor(bounds.limits.joint)
         self._monitor.reset(nothing)
 
-    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+    def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        return self._stream.is_next(packet.tau_c[: self._n], steps, in_doubt)
+        return self._stream.is_next(command.tau[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's torques, or bridges a cycle that has none."""
-        packet, steps, is_lost, _ = playback
+        command, steps, is_lost, _ = playback
         cycles = self._gap.step(playback)
         tau = self._tau
-        if packet is not None:
-            tau = list(packet.tau_c[: self._n])
+        if command is not None:
+            tau = list(command.tau[: self._n])
             if not isfinite(sum(tau)):
                 reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
-                return GeneratorOutput(faults=(Fault.COMMAND_TORQUE_RANGE_VIOLATION,), reason=reason)
+                return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_TORQUES, reason),))
             if is_lost:
                 tau = [last + (goal - last) / steps for last, goal in zip(self._tau, tau, strict=True)]
         self._tau = tau
         self._stream.take(tau)
         tau = self._filter.step(tau)
-        if cycles > 0 and (breaches := self._monitor.step(tau, cycles)):
-            return GeneratorOutput(faults=rci_faults(breaches), reason=describe_breaches(breaches))
+        if cycles > 0 and (violations := self._monitor.step(tau, cycles)):
+            return GeneratorOutput(violations=tuple(violations))
         return GeneratorOutput(tau=tau)

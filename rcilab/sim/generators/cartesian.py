@@ -15,111 +15,106 @@ from math import dist, hypot, pi, remainder, tau
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.common_conditions import ARM_ANGLE_TOLERANCE
-from rcilab.conformance.limit_violation import LimitViolation, describe_breaches
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.conditions import rci_faults
-from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import (
+from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.command_extrapolator import CommandExtrapolator
+from rcilab.sim.filters import PoseLowPass
+from rcilab.sim.generators.generator import (
     GeneratorOutput,
     JointReference,
     MissedCycles,
-    MotionLimits,
     lost_motion,
+    with_jump,
 )
-from rcilab.makers.rokae.controller.modes.ik_tracker import IkTracker
-from rcilab.makers.rokae.controller.modes.start import StartMonitor, find_tool_jump
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.wire import CommandPacket
-from rcilab.sim.command_extrapolator import CommandExtrapolator
-from rcilab.sim.filters import PoseLowPass
-
-_INVALID = (Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME,)
-_ELBOW = (Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,)
+from rcilab.sim.generators.ik_tracker import IkTracker
+from rcilab.sim.generators.motion_limits import MotionLimits
+from rcilab.sim.generators.start import StartMonitor, find_tool_jump
+from rcilab.sim.jitter_buffer import Playback
+from rcilab.sim.violations import ArmCondition, ArmViolation
 
 
 class CartesianGenerator:
     """Follows commanded tool poses and arm angles.
 
     Args:
-        terms: Of the motion.
+        bounds: Filters and limits of the motion.
         q: Where the arm stands, n plain floats, [rad]; not at a singularity.
     """
 
-    def __init__(self, terms: MotionLimits, q: list[float]) -> None:
-        model = terms.model
-        self._terms = terms
+    def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
+        model = bounds.model
+        self._bounds = bounds
         self._has_begun = False
         self._jump: Remark | None = None
         self._has_psi = bool(model.redundancy)
         self._q = q
         self._psi = model.arm_angle(q) if self._has_psi else 0.0
-        limits = terms.limits.arm_angle
-        self._is_told = False  # Whether this motion's commands have had an arm angle.
+        limits = bounds.limits.arm_angle
+        self._had_psi = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
         pose = model.forward(q)
-        self._follower = IkTracker(model)
+        self._tracker = IkTracker(model)
         self._stream = CommandExtrapolator([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
-        self._filter = PoseLowPass(terms.settings.cartesian_filter, pose, self._psi)
+        self._filter = PoseLowPass(bounds.parameters.cartesian_filter, pose, self._psi)
         self._pose = pose
         self._monitor = self._monitor_from(pose, self._psi)
         self._start: StartMonitor[CartesianMonitor] | None = None
         self._gap = MissedCycles()
-        self._reference = JointReference(terms, q, judges_box=False)
+        self._reference = JointReference(bounds, q, checks_box=False)
         self._reference_has_begun = False
 
-    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+    def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        if find_frame_error(packet.T_base_tool_c) is not None:
+        if find_frame_error(command.T_base_tool) is not None:
             return True  # It is refused when it is played.
-        return self._stream.is_next(self._read(packet), steps, in_doubt)
+        return self._stream.is_next(self._read(command), steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's pose, or bridges a cycle that has none."""
-        packet, is_lost = playback.packet, playback.is_lost
+        command, is_lost = playback.command, playback.is_lost
         cycles = self._gap.step(playback)
-        if packet is None:
+        if command is None:
             values = self._stream.predict(1)
         else:
-            error = find_frame_error(packet.T_base_tool_c)
+            error = find_frame_error(command.T_base_tool)
             if error is not None:
-                return GeneratorOutput(faults=_INVALID, reason=Remark(error, "no_pose"))
-            if self._has_psi and packet.psi_valid and not abs(packet.psi_c) <= pi + ARM_ANGLE_TOLERANCE:
-                said = f"arm angle: commanded position {packet.psi_c} rad passes +-pi rad"
-                return GeneratorOutput(faults=_ELBOW, reason=Remark(said, "arm_angle", value=f"{packet.psi_c} rad"))
-            values = self._read(packet)
+                return _invalid_pose(Remark(error, "no_pose"))
+            if self._has_psi and command.has_psi and not abs(command.psi) <= pi + ARM_ANGLE_TOLERANCE:
+                said = f"arm angle: commanded position {command.psi} rad passes +-pi rad"
+                remark = Remark(said, "arm_angle", value=f"{command.psi} rad")
+                return GeneratorOutput(violations=(ArmViolation(ArmCondition.ARM_ANGLE_RANGE, remark),))
+            values = self._read(command)
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
         if not self._has_begun:
             self._begin(values)
         self._stream.take(values)
-        self._psi = remainder(values[7], tau) if packet is None or is_lost else self._arm_angle(packet)
-        self._is_told |= packet is not None and packet.psi_valid
+        self._psi = remainder(values[7], tau) if command is None or is_lost else self._arm_angle(command)
+        self._had_psi |= command is not None and command.has_psi
         try:
             pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
             pose, psi = self._filter.step(pose, self._psi)
         except InvalidValueError as error:  # Numbers so absurd that bridge or filter made no pose of them.
-            return GeneratorOutput(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_pose"))
-        return self._judge(pose, psi, cycles)
+            return _invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
+        return self._check(pose, psi, cycles)
 
-    def _judge(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
+    def _check(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
         if cycles > 0:
-            breaches = self._step_monitor(pose, psi if self._has_psi else None, cycles)
-            if breaches:
-                reason = describe_breaches(breaches)
-                return GeneratorOutput(
-                    faults=rci_faults(breaches), reason=Remark.all((self._jump, reason)) if self._jump else reason
-                )
+            violations = self._step_monitor(pose, psi if self._has_psi else None, cycles)
+            if violations:
+                return GeneratorOutput(violations=with_jump(self._jump, violations))
             self._jump = None
         try:
-            q = self._follower.solve(pose, psi, self._q)
+            q = self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a pose on its way: {error}", "no_angles"))
-            return GeneratorOutput(faults=_INVALID, reason=Remark(f"commanded pose: {error}", "no_angles"))
+            return _invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
         if not self._reference_has_begun:
             self._reference_has_begun = True
             self._reference.begin(q, None)  # Of the tool's, the tolerance has been looked at.
@@ -142,21 +137,21 @@ class CartesianGenerator:
         lag = remainder(psi - self._psi, tau)
         if not (translation or turn or lag):
             return
-        cartesian, arm_angle = self._terms.limits.cartesian, self._terms.limits.arm_angle
+        cartesian, arm_angle = self._bounds.limits.cartesian, self._bounds.limits.arm_angle
         h3 = CYCLE_TIME**3
         is_a_step = translation <= cartesian.translation_jerk * h3 and turn <= cartesian.rotation_jerk * h3
         if is_a_step and (arm_angle is None or abs(lag) <= arm_angle.jerk * h3):
             self._start = StartMonitor(self._monitor, self._monitor_from(pose, psi))
             return
-        self._jump = find_tool_jump(translation, turn, lag, self._terms.tolerance)
+        self._jump = find_tool_jump(translation, turn, lag, self._bounds.tolerance)
         if self._jump is None:
             self._stream = CommandExtrapolator(values)
-            self._filter = PoseLowPass(self._terms.settings.cartesian_filter, pose, psi)
+            self._filter = PoseLowPass(self._bounds.parameters.cartesian_filter, pose, psi)
             self._monitor = self._monitor_from(pose, psi)
 
     def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
-        terms = self._terms
-        monitor = CartesianMonitor(terms.limits, terms.entry_box())
+        bounds = self._bounds
+        monitor = CartesianMonitor(bounds.limits, bounds.entry_box())
         monitor.reset(pose, psi if self._has_psi else None)
         return monitor
 
@@ -164,27 +159,31 @@ class CartesianGenerator:
         start = self._start
         if start is None:
             return self._monitor.step(pose, psi, cycles)
-        breaches = start.step(pose, psi, cycles)
+        violations = start.step(pose, psi, cycles)
         self._monitor = start.monitor
         if start.is_decided:
             self._start = None
-        return breaches
+        return violations
 
-    def _read(self, packet: CommandPacket) -> list[float]:
+    def _read(self, command: ArmCommand) -> list[float]:
         """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""
-        m = packet.T_base_tool_c
+        m = command.T_base_tool
         w, x, y, z = wxyz_from_rotation((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))
         _, _, _, last_w, last_x, last_y, last_z, last_psi = self._stream.last
         if w * last_w + x * last_x + y * last_y + z * last_z < 0.0:
             w, x, y, z = -w, -x, -y, -z
-        psi = last_psi + remainder(self._arm_angle(packet) - last_psi, tau)
+        psi = last_psi + remainder(self._arm_angle(command) - last_psi, tau)
         return [m[3], m[7], m[11], w, x, y, z, psi]
 
-    def _arm_angle(self, packet: CommandPacket) -> float:
+    def _arm_angle(self, command: ArmCommand) -> float:
         if not self._has_psi:
             return 0.0
-        if packet.psi_valid:
-            return packet.psi_c
-        # The vendor's client marks an arm angle of exactly zero as none: it is meant where one was told before.
-        passes_zero = self._is_told and packet.psi_c == 0.0 and abs(self._psi) <= self._smallest_psi
+        if command.has_psi:
+            return command.psi
+        # The vendor's client marks an arm angle of exactly zero as none: it is meant where one was commanded before.
+        passes_zero = self._had_psi and command.psi == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
+
+
+def _invalid_pose(remark: Remark) -> GeneratorOutput:
+    return GeneratorOutput(violations=(ArmViolation(ArmCondition.VALID_POSE, remark),))

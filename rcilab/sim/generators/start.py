@@ -20,8 +20,8 @@ from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.actuator import ControlLaw
-from rcilab.makers.rokae.controller.settings import Settings
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.arm_parameters import ArmParameters
 
 SERVO_ERROR = 1e-3  # [rad] Static error of a joint on its servo, and rounding; the MuJoCo plant's stays below 0.2 mrad.
 SERVO_LENGTH = 1e-3  # [m] The same at the tool, at a lever of 1 m.
@@ -58,22 +58,22 @@ class StartTolerance:
         )
 
 
-def start_tolerance(law: ControlLaw, settings: Settings) -> StartTolerance:
+def start_tolerance(law: ControlLaw, parameters: ArmParameters) -> StartTolerance:
     """Returns what a control law makes of an arm's position: what a motion in it, or right after it, may be off.
 
     Args:
         law: Of the motion.
-        settings: With the stiffness of both impedances.
+        parameters: With the stiffness of both impedances.
     """
-    n = len(settings.joint_lower)
-    if not law.yields:
+    n = len(parameters.joint_lower)
+    if not law.is_compliant:
         return StartTolerance((SERVO_ERROR,) * n)
     if law is ControlLaw.JOINT_IMPEDANCE:
-        joint = tuple(_deflection(FORCE * LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in settings.joint_stiffness)
+        joint = tuple(_deflection(FORCE * LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in parameters.joint_stiffness)
         widest = max(joint)
         return StartTolerance(joint, min(widest * LEVER, WIDEST_LENGTH), widest, widest)
     if law is ControlLaw.CARTESIAN_IMPEDANCE:
-        *translations, a, b, c = settings.cartesian_stiffness
+        *translations, a, b, c = parameters.cartesian_stiffness
         translation = max(_deflection(FORCE, k, SERVO_LENGTH, WIDEST_LENGTH) for k in translations)
         rotation = max(_deflection(FORCE * TURNING_LEVER, k, SERVO_ERROR, WIDEST_ANGLE) for k in (a, b, c))
         return StartTolerance((WIDEST_ANGLE,) * n, translation, rotation, WIDEST_ANGLE)
@@ -149,7 +149,7 @@ class Stepping(Protocol):
 
     @property
     def step(self) -> Callable[..., Sequence[LimitViolation]]:
-        """Takes the commands of this cycle and returns what they break."""
+        """Takes the commands of this cycle and returns what they violate."""
         ...
 
 
@@ -158,7 +158,7 @@ _AMBIGUOUS = 4  # Commands after which a third difference no longer reaches the 
 
 
 class StartMonitor(Generic[_M]):
-    """Evaluates commands, the first few of which may be read in two ways; a violation is what breaks both.
+    """Evaluates commands, the first few of which may be read in two ways; what violates a condition in both counts.
 
     A first command that is off the reference by no more than one cycle's jerk is the first step of a motion from there,
     or the place where another motion begins. Owned by a motion generator.
@@ -182,16 +182,16 @@ class StartMonitor(Generic[_M]):
         return self._alternative is None
 
     def step(self, *signals: Any) -> Sequence[LimitViolation]:
-        """Takes the commands of this cycle and returns what they break."""
-        breaches = self.monitor.step(*signals)
+        """Takes the commands of this cycle and returns what they violate."""
+        violations = self.monitor.step(*signals)
         if self._alternative is not None:
             other = self._alternative.step(*signals)
-            if breaches and not other:
-                self.monitor, breaches = self._alternative, ()
+            if violations and not other:
+                self.monitor, violations = self._alternative, ()
             self._left -= 1
             if self._left == 0 or other or self.monitor is self._alternative:
                 self._alternative = None
-        return breaches
+        return violations
 
 
 class StartOffset:

@@ -10,50 +10,49 @@ from __future__ import annotations
 from math import isfinite
 
 from rcilab.i18n.translator import Remark
-from rcilab.makers.rokae.controller.jitter_buffer import Playback
-from rcilab.makers.rokae.controller.modes.generator import GeneratorOutput, JointReference, MissedCycles, MotionLimits
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
+from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles
+from rcilab.sim.generators.motion_limits import MotionLimits
+from rcilab.sim.jitter_buffer import Playback
+from rcilab.sim.violations import ArmCondition, ArmViolation
 
 
 class JointGenerator:
     """Follows commanded joint angles.
 
     Args:
-        terms: Of the motion.
+        bounds: Filters and limits of the motion.
         q: Where the arm stands, n plain floats, [rad].
     """
 
-    def __init__(self, terms: MotionLimits, q: list[float]) -> None:
-        self._n = terms.model.n
-        self._terms = terms
+    def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
+        self._n = bounds.model.n
+        self._bounds = bounds
         self._has_begun = False
         self._stream = CommandExtrapolator(q)
-        self._filter = LowPass(terms.settings.joint_filter, q)
+        self._filter = LowPass(bounds.parameters.joint_filter, q)
         self._gap = MissedCycles()
-        self._reference = JointReference(terms, q, judges_box=True)
+        self._reference = JointReference(bounds, q, checks_box=True)
 
-    def is_next(self, packet: CommandPacket, steps: int, in_doubt: bool) -> bool:
+    def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        return self._stream.is_next(packet.q_c[: self._n], steps, in_doubt)
+        return self._stream.is_next(command.q[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
         """Takes this cycle's angles, or bridges a cycle that has none."""
-        packet = playback.packet
+        command = playback.command
         cycles = self._gap.step(playback)
-        if packet is None:
+        if command is None:
             q = self._stream.predict(1)
         else:
-            q = list(packet.q_c[: self._n])
+            q = list(command.q[: self._n])
             if playback.is_lost:
                 q = self._stream.predict(1, q, playback.steps)
         if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
             reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
-            return GeneratorOutput(
-                faults=(Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,), reason=reason, is_number=False
-            )
+            return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
         if not self._has_begun:
             self._begin(q)
         self._stream.take(q)
@@ -62,6 +61,6 @@ class JointGenerator:
     def _begin(self, q: list[float]) -> None:
         """Takes the first command, which filter and prediction start from when the motion begins there."""
         self._has_begun = True
-        if self._reference.begin(q, self._terms.tolerance):
+        if self._reference.begin(q, self._bounds.tolerance):
             self._stream = CommandExtrapolator(q)
-            self._filter = LowPass(self._terms.settings.joint_filter, q)
+            self._filter = LowPass(self._bounds.parameters.joint_filter, q)

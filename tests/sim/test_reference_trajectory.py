@@ -27,7 +27,7 @@ def test_from_any_state_inside_the_limits_it_comes_to_rest_inside_acceleration_a
     # Not at full acceleration: where rounding decides, the manual's strict bounds leave nothing over.
     commanded, rows = moving(velocity * LIMITS.velocity, 0.95 * acceleration * LIMITS.acceleration)
     for _ in range(3000):
-        commanded.come_to_rest()
+        commanded.stop()
         rows.append(np.array(commanded.q))
         if commanded.is_at_rest:
             break
@@ -43,7 +43,7 @@ def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
     commanded.move([1e-6] * 7)
     goal = commanded.q
     for _ in range(3):
-        commanded.come_to_rest()
+        commanded.stop()
         assert commanded.q == goal
     assert commanded.is_at_rest
 
@@ -51,7 +51,7 @@ def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
 def test_resting_it_stays_at_rest() -> None:
     commanded = ReferenceTrajectory(LIMITS, [0.5] * 7)
     for _ in range(3):
-        commanded.come_to_rest()
+        commanded.stop()
     assert commanded.is_at_rest
     assert commanded.q == [0.5] * 7
 
@@ -63,7 +63,7 @@ def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(ve
     commanded.join(q.tolist(), dq.tolist(), ddq.tolist())
     rows = [q - 1e-3 * dq + 0.5e-6 * ddq, q]
     while not commanded.is_at_rest:
-        commanded.come_to_rest()
+        commanded.stop()
         rows.append(np.array(commanded.q))
         assert len(rows) < 3000
     assert (np.abs(np.diff(rows, 2, axis=0)) * 1e6 < LIMITS.acceleration).all()
@@ -74,5 +74,5 @@ def test_an_arm_that_was_thrown_beyond_reason_still_gets_a_stop() -> None:
     commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     commanded.join([0.0] * 7, [500.0] * 7, [1e5] * 7)
     for _ in range(3000):
-        commanded.come_to_rest()
+        commanded.stop()
     assert commanded.is_at_rest

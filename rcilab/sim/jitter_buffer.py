@@ -28,7 +28,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from rcilab.makers.rokae.wire import CommandPacket
+from rcilab.sim.arm_command import ArmCommand
 
 CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
@@ -41,10 +41,10 @@ LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (ma
 class Playback(NamedTuple):
     """What one cycle gets from the buffer."""
 
-    packet: CommandPacket | None
+    command: ArmCommand | None
     """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None when there is none."""
     steps: int
-    """Cycles from now to when `packet` is due, 1 for now."""
+    """Cycles from now to when `command` is due, 1 for now."""
     is_lost: bool
     """The motion runs and this cycle has no command."""
     skipped: int = 0
@@ -72,7 +72,7 @@ class JitterBuffer:
 
     def __init__(self, prefill: int) -> None:
         self._prefill = prefill
-        self._queue: deque[CommandPacket] = deque()
+        self._queue: deque[ArmCommand] = deque()
         self.begin()
 
     def begin(self, *, most: int | None = None) -> None:
@@ -85,7 +85,7 @@ class JitterBuffer:
         self._queue.clear()
         self._stock = most
         self._countdown = self._prefill if self._stock is None else self._stock
-        self._newest: CommandPacket | None = None
+        self._newest: ArmCommand | None = None
         self._lives = False
         self._lowest, self._looked, self._excess = CAPACITY, 0, 0
         self._outcomes: deque[bool] = deque(maxlen=WINDOW)
@@ -116,25 +116,25 @@ class JitterBuffer:
         """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
 
-    def push(self, packet: CommandPacket) -> None:
+    def push(self, command: ArmCommand) -> None:
         """Takes a command from the network."""
         queue, newest = self._queue, self._newest
-        if packet == newest:
+        if command == newest:
             self.copies += 1
             self._lives = True
             return
-        is_overtaken = newest is not None and 0 < newest.message_id - packet.message_id <= LONGEST_GAP
+        is_overtaken = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
         if not is_overtaken:
-            self._newest = packet
-        if self._is_late(packet):
+            self._newest = command
+        if self._is_late(command):
             self.late += 1
-        elif is_overtaken and packet in queue:
+        elif is_overtaken and command in queue:
             self.copies += 1
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
                 self.dropped += 1
-            queue.append(packet)
+            queue.append(command)
 
     def work_off(self) -> bool:
         """Returns whether a cycle more is due now: many more commands than the prefill waited through the last window.
@@ -146,12 +146,13 @@ class JitterBuffer:
         self._excess -= 1
         return True
 
-    def take(self, is_next: Callable[[CommandPacket, int, bool], bool]) -> Playback:
+    def take(self, is_next: Callable[[ArmCommand, int, bool], bool]) -> Playback:
         """Returns what this cycle plays.
 
         Args:
-            is_next: Asked about a command whose id is a few cycles ahead, `(packet, steps, in_doubt)`: does it continue
-                the motion by one step (true) or by that many (false)? `in_doubt` is the answer where neither is clear.
+            is_next: Asked about a command whose id is a few cycles ahead, `(command, steps, in_doubt)`: does it
+                continue the motion by one step (true) or by that many (false)? `in_doubt` is the answer where
+                neither is clear.
         """
         if self.is_finished:
             return _WAITING
@@ -164,40 +165,40 @@ class JitterBuffer:
                 return _WAITING
             self.is_playing = True
             self._skip_old()
-            first = self._queue[0].message_id
+            first = self._queue[0].number
             self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
         self._look_for_excess()
         skipped = self._skip_old()
         lives, self._lives = self._lives, False
         if not self._queue:
             return self._wait_alive() if lives else self._lose(_EMPTY)
-        packet = self._queue[0]
-        steps = self._steps_to(packet, is_next)
+        command = self._queue[0]
+        steps = self._steps_to(command, is_next)
         if steps > 1:  # Unless a command that was overtaken fills the gap, its cycles are lost.
-            between = (other for other in self._queue if self._last_id < other.message_id < packet.message_id)
-            packet = min(between, key=lambda other: other.message_id, default=packet)
-            steps = self._steps_to(packet, is_next)
+            between = (other for other in self._queue if self._last_id < other.number < command.number)
+            command = min(between, key=lambda other: other.number, default=command)
+            steps = self._steps_to(command, is_next)
             if steps > 1:
-                return self._lose(Playback(packet, steps, True))
-        return self._play(packet, skipped)
+                return self._lose(Playback(command, steps, True))
+        return self._play(command, skipped)
 
     def _ids(self) -> Iterator[int]:
-        return (packet.message_id for packet in self._queue)
+        return (command.number for command in self._queue)
 
-    def _steps_to(self, packet: CommandPacket, is_next: Callable[[CommandPacket, int, bool], bool]) -> int:
+    def _steps_to(self, command: ArmCommand, is_next: Callable[[ArmCommand, int, bool], bool]) -> int:
         """Returns how many cycles from now a command is due, 1 for now."""
-        ahead = packet.message_id - self._last_id
+        ahead = command.number - self._last_id
         if not 1 < ahead <= LONGEST_GAP:
             return 1
         unexplained = max(ahead - self._surplus, 1)
         if unexplained == 1:
-            return 1 if is_next(packet, ahead, True) else ahead
-        return 1 if is_next(packet, unexplained, False) else unexplained
+            return 1 if is_next(command, ahead, True) else ahead
+        return 1 if is_next(command, unexplained, False) else unexplained
 
-    def _is_late(self, packet: CommandPacket) -> bool:
+    def _is_late(self, command: ArmCommand) -> bool:
         """Returns whether the cycle that a command is for has passed already."""
-        behind = self._last_id - packet.message_id
-        if packet.message_id in self._passed_over:
+        behind = self._last_id - command.number
+        if command.number in self._passed_over:
             return False
         return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
 
@@ -215,7 +216,7 @@ class JitterBuffer:
             return 0
         skipped = max(0, len(self._queue) - self._stock - 1)
         for _ in range(skipped):
-            self._advance_to(self._queue.popleft().message_id)
+            self._advance_to(self._queue.popleft().number)
         return skipped
 
     def _wait_alive(self) -> Playback:
@@ -225,13 +226,13 @@ class JitterBuffer:
         self._count(True)
         return _EMPTY
 
-    def _play(self, packet: CommandPacket, skipped: int) -> Playback:
-        self._queue.remove(packet)
-        self._advance_to(packet.message_id)
+    def _play(self, command: ArmCommand, skipped: int) -> Playback:
+        self._queue.remove(command)
+        self._advance_to(command.number)
         self.lost_in_row = 0
-        self.is_finished = packet.finished
+        self.is_finished = command.finished
         self._count(True)
-        return Playback(packet, 1, False, skipped)
+        return Playback(command, 1, False, skipped)
 
     def _advance_to(self, played: int) -> None:
         """Takes note of the id that is played now."""

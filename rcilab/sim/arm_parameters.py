@@ -1,0 +1,70 @@
+"""What can be configured on a virtual arm, in neutral terms; a maker's settings build on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from rcilab.core.arrays import readonly_copy
+from rcilab.core.limits import JointLimits
+from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.sim.filters import SAMPLING_RATE
+
+Floats = tuple[float, ...]
+
+
+class ForceAxesKind(Enum):
+    """Whose directions the axes of the force-control frame have."""
+
+    WORLD = "world"
+    """Those of the base."""
+    TOOL = "tool"
+    """Those of the frame itself."""
+    PATH = "path"
+    """x along the commanded velocity of the tool."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmParameters:
+    """Values that a client configures; vectors have n plain floats."""
+
+    joint_lower: Floats
+    """Soft limits, [rad]."""
+    joint_upper: Floats
+    """[rad]."""
+    collision_thresholds: Floats
+    """[N m]."""
+    joint_stiffness: Floats
+    """[N m/rad]."""
+    cartesian_stiffness: Floats
+    """Three translations [N/m], three rotations [N m/rad]."""
+    desired_wrench: Floats = (0.0,) * 6
+    """What Cartesian impedance presses with, [N, N m]."""
+    T_flange_tool: Pose = IDENTITY
+    load: Payload = NO_LOAD
+    joint_filter: float = SAMPLING_RATE
+    """Cut-off frequency of the low pass on commanded joint angles, [Hz]. Off after power-up: a client that filters
+    before it sends is not filtered twice, one that does not is followed exactly."""
+    cartesian_filter: float = SAMPLING_RATE
+    """The same for commanded poses, [Hz]."""
+    torque_filter: float = SAMPLING_RATE
+    """The same for commanded torques, [Hz]."""
+    safety_box: SafetyBox | None = None
+    T_flange_force: Pose = IDENTITY
+    """Force-control frame."""
+    force_axes: ForceAxesKind = ForceAxesKind.WORLD
+    virtual_guide: bool = False
+    """Whether walls push the tool back into the active safety box wherever the arm is compliant."""
+    auto_limit: bool = False
+    """Whether commanded joint angles are stopped inside the soft limits instead of violating them."""
+
+    def soft_limits(self, joint: JointLimits) -> JointLimits:
+        """Returns the limits of an arm's joints with the soft limits as position bounds."""
+        return replace(joint, lower=readonly_copy(self.joint_lower), upper=readonly_copy(self.joint_upper))
+
+    @property
+    def guiding_box(self) -> SafetyBox | None:
+        """The box whose walls push; None when there are no such walls."""
+        return active_box(self.safety_box) if self.virtual_guide else None

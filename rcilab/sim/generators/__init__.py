@@ -1,0 +1,25 @@
+"""Motion generators: one for each motion, from a client's commands to a reference that the arm can follow."""
+
+from __future__ import annotations
+
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.generators.cartesian import CartesianGenerator
+from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
+from rcilab.sim.generators.joint import JointGenerator
+from rcilab.sim.generators.motion_limits import Mode, MotionLimits
+from rcilab.sim.generators.torque import TorqueGenerator
+
+__all__ = ["GeneratorOutput", "Mode", "MotionGenerator", "build_generator"]
+
+
+def build_generator(mode: Mode, bounds: MotionLimits, q: list[float]) -> MotionGenerator:
+    """Returns the generator of a motion that begins now.
+
+    Args:
+        mode: What is commanded, under which control law.
+        bounds: Filters and limits of the motion.
+        q: Reference of the stationary arm, n plain floats, [rad].
+    """
+    if mode.law is ControlLaw.TORQUE:
+        return TorqueGenerator(bounds)
+    return CartesianGenerator(bounds, q) if mode.is_cartesian else JointGenerator(bounds, q)

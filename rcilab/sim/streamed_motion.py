@@ -1,0 +1,90 @@
+"""A motion that a client streams: one command a cycle, from the jitter buffer through a motion generator."""
+
+from __future__ import annotations
+
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.i18n.translator import Remark
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
+from rcilab.sim.generators.motion_limits import Mode
+from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer
+from rcilab.sim.violations import ArmCondition, ArmViolation
+
+PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
+# busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
+TORQUE_PREFILL = 2  # [cycles] The same for torques: the client closes the loop, and delay makes it oscillate.
+LOST_LIMIT = 20  # [cycles] Lost commands in a row that end a motion (RCI manual 4.6: usually 10 to 20).
+DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after the end of the stream; longer than any queue.
+
+
+class StreamedMotion:
+    """The commands of a client, played one a cycle. Owned by the virtual arm.
+
+    Attributes:
+        playout: The queue of commands, with its counts.
+        is_followed: Whether commands are played: from `begin` to `discard`, or until `drain` has played what is queued.
+
+    Args:
+        prefill: Cycles between the first command and its play-out.
+        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        lost_limit: Lost cycles in a row that end the motion with a violation; None never does.
+    """
+
+    def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
+        self.playout = JitterBuffer(prefill)
+        self.is_followed = False
+        self.mode = Mode(ControlLaw.POSITION, False)
+        self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
+        self._lost_limit = lost_limit
+        self._generator: MotionGenerator | None = None
+        self._drain: int | None = None  # Cycles that are left for what is queued; None until the stream has ended.
+
+    @property
+    def law(self) -> ControlLaw:
+        """The control law that follows the commands."""
+        is_over = self.mode.law.is_force_driven and self.playout.is_finished  # No command holds the arm any more.
+        return ControlLaw.POSITION if is_over else self.mode.law
+
+    def prepare(self, mode: Mode) -> None:
+        """Forgets the last motion, ready for one in this mode."""
+        self.mode = mode
+        self.playout.begin(most=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
+
+    def begin(self, generator: MotionGenerator) -> None:
+        """Plays commands from now on."""
+        self._generator = generator
+        self.is_followed, self._drain = True, None
+
+    def drain(self) -> None:
+        """Plays what is queued, and no more."""
+        self._drain = DRAIN_LIMIT
+
+    def discard(self) -> None:
+        """Forgets what is queued; nothing is followed any more."""
+        self.is_followed = False
+        self.playout.clear()
+
+    def step(self) -> GeneratorOutput | None:
+        """Plays what is due in this cycle; None: nothing is. An output with violations must not be followed."""
+        playout = self.playout
+        if self._drain is not None:
+            self._drain = self._drain - 1 if len(playout) else 0
+            if self._drain == 0:
+                self.is_followed = False
+                return None
+        generator = self._generator
+        assert generator is not None  # `begin` has set it.
+        playback = playout.take(generator.is_next)
+        if playback.command is None and not playback.is_lost:
+            return None
+        output = generator.step(playback)
+        if playback.is_lost and self._lost_limit is not None and playout.lost_in_row >= self._lost_limit:
+            return GeneratorOutput(violations=(ArmViolation(ArmCondition.COMMANDS_ARRIVE, self._describe_loss()),))
+        return output
+
+    def _describe_loss(self) -> Remark:
+        if not self.playout.is_playing:
+            seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
+            return Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
+        lost = self.playout.lost_in_row
+        return Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost)

@@ -1,0 +1,333 @@
+"""A virtual arm: reference, drives, plant and sensors, advanced together one cycle at a time. It knows no maker.
+
+Each `step` plays one command of the motion in progress, or goes on stopping, checks it, moves the plant and reads the
+sensors. What it finds wrong is in the result as violations; the maker's controller turns them into its own faults.
+
+On a violation the arm reacts as a position controller does: the command that violates a condition is not followed,
+queued commands are forgotten, and the arm stops on one path, `ReferenceTrajectory.stop`, inside its acceleration and
+jerk limits, under the position servo; then the brakes engage. Where the arm followed its reference the stop begins at
+the last good command; where it was compliant (impedance, torque, hand guiding), at its measured position and velocity.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, readonly_copy
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.limits import Limits
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.actuator import Actuator, ControlLaw
+from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.generators import build_generator
+from rcilab.sim.generators.motion_limits import Mode, build_motion_limits
+from rcilab.sim.generators.start import start_tolerance
+from rcilab.sim.hand_guiding import GuidedFreedom
+from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.measured_state import MeasuredStateMonitor
+from rcilab.sim.plant import Measurement, Plant, Setpoint
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
+from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, StreamedMotion
+from rcilab.sim.tool_kinematics import ToolKinematics
+from rcilab.sim.violations import Violations
+
+STANDSTILL = 1e-4  # [rad/s] A joint below it stands still, 0.006 deg/s: far below what an eye or a tool notices.
+SETTLE_LIMIT = 300  # [cycles] How long to wait for an arm that something keeps off its reference.
+
+
+class CycleSignals(NamedTuple):
+    """The signals of one cycle."""
+
+    commanded: ReferenceTrajectory
+    tool_c: ToolKinematics
+    """The tool of the commanded motion."""
+    measured: Measurement
+    tool: ToolKinematics
+    """The tool as measured."""
+    tau_c: list[float] | None
+    """Commanded torques, [N m]; None while none are commanded."""
+    tau_ext: JointVector
+    """External joint torques, [N m]."""
+    wrench: Array
+    """External wrench on the tool, base axes, [N, N m]."""
+
+
+class StepResult(NamedTuple):
+    """What went wrong in one cycle; both are empty in nearly every cycle."""
+
+    command_violations: Violations = ()
+    """Of the command, or of its absence. Then no measurement is checked in this cycle."""
+    measured_violations: Violations = ()
+    """Of the measurement: the command of this cycle has been followed."""
+
+
+_CLEAN = StepResult()
+
+
+class VirtualArm:
+    """One arm. Owned by the loop that calls `step`, once a cycle.
+
+    Attributes:
+        model: The arm with the configured tool and load.
+        plant: What moves.
+        commanded: The commanded joint angles.
+        tool_c: The tool at the commanded joint angles.
+        measured_state: The sensors.
+        resting_law: The control law while no command is followed. BRAKED engages the brakes once the arm stands still.
+        is_monitored: Whether measurements are checked.
+
+    Args:
+        model: The arm.
+        plant: What moves.
+        parameters: What the client has configured.
+        prefill: Cycles between the first command of a motion and its play-out.
+        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        lost_limit: Lost cycles in a row that end a motion; None never does.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        plant: Plant,
+        parameters: ArmParameters,
+        *,
+        prefill: int = PREFILL,
+        torque_prefill: int | None = None,
+        lost_limit: int | None = LOST_LIMIT,
+    ) -> None:
+        self.model = model
+        self.plant = plant
+        measured = plant.reset(model.home)
+        q = measured.q.tolist()
+        self.commanded = ReferenceTrajectory(model.limits.joint, q)
+        self.tool_c = ToolKinematics(model, q)
+        self.measured_state = MeasuredStateMonitor(model, measured)
+        self.resting_law = ControlLaw.BRAKED
+        self.is_monitored = False
+        self._parameters = parameters
+        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
+        self._actuator = Actuator(model, parameters)
+        self._tau_c: list[float] | None = None
+        self._tool_version = self.commanded.version
+        self._law = ControlLaw.BRAKED
+        self._last_compliance: ControlLaw | None = None  # Until commands have moved the arm on its servos.
+        self._dq_before = measured.dq
+        self._cycles_at_rest = 0
+        self._setpoint: Setpoint | None = None
+
+    @property
+    def playout(self) -> JitterBuffer:
+        """The queue of commands, with its counts."""
+        return self._motion.playout
+
+    @property
+    def is_following(self) -> bool:
+        """Whether commands are played."""
+        return self._motion.is_followed
+
+    @property
+    def is_standstill(self) -> bool:
+        """Whether its reference is stationary and its joints have stopped."""
+        return self.commanded.is_at_rest and (self._cycles_at_rest > SETTLE_LIMIT or self._is_slow())
+
+    @property
+    def can_engage_brakes(self) -> bool:
+        """Whether it stands still at its reference: servos settle, and a compliant arm may always move."""
+        may_rest = self.commanded.is_at_rest and not self._law.is_compliant
+        return may_rest and (
+            self._cycles_at_rest > SETTLE_LIMIT or self.measured_state.measured.q.tolist() == self.commanded.q
+        )
+
+    @property
+    def has_settled(self) -> bool:
+        """Whether no count goes on here any more, and the control law stays what it is."""
+        return self._cycles_at_rest > SETTLE_LIMIT and self._current_law() is self._law
+
+    @property
+    def signals(self) -> CycleSignals:
+        """The signals of the last cycle."""
+        sensors = self.measured_state
+        return CycleSignals(
+            self.commanded,
+            self.tool_c,
+            sensors.measured,
+            sensors.tool,
+            self._tau_c,
+            sensors.tau_ext,
+            sensors.wrench,
+        )
+
+    def reset(self, q: JointVector) -> None:
+        """Places the stationary arm somewhere else."""
+        measured = self.plant.reset(readonly_copy(q))
+        self.commanded.place(measured.q.tolist())
+        self.tool_c.place(self.commanded.q)
+        self._tool_version = self.commanded.version
+        self._dq_before = measured.dq
+        self.measured_state.configure(self.model, measured)
+
+    def configure(self, parameters: ArmParameters) -> None:
+        """Takes new parameters; another tool or load only at standstill."""
+        self._parameters = parameters
+        tool, load = parameters.T_flange_tool, parameters.load
+        if tool is not self.model.T_flange_tool or load is not self.model.load:
+            self.model = self.model.with_tool(tool).with_load(load)
+            self.plant.configure(self.model)
+            measured = self.plant.reset(self.measured_state.measured.q)
+            self.tool_c = ToolKinematics(self.model, self.commanded.q)
+            self._dq_before = measured.dq
+            self.measured_state.configure(self.model, measured)
+        self._actuator.configure(self.model, parameters)
+
+    def prepare_motion(self, mode: Mode) -> None:
+        """Forgets the last motion, ready for one in this mode."""
+        self._motion.prepare(mode)
+
+    def begin_motion(self, limits: Limits) -> None:
+        """Follows commands from now on, from the present reference.
+
+        Args:
+            limits: Of the arm, as they apply to this motion.
+        """
+        mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
+        tolerance = start_tolerance(mode.law, parameters)
+        if self._last_compliance is not None:
+            tolerance = tolerance.widened(start_tolerance(self._last_compliance, parameters))
+        starts = (sensors.measured.q, np.array(self.commanded.q))
+        tools = (sensors.tool.pose, self.tool_c.pose)
+        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance)
+        self._motion.begin(build_generator(mode, bounds, list(self.commanded.q)))
+        sensors.begin(
+            bounds.limits,
+            bounds.entry_box(),
+            parameters.collision_thresholds,
+            checks_tool=mode.is_cartesian,
+            is_compliant=mode.law.is_compliant,
+        )
+        self._tau_c = [0.0] * self.model.n if mode.law is ControlLaw.TORQUE else None
+
+    def drain_motion(self) -> None:
+        """Plays what is queued, then stops."""
+        self._motion.drain()
+
+    def discard_motion(self) -> None:
+        """Forgets what is queued and stops."""
+        self._motion.discard()
+
+    def begin_guiding(self, freedom: GuidedFreedom) -> None:
+        """Begins hand guiding at the present pose, as soon as `resting_law` is GUIDE."""
+        self._actuator.begin_guiding(freedom, self.measured_state.measured)
+
+    def receive(self, command: ArmCommand) -> bool:
+        """Queues a command; returns whether one was expected."""
+        if self._motion.is_followed:
+            self._motion.playout.push(command)
+        return self._motion.is_followed
+
+    def step(self, command: ArmCommand | None = None) -> StepResult:
+        """Advances by one cycle: the reference goes on, the plant moves, the sensors are read.
+
+        Args:
+            command: Queued first; None: nothing new.
+        """
+        if command is not None:
+            self.receive(command)
+        result = _CLEAN
+        has_moved = False
+        if self._motion.is_followed:
+            output = self._motion.step()
+            if output is not None and output.violations:
+                result = StepResult(command_violations=output.violations)
+                self._react()
+            elif output is not None:
+                has_moved = True
+                self._tau_c = output.tau
+                if output.q is not None:
+                    self.commanded.move(output.q, output.differences)
+        law = self._current_law()
+        if law is not ControlLaw.TORQUE:
+            self._tau_c = None
+        self._move(law, has_moved=has_moved)
+        if self.is_monitored:
+            # The arm's own stop is a motion of the joints: nothing is commanded of the tool's motion meanwhile.
+            violations = self.measured_state.check(is_commanded=self._motion.is_followed)
+            if violations:
+                result = StepResult(measured_violations=violations)
+                self._react()
+        return result
+
+    def hold(self) -> bool:
+        """Advances a settled arm by one cycle; returns whether its signals are those of the cycle before.
+
+        Only after a cycle with the signals of the one before, and `has_settled`: then `step` would come to the same
+        setpoint, and to the same signals unless the plant measures something else.
+        """
+        assert self._setpoint is not None
+        measured = self.plant.step(self._setpoint)
+        if measured is self.measured_state.measured:
+            return True
+        self._take(self._law, measured)
+        return False
+
+    def _react(self) -> None:
+        self._motion.discard()
+        self.resting_law = ControlLaw.BRAKED
+        self.is_monitored = False
+
+    def _current_law(self) -> ControlLaw:
+        if self._motion.is_followed:
+            return self._motion.law
+        law = self.resting_law
+        return ControlLaw.POSITION if law is ControlLaw.BRAKED and not self.can_engage_brakes else law
+
+    def _move(self, law: ControlLaw, *, has_moved: bool) -> None:
+        """Moves the plant by one cycle.
+
+        When a compliant arm is not to be compliant any more, the reference starts again from the measured position and
+        velocity.
+
+        Args:
+            law: How the reference becomes a setpoint.
+            has_moved: Whether the commanded angles are those of this cycle already; otherwise they stop.
+        """
+        commanded, last = self.commanded, self.measured_state.measured
+        if self._law.is_compliant and not law.is_compliant:
+            ddq: list[float] = ((last.dq - self._dq_before) / CYCLE_TIME).tolist()
+            commanded.join(last.q.tolist(), last.dq.tolist(), ddq)
+        if has_moved and not law.is_compliant:
+            self._last_compliance = None
+        if not (law.is_force_driven or commanded.is_at_rest or has_moved):
+            commanded.stop()
+        if not law.is_force_driven:
+            self._move_tool()
+        self._setpoint = self._actuator.setpoint(law, commanded, self.tool_c, last, self._tau_c)
+        self._take(law, self.plant.step(self._setpoint))
+
+    def _take(self, law: ControlLaw, measured: Measurement) -> None:
+        """Takes the measurement of this cycle."""
+        commanded, last = self.commanded, self.measured_state.measured
+        if law.is_force_driven:
+            commanded.move(measured.q.tolist())
+            self._move_tool()
+        elif law is ControlLaw.BRAKED and measured.q.tolist() != commanded.q:
+            commanded.place(measured.q.tolist())
+            self._move_tool()
+        self._law, self._dq_before = law, last.dq
+        if law.is_compliant:
+            self._last_compliance = law
+        self._cycles_at_rest = self._cycles_at_rest + 1 if commanded.is_at_rest else 0
+        self.measured_state.observe(measured, commanded, self.tool_c)
+
+    def _is_slow(self) -> bool:
+        speeds: list[float] = self.measured_state.measured.dq.tolist()
+        return -STANDSTILL < min(speeds) and max(speeds) < STANDSTILL
+
+    def _move_tool(self) -> None:
+        commanded, tool = self.commanded, self.tool_c
+        if commanded.version != self._tool_version or not tool.is_at_rest:
+            q, dq, _ = commanded.arrays
+            tool.update(commanded.q, self.model.rigid_body.tool_motion(q, dq))
+            self._tool_version = commanded.version
