@@ -204,7 +204,7 @@ def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
     playout.take(by_whole_gap)
     for _ in range(3):
         playout.push(first)
-        assert playout.take(by_whole_gap).packet is None
+        assert playout.take(by_whole_gap).command is None
     assert (playout.lost, playout.lost_in_row, playout.success_rate) == (0, 0, 1.0)
     playout.push(command(9))  # The states 6 to 8 never came; their cycles were spent on what it said again.
     assert take_ids(playout, 1) == [9]
