@@ -18,8 +18,9 @@ from collections.abc import Iterable
 from enum import Enum
 from typing import Final, NamedTuple
 
+from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.faults import RANGE_FAULTS, Fault
-from rcilab.sim.violations import ArmCondition, Violation
+from rcilab.sim.violations import ArmCondition, ArmViolation, Violation
 
 
 class FaultSource(Enum):
@@ -96,24 +97,25 @@ ARM_FAULTS: Final = {
     ArmCondition.COMMANDS_ARRIVE: Fault.INSTABILITY_DETECTION,
     ArmCondition.NO_COLLISION: Fault.COLLISION,
 }
-"""The fault of every condition that is no row of the condition table; those name their own."""
-
-
-def fault_of(violation: Violation) -> Fault | None:
-    """Returns the fault that a violation raises."""
-    condition = violation.condition
-    fault = ARM_FAULTS[condition] if isinstance(condition, ArmCondition) else condition.fault
-    return fault if isinstance(fault, Fault) else None
+"""The fault of every condition that is not a row of the condition table."""
 
 
 def faults_of(violations: Iterable[Violation]) -> tuple[Fault, ...]:
     """Returns the faults that violations raise, in wire order and once each."""
-    return tuple(sorted({fault for violation in violations if (fault := fault_of(violation)) is not None}))
+    faults: set[Fault | None] = set()
+    for violation in violations:
+        if isinstance(violation, ArmViolation):
+            faults.add(ARM_FAULTS[violation.condition])
+        else:
+            faults.update(rci_faults((violation,)))
+    return tuple(sorted(fault for fault in faults if fault is not None))
 
 
 def is_beyond_range(violation: Violation) -> bool:
-    """Returns whether a joint is beyond its range, which costs motor power; no number is in no place."""
-    return violation.condition is not ArmCondition.FINITE_ANGLES and fault_of(violation) in RANGE_FAULTS
+    """Returns whether a joint is beyond its range, which costs motor power. An angle that is not finite is not."""
+    return violation.condition is not ArmCondition.FINITE_ANGLES and not RANGE_FAULTS.isdisjoint(
+        faults_of((violation,))
+    )
 
 
 def as_text() -> str:
