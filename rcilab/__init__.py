@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from rcilab.notebook.plot import plot as plot
     from rcilab.notebook.preview import preview as preview
     from rcilab.recording.run import Run as Run
-    from rcilab.recording.run_file import load_run as load_run
+    from rcilab.recording.run import load_run as load_run
 
 __version__ = "0.2.0"
 
@@ -64,7 +64,7 @@ _HOMES = {
     "check": "rcilab.conformance.check",
     "connect": "rcilab.execution.session",
     "load_model": "rcilab.model.robot_model",
-    "load_run": "rcilab.recording.run_file",
+    "load_run": "rcilab.recording.run",
     "plan_arc": "rcilab.motion.cartesian",
     "plan_circle": "rcilab.motion.cartesian",
     "plan_joint": "rcilab.motion.joint",

@@ -26,7 +26,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C or a termination signal."""
-    from rcilab.recording.run_file import load_run
+    from rcilab.recording.run import load_run
 
     token = find_page_token(args)
     found = load_run(args.file, max_rows=args.max_rows)

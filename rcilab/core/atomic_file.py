@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import IO
 
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.error_base import InvalidValueError
 
 
 @contextmanager

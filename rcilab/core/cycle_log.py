@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.atomic_file import replacing
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.error_base import InvalidValueError
 
 STATE_FIELDS = ("tau_ext_in_base", "tau_ext_in_stiff", "T_base_tool", "theta")
 """What else of a state a row holds, by the names that `RobotState` has for it, in the order of the row."""

@@ -6,13 +6,12 @@ from rcilab.motion.cartesian import plan_arc, plan_circle, plan_line, plan_nulls
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.margin import LIMIT_MARGIN
-from rcilab.motion.motion import Motion, MotionSample, TimeLaw, require_motion
+from rcilab.motion.motion import Motion, MotionSample, TimeLaw, motion_through, require_motion
 from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.plan_program import plan_program
 from rcilab.motion.program import Program
 from rcilab.motion.recovery import plan_recovery
-from rcilab.motion.spline import motion_through
 from rcilab.motion.stop import plan_stop
 from rcilab.motion.waypoint import Waypoint
 

@@ -6,7 +6,8 @@ import hashlib
 import math
 from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import BinaryIO, Literal, TypeAlias
+from pathlib import Path
+from typing import IO, BinaryIO, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.core.file_bounds import MOST_ROWS, require_rows
 from rcilab.i18n.locale import Language
 from rcilab.i18n.localized_text import language
 from rcilab.i18n.translator import Remark
+from rcilab.motion import storage
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
+from rcilab.motion.samples import is_on_grid, read_samples
+from rcilab.motion.spline import spline_through
 
 TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
 """How a motion runs along its path: as fast as all limits allow, the same with the recommended torque rate kept too, by
@@ -103,8 +107,6 @@ class Motion:
         Raises:
             InvalidValueError: Not finite, no times or too many, or the times do not increase.
         """
-        from rcilab.motion.spline import motion_through
-
         if (dt is None) == (times is None):
             problem = "needs either dt= (seconds between samples) or times=; rows of 1 ms go into Motion.from_cycles"
             raise InvalidValueError("dt and times", (dt, times), problem)
@@ -251,9 +253,7 @@ class Motion:
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
         """
-        from rcilab.motion.storage import save_motion
-
-        save_motion(self, file)
+        storage.save(file, self._write_npz, lambda stream: storage.write_rows(stream, self.times, self.q))
 
     @classmethod
     def load(cls, file: str | PathLike[str] | BinaryIO, *, max_rows: int = MOST_ROWS) -> Motion:
@@ -269,9 +269,12 @@ class Motion:
             InvalidValueError: There is no such file, it holds no sound motion, or too much.
             VersionMismatchError: It was written by another version of this format.
         """
-        from rcilab.motion.storage import load_motion
-
-        return load_motion(file, max_rows)
+        if not storage.is_csv(file):
+            return storage.read_content(file, max_rows, cls)
+        times, q = read_samples(file, None, "rad", max_rows)  # type: ignore[arg-type]  # A name: streams are .npz.
+        if is_on_grid(times):
+            return cls.from_cycles(q)
+        return _short_enough(motion_through(times, q), max_rows, file)  # type: ignore[arg-type]
 
     @classmethod
     def load_samples(
@@ -302,9 +305,7 @@ class Motion:
             InvalidValueError: There is no such file, or it holds no sound samples, or too many; the message names the
                 line.
         """
-        from rcilab.motion.samples import load_samples
-
-        return load_samples(file, rate_hz=rate_hz, unit=unit, max_rows=max_rows)
+        return _short_enough(motion_through(*read_samples(file, rate_hz, unit, max_rows)), max_rows, file)
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)
@@ -321,6 +322,18 @@ class Motion:
         title = caption.format(law=self.law, duration=self.duration, speed=self.speed)
         return f"<table><caption>{title}</caption>{''.join(degrees)}</table>"
 
+    def _write_npz(self, stream: IO[bytes]) -> None:
+        content = {
+            "law": np.array(self.law),
+            "speed": np.array(self.speed),
+            "breaks": self.polynomial.breaks,
+            "coefficients": self.polynomial.coefficients,
+            "goal": self.goal,
+            "segment_starts": self.segment_starts,
+            "notes": np.array(self.notes, dtype=np.str_),
+        }
+        storage.write_arrays(stream, content)
+
     def _kept(self, name: str) -> Array:
         # Two threads may both compute it; they get equal arrays and one of them stays.
         if name not in self._cache:
@@ -336,6 +349,27 @@ class Motion:
             array[-1] = 0.0 if derivative else self.goal
         # Rows of bytes: what was judged cannot be made writable again, as an array of its own could.
         return np.frombuffer(array.tobytes()).reshape(array.shape)
+
+
+def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
+    """Returns the motion through joint angles at given times: a cubic spline that starts and ends at standstill.
+
+    Limits are not checked: `check` does that.
+
+    Args:
+        times: Time of each sample, shape (N,), increasing, [s]; the motion starts with the first.
+        q: Joint angles, shape (N, n), N >= 1, [rad].
+
+    Raises:
+        InvalidValueError: Not finite, not N times and N rows, the times do not increase, or last too long.
+    """
+    curve, rows = spline_through(times, q)
+    return standing(rows[0], law="samples") if curve is None else Motion(polynomial=curve, goal=rows[-1], law="samples")
+
+
+def _short_enough(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
+    require_rows(len(motion), max_rows, "samples", Path(file).name)
+    return motion
 
 
 def require_motion(motion: object) -> Motion:

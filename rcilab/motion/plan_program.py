@@ -22,13 +22,13 @@ from rcilab.motion.cartesian import plan_path
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.program import MOST_WAYPOINTS, Program
+from rcilab.motion.program import Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.segment import Segment, build_segments, naming
 from rcilab.motion.segment_spline import build_chain
 from rcilab.motion.segment_spline_motion import plan_chain
 from rcilab.motion.torque_rate import plan_within_torque_rate
-from rcilab.motion.waypoint import label
+from rcilab.motion.waypoint import MOST_WAYPOINTS, label
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""

@@ -6,26 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 
-from rcilab.core.arrays import Unquoted, as_vector, described
+from rcilab.core.arrays import as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
-from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_fit, vector_of
+from rcilab.motion.program_file import load_program, program_text, read_program, save_program
+from rcilab.motion.program_script import program_script
+from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_count, require_fit, vector_of
 from rcilab.robots import describe_robot
-
-MOST_WAYPOINTS = 10_000
-"""A choice; a motion through them has a gigabyte."""
-
-
-def require_count(count: int) -> None:
-    """Refuses a program of no waypoint, or of too many.
-
-    Raises:
-        InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.
-    """
-    if not 1 <= count <= MOST_WAYPOINTS:
-        raise InvalidValueError("waypoints", Unquoted(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
-            "span", low="1", high=str(MOST_WAYPOINTS)
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,21 +65,22 @@ class Program:
 
     def to_json(self) -> str:
         """Returns the program as JSON, which `from_json` reads back to the last bit."""
-        from rcilab.motion.program_file import program_text
-
         return program_text(self)
 
     @classmethod
-    def from_json(cls, text: str) -> Program:
+    def from_json(cls, text: str | bytes, name: str = "program") -> Program:
         """Returns the program in a JSON text.
+
+        Args:
+            text: JSON, bytes in UTF-8.
+            name: What to call it in an error.
 
         Raises:
             InvalidValueError: It holds no sound program; the message names the line, the key and what to do.
             VersionMismatchError: It was written for another version of this format.
         """
-        from rcilab.motion.program_file import read_program
-
-        return read_program(text.encode(errors="surrogatepass"), "program")
+        content = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
+        return read_program(content, name, cls)
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the program to a file as JSON.
@@ -100,8 +88,6 @@ class Program:
         Raises:
             InvalidValueError: The file cannot be written.
         """
-        from rcilab.motion.program_file import save_program
-
         save_program(self, file)
 
     @classmethod
@@ -112,14 +98,10 @@ class Program:
             InvalidValueError: There is no such file, or it holds no sound program; the message names the line.
             VersionMismatchError: It was written for another version of this format.
         """
-        from rcilab.motion.program_file import load_program
-
-        return load_program(file)
+        return load_program(file, cls)
 
     def to_python(self) -> str:
         """Returns a script that plans the same motion; run as `python SCRIPT [OUT.npz]` it prints the report."""
-        from rcilab.motion.program_script import program_script
-
         return program_script(self)
 
     def __repr__(self) -> str:

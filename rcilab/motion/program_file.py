@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import fields
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcilab.core.arrays import Unquoted, described
 from rcilab.core.atomic_file import read_whole, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
 from rcilab.motion.lined_json import LONGEST, LongListError, Node, read_json
-from rcilab.motion.program import MOST_WAYPOINTS, Program, require_count
-from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS, Waypoint, require_fit
+from rcilab.motion.waypoint import ALLOWED, ALWAYS, MOST_WAYPOINTS, WORDS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
+
+if TYPE_CHECKING:
+    from rcilab.motion.program import Program
+
+P = TypeVar("P")
 
 FORMAT = "rcilab program"
 VERSION = 1
@@ -58,8 +63,8 @@ def save_program(program: Program, file: str | PathLike[str]) -> None:
         ) from error
 
 
-def load_program(file: str | PathLike[str]) -> Program:
-    """Returns the program in a file.
+def load_program(file: str | PathLike[str], build: Callable[..., P]) -> P:
+    """Returns the program in a file; arguments as of `read_program`.
 
     Raises:
         InvalidValueError: There is no such file, or it holds no sound program.
@@ -69,15 +74,16 @@ def load_program(file: str | PathLike[str]) -> Program:
         raise InvalidValueError("program file", described(file), "is no file name")
     path = Path(fspath(file))
     content = read_whole(path, "program file", LONGEST + 1)
-    return read_program(content, path.name)
+    return read_program(content, path.name, build)
 
 
-def read_program(content: bytes, name: str) -> Program:
-    """Returns the program in a JSON text.
+def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
+    """Returns what `build` makes of the program in a JSON text; its keyword arguments are those of `Program`.
 
     Args:
         content: JSON in UTF-8.
         name: What to call it in an error.
+        build: Makes the program, and raises InvalidValueError where a value is not sound.
 
     Raises:
         InvalidValueError: It holds no sound program; one sentence with line, key, value, bound and what to do.
@@ -129,7 +135,7 @@ def read_program(content: bytes, name: str) -> Program:
         raise _placed(error, name, listed) from error
     waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))
     try:
-        return Program(waypoints=waypoints, **texts, **vectors)  # type: ignore[arg-type]  # Program checks them.
+        return build(waypoints=waypoints, **texts, **vectors)
     except InvalidValueError as error:
         raise _placed(error, name, found.get("tool" if error.name == "wxyz" else error.name, root)) from error
 

@@ -1,4 +1,4 @@
-"""Joint samples from elsewhere: a CSV or NPZ file at any rate becomes a motion."""
+"""Joint samples from elsewhere: times and angles in a CSV or NPZ file at any rate."""
 
 from __future__ import annotations
 
@@ -14,17 +14,15 @@ from rcilab.core.arrays import Array, JointPath, as_number, as_path, as_vector
 from rcilab.core.atomic_file import read_whole
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows
 from rcilab.motion.archive import read_arrays
-from rcilab.motion.motion import Motion
-from rcilab.motion.spline import motion_through
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 
 MOST = 4.0 * math.pi
-"""Angle that no joint of an arm reaches, [rad]: whoever reads more, reads degrees."""
+"""Angle that no joint of an arm reaches, [rad]: more is in degrees."""
 
 _ON_GRID = 1e-6
 """How far times may be off whole cycles and still be them, [s]: what six decimals leave."""
@@ -34,37 +32,23 @@ _JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _
 _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
-def load_samples(
-    file: str | PathLike[str], *, rate_hz: float | None = None, unit: AngleUnit = "rad", max_rows: int = MOST_ROWS
-) -> Motion:
-    """Returns the motion through the joint samples in a file; see `Motion.load_samples`.
+def is_on_grid(times: Array) -> bool:
+    """Returns whether times, shape (N,), [s], are one a controller cycle."""
+    grid = times[0] + CYCLE_TIME * np.arange(len(times))
+    return bool(np.abs(times - grid).max() < _ON_GRID)
+
+
+def read_samples(
+    file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit, max_rows: int
+) -> tuple[Array, JointPath]:
+    """Returns the times [s], shape (N,), and the joint angles [rad], shape (N, n), in a file.
+
+    Arguments are those of `Motion.load_samples`.
 
     Raises:
         InvalidValueError: There is no such file, or it holds no sound samples; one sentence with the line.
     """
-    return _short_enough(motion_through(*_read(file, rate_hz, unit, require_max_rows(max_rows))), max_rows, file)
-
-
-def load_rows(file: str | PathLike[str], max_rows: int) -> Motion:
-    """Returns the motion in a CSV file: rows of the 1 ms grid as they are, others as `load_samples` reads them.
-
-    Raises:
-        InvalidValueError: As for `load_samples`.
-    """
-    times, q = _read(file, None, "rad", max_rows)
-    grid = times[0] + CYCLE_TIME * np.arange(len(times))
-    if np.abs(times - grid).max() < _ON_GRID:
-        return Motion.from_cycles(q)
-    return _short_enough(motion_through(times, q), max_rows, file)
-
-
-def _short_enough(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
-    require_rows(len(motion), max_rows, "samples", Path(file).name)
-    return motion
-
-
-def _read(file: str | PathLike[str], rate_hz: float | None, unit: AngleUnit, max_rows: int) -> tuple[Array, JointPath]:
-    """Returns times [s] and joint angles [rad]."""
+    require_max_rows(max_rows)
     if unit not in get_args(AngleUnit):
         raise InvalidValueError("unit", unit, f"is unknown; known: {', '.join(get_args(AngleUnit))}")
     if rate_hz is not None and not 0.0 < (rate_hz := as_number(rate_hz, "rate_hz", "Hz")) < math.inf:

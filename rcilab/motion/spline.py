@@ -1,4 +1,4 @@
-"""The smooth curve through given samples: a cubic spline that starts and ends at rest."""
+"""The smooth curve through given samples: a cubic spline that starts and ends at standstill."""
 
 from __future__ import annotations
 
@@ -7,19 +7,18 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, JointPath, as_path, as_vector
 from rcilab.core.errors import InvalidValueError
-from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 LONGEST = 7200.0
-"""How long a motion through samples may last, [s]. A choice: its rows then take 400 MB, as of one that is planned."""
+"""How long a motion through samples may last, [s]. Its rows then take 400 MB, as of one that is planned."""
 
 
-def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
-    """Returns the motion through joint angles at given times, with continuous acceleration.
+def spline_through(times: ArrayLike, q: ArrayLike) -> tuple[PiecewisePolynomial | None, JointPath]:
+    """Returns the curve through joint angles at given times, with continuous acceleration, and the checked angles.
 
     A cubic spline that passes every sample; it starts and ends with velocity and acceleration zero, as the robot
     demands of a motion, for which the first and the last interval are each cut in two (Biagiotti and Melchiorri,
-    Trajectory Planning for Automatic Machines and Robots, 2008, 4.4.4). Nobody has looked at limits: `check` does.
+    Trajectory Planning for Automatic Machines and Robots, 2008, 4.4.4). A single sample has no curve: None.
 
     Args:
         times: Time of each sample, shape (N,), increasing, [s]; the motion starts with the first.
@@ -38,7 +37,7 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
         unit = "are the times in s, and the rate in samples a second?"
         raise InvalidValueError("duration", whole, f"s is more than {LONGEST:g} s, the longest motion; {unit}")
     if len(rows) == 1:
-        return standing(rows[0], law="samples")
+        return None, rows
     knots, angles, bends = _spline(t - t[0], rows)
     h = np.diff(knots)[:, np.newaxis]
     pieces = np.empty((len(h), rows.shape[1], 4))
@@ -46,7 +45,7 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
     pieces[:, :, 1] = np.diff(angles, axis=0) / h - h * (2.0 * bends[:-1] + bends[1:]) / 6.0
     pieces[:, :, 2] = bends[:-1] / 2.0
     pieces[:, :, 3] = np.diff(bends, axis=0) / (6.0 * h)
-    return Motion(polynomial=PiecewisePolynomial(knots, pieces), goal=rows[-1], law="samples")
+    return PiecewisePolynomial(knots, pieces), rows
 
 
 def _spline(t: Array, q: JointPath) -> tuple[Array, JointPath, JointPath]:

@@ -1,22 +1,25 @@
-"""Motions in files: a versioned .npz that comes back to the last bit, the rows as CSV, and words for other files."""
+"""Files of motions: a versioned .npz of arrays that comes back to the last bit, and rows as CSV."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sized
 from io import TextIOWrapper
 from os import PathLike, fspath
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO, BinaryIO, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import as_number
+from rcilab.core.arrays import Array, JointPath, as_number
 from rcilab.core.atomic_file import read_whole, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
-from rcilab.core.file_bounds import MOST_ROWS, ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
 from rcilab.motion.archive import read_arrays
-from rcilab.motion.motion import Motion
 from rcilab.motion.piecewise import PiecewisePolynomial
+
+M = TypeVar("M", bound=Sized)
 
 KIND = "rcilab motion"
 VERSION = 1
@@ -25,58 +28,59 @@ _SIGNATURES = (b"PK", b"\x93NUMPY")
 """How an archive and a single array of numpy's begin."""
 
 
-def save_motion(motion: Motion, file: str | PathLike[str] | BinaryIO) -> None:
+def write_arrays(stream: IO[bytes], content: Mapping[str, ArrayLike]) -> None:
+    """Writes what a motion is made of, by name, as .npz."""
+    np.savez(stream, kind=np.array(KIND), version=np.array(VERSION), **dict(content))  # type: ignore[arg-type]
+
+
+def write_rows(stream: IO[bytes], times: Array, q: JointPath) -> None:
+    """Writes the rows of a motion as CSV.
+
+    Args:
+        stream: Where to.
+        times: Shape (N,), [s].
+        q: Joint angles, shape (N, n), [rad].
+    """
+    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
+    joints = [Column(f"q{i + 1}", "rad", q[:, i]) for i in range(q.shape[1])]
+    write_csv([Column("t", "s", times), *joints], lines)
+    lines.detach()
+
+
+def save(
+    file: str | PathLike[str] | BinaryIO, npz: Callable[[IO[bytes]], None], csv: Callable[[IO[bytes]], None]
+) -> None:
     """Writes a motion: by the ending of a name .npz or .csv, to a stream .npz.
+
+    Args:
+        file: Name or stream.
+        npz: Writes the one form to a stream.
+        csv: Writes the other.
 
     Raises:
         InvalidValueError: The ending is unknown, or the file cannot be written.
     """
     if not isinstance(file, str | PathLike):
         _require_stream(file, "write")
-        _write_npz(motion, file)
+        npz(file)
         return
-    write = _WRITERS[_require_suffix(file)]
+    suffix, writers = Path(file).suffix.lower(), {".npz": npz, ".csv": csv}
+    if suffix not in writers:
+        raise InvalidValueError("motion file", fspath(file), f"must end in {' or '.join(writers)}")
     try:
         with replacing(file) as stream:
-            write(motion, stream)
+            writers[suffix](stream)
     except OSError as error:
         raise InvalidValueError("motion file", fspath(file), f"cannot be written: {error.strerror}") from error
 
 
-def _write_npz(motion: Motion, stream: IO[bytes]) -> None:
-    content = {
-        "kind": np.array(KIND),
-        "version": np.array(VERSION),
-        "law": np.array(motion.law),
-        "speed": np.array(motion.speed),
-        "breaks": motion.polynomial.breaks,
-        "coefficients": motion.polynomial.coefficients,
-        "goal": motion.goal,
-        "segment_starts": motion.segment_starts,
-        "notes": np.array(motion.notes, dtype=np.str_),
-    }
-    np.savez(stream, **content)
+def is_csv(file: object) -> bool:
+    """Returns whether a file is a CSV, by the ending of its name."""
+    return isinstance(file, str | PathLike) and Path(fspath(file)).suffix.lower() == ".csv"
 
 
-def _write_csv(motion: Motion, stream: IO[bytes]) -> None:
-    lines = TextIOWrapper(stream, encoding="utf-8", newline="")
-    joints = [Column(f"q{i + 1}", "rad", motion.q[:, i]) for i in range(motion.n)]
-    write_csv([Column("t", "s", motion.times), *joints], lines)
-    lines.detach()
-
-
-_WRITERS = {".npz": _write_npz, ".csv": _write_csv}
-
-
-def _require_suffix(file: str | PathLike[str]) -> str:
-    suffix = Path(file).suffix.lower()
-    if suffix not in _WRITERS:
-        raise InvalidValueError("motion file", fspath(file), f"must end in {' or '.join(_WRITERS)}")
-    return suffix
-
-
-def load_motion(file: str | PathLike[str] | BinaryIO, max_rows: int = MOST_ROWS) -> Motion:
-    """Returns the motion in a file; see `Motion.load`.
+def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Callable[..., M]) -> M:
+    """Returns what `build` makes of the content of an .npz; its keyword arguments are those of `Motion`.
 
     Raises:
         InvalidValueError: There is no such file, it holds no sound motion, or too long a one.
@@ -85,10 +89,6 @@ def load_motion(file: str | PathLike[str] | BinaryIO, max_rows: int = MOST_ROWS)
     require_max_rows(max_rows)
     if not isinstance(file, str | PathLike):
         _require_stream(file, "read")
-    elif Path(file).suffix.lower() == ".csv":
-        from rcilab.motion.samples import load_rows
-
-        return load_rows(file, max_rows)
     name = fspath(file) if isinstance(file, str | PathLike) else "stream"
     content = _read(file, name, max_rows)
     if str(content.get("kind", "")) != KIND:
@@ -101,10 +101,10 @@ def load_motion(file: str | PathLike[str] | BinaryIO, max_rows: int = MOST_ROWS)
         raise VersionMismatchError(f"motion file {name!r}", found, VERSION, advice)
     try:
         curve = PiecewisePolynomial(content["breaks"], content["coefficients"])
-        motion = Motion(
+        motion = build(
             polynomial=curve,
             goal=content["goal"],
-            law=str(content["law"]),  # type: ignore[arg-type]  # Motion checks it.
+            law=str(content["law"]),
             speed=as_number(content["speed"], "speed"),
             # Files from before there were programs have neither.
             segment_starts=content.get("segment_starts", np.zeros(1)),

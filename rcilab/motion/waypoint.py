@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import as_number, as_vector, described
+from rcilab.core.arrays import Unquoted, as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.model.kinematics.solvers.build import build_solver
@@ -52,6 +52,9 @@ WORDS: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation),
 """The words that some of them are one of; the first is meant where none is given."""
 
 Floats: TypeAlias = tuple[float, ...]
+
+MOST_WAYPOINTS = 10_000
+"""Tuning value: a motion through them has a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,6 +256,18 @@ def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValu
     if not error.code:
         return named
     return named.coded("waypoint_value", number=number, kind=kind, name=error.name, reason=error)
+
+
+def require_count(count: int) -> None:
+    """Refuses a program of no waypoint, or of too many.
+
+    Raises:
+        InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.
+    """
+    if not 1 <= count <= MOST_WAYPOINTS:
+        raise InvalidValueError("waypoints", Unquoted(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
+            "span", low="1", high=str(MOST_WAYPOINTS)
+        )
 
 
 def require_fit(waypoint: Waypoint, robot: RobotDescription) -> None:

@@ -14,6 +14,11 @@ from rcilab.core.cycle_log import write_csv, write_npz
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Text
 from rcilab.i18n.units import USUAL, Units
+from rcilab.recording.columns import run_columns
+from rcilab.recording.frame import write_parquet
+from rcilab.recording.html_file import write_html
+from rcilab.recording.mcap_file import write_mcap
+from rcilab.recording.run_file import write_run
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -85,14 +90,10 @@ def require_ending(ending: str) -> str:
 
 
 def _rcirun(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
-    from rcilab.recording.run_file import write_run
-
     write_run(run, stream)
 
 
 def _csv(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
-    from rcilab.recording.columns import run_columns
-
     lines = TextIOWrapper(stream, encoding="utf-8", newline="")
     write_csv(run_columns(run), lines, progress)
     lines.flush()
@@ -104,20 +105,14 @@ def _npz(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
 
 
 def _parquet(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
-    from rcilab.recording.frame import write_parquet
-
     write_parquet(run, stream, progress)
 
 
 def _mcap(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
-    from rcilab.recording.mcap_file import write_mcap
-
     write_mcap(run, stream, progress)
 
 
 def _html(run: Run, stream: IO[bytes], progress: Progress, text: Text) -> None:
-    from rcilab.recording.html_file import write_html
-
     write_html(run, stream, text)
 
 

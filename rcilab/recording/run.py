@@ -11,11 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.conformance.check import check
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
+from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.i18n.localized_text import language
 from rcilab.i18n.units import USUAL, Units
+from rcilab.motion.motion import Motion
+from rcilab.recording.export import save_run
+from rcilab.recording.frame import to_pandas
+from rcilab.recording.run_file import decode_content, read_run
+from rcilab.recording.run_html import run_html
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
 from rcilab.robots import describe_robot
@@ -23,7 +31,6 @@ from rcilab.robots import describe_robot
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
-    from rcilab.motion import Motion
 
 _FIRST_ARM = "xMatePro7"  # A recording without a model is of an arm whose controller has the same faults.
 _LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
@@ -213,8 +220,6 @@ class Run:
         """The verdict on the plan; None without a plan or an arm. Judged anew each time, by the table of today."""
         if self.plan is None or self.model is None:
             return None
-        from rcilab.conformance.check import check
-
         return check(self.plan, self.model)
 
     def commanded(self) -> Motion:
@@ -226,8 +231,6 @@ class Run:
         Raises:
             UsageError: No cycle was recorded.
         """
-        from rcilab.motion.motion import Motion
-
         if not len(self.t):
             raise UsageError("this run has no cycle: nothing was commanded")
         times = self.t - self.delay * CYCLE_TIME
@@ -320,8 +323,6 @@ class Run:
             InvalidValueError: The ending is unknown, or the file cannot be written.
             UsageError: The format needs a library that is not installed, or an arm and there is none.
         """
-        from rcilab.recording.export import save_run
-
         save_run(self, file, progress=progress, language=language, units=units)
 
     def to_pandas(self) -> Any:
@@ -330,8 +331,6 @@ class Run:
         Raises:
             UsageError: pandas is not installed.
         """
-        from rcilab.recording.frame import to_pandas
-
         return to_pandas(self)
 
     def __repr__(self) -> str:
@@ -348,9 +347,6 @@ class Run:
         return f"<Run {', '.join(facts)}>"
 
     def _repr_html_(self) -> str:
-        from rcilab.i18n.localized_text import language
-        from rcilab.recording.run_html import run_html
-
         return run_html(self, language())
 
 
@@ -397,3 +393,25 @@ def build_run(
         setup=setup or Setup(),
         paced=paced,
     )
+
+
+def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
+    """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
+
+    Args:
+        file: The file's name.
+        max_rows: How many cycles it may hold: 17 minutes.
+
+    Returns:
+        The run. `is_complete` is False when the file was cut off.
+
+    Raises:
+        InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
+        VersionMismatchError: It was written by another version of this format.
+    """
+    return read_run(file, max_rows, Run)
+
+
+def decode_run(content: bytes, name: str = "stream", *, max_rows: int = MOST_ROWS) -> Run:
+    """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
+    return decode_content(content, name, max_rows, Run)

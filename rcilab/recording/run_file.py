@@ -24,11 +24,12 @@ import json
 import os
 import struct
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,20 @@ from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_whole
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.core.file_bounds import MOST_ROWS, require_max_rows, require_rows
+from rcilab.core.file_bounds import require_max_rows, require_rows
 from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
 from rcilab.recording.chunks import Chunk, decode_blocks, encode_block, encode_header
-from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
+    from rcilab.recording.run import Run
+
+R = TypeVar("R")
 
 ENDING = ".rcirun"
 BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
@@ -211,15 +215,13 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
     writer.finish(stopped=run.stopped, truncated=run.truncated, paced=run.paced)
 
 
-def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
-    """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
+def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) -> R:
+    """Returns what `build` makes of a `.rcirun` file; of one that was cut off, of all up to its last whole block.
 
     Args:
         file: The file's name.
-        max_rows: How many cycles it may hold: 17 minutes.
-
-    Returns:
-        The run. `is_complete` is False when the file was cut off.
+        max_rows: How many cycles it may hold.
+        build: Makes the run; its keyword arguments are those of `Run`.
 
     Raises:
         InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
@@ -229,11 +231,11 @@ def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
         raise InvalidValueError("run file", described(file), "is no file name")
     name = fspath(file)
     content = read_whole(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
-    return decode_run(content, name, max_rows=max_rows)
+    return decode_content(content, name, max_rows, build)
 
 
-def decode_run(content: bytes, name: str = "stream", *, max_rows: int = MOST_ROWS) -> Run:
-    """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
+def decode_content(content: bytes, name: str, max_rows: int, build: Callable[..., R]) -> R:
+    """Returns what `build` makes of the bytes of a `.rcirun` file; see `read_run`."""
     blocks = decode_blocks(content, name)
     if not blocks or blocks[0].kind != "HEAD":
         raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
@@ -241,7 +243,7 @@ def decode_run(content: bytes, name: str = "stream", *, max_rows: int = MOST_ROW
         )
     require_rows(sum(_count_cycles(block) for block in blocks), max_rows, "run file", name)
     try:
-        return _build(blocks, max_rows)
+        return _build(blocks, max_rows, build)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
     except (RcilabError, zlib.error, struct.error) as error:
@@ -270,7 +272,7 @@ def _count_cycles(block: Chunk) -> int:
     return _ROWS.unpack_from(block.payload)[0] if block.kind == "CYCL" and len(block.payload) >= _ROWS.size else 0
 
 
-def _build(blocks: tuple[Chunk, ...], max_rows: int) -> Run:
+def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) -> R:
     head = json.loads(blocks[0].payload)
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
@@ -287,7 +289,7 @@ def _build(blocks: tuple[Chunk, ...], max_rows: int) -> Run:
     stopped = tail.get("stopped")
     if not isinstance(stopped, str | None):
         raise TypeError("why it was stopped is no text")
-    return Run(
+    return build(
         plan=Motion.load(BytesIO(plans[-1]), max_rows=max_rows) if plans else None,
         cycles=cycles,
         stopped=stopped,
@@ -355,8 +357,6 @@ def _arm_facts(model: RobotModel) -> dict[str, Any]:
 
 
 def _build_arm(facts: dict[str, Any]) -> RobotModel:
-    from rcilab.model.dynamics.payload import Payload
-
     mass, center, inertia = facts["load"]
     load = Payload(mass=mass, center_of_mass=np.array(center), inertia=np.array(inertia))
     return load_model(facts["name"], tool=Pose.from_row_major(facts["tool"]), load=load)

@@ -35,11 +35,11 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.named_poses import NamedPoseStore
-from rcilab.motion.program_file import read_program
 from rcilab.motion.samples import load_samples
 from rcilab.recording.chunks import MAGIC
 from rcilab.recording.optional_deps import MissingExtraError
-from rcilab.recording.run_file import RunFile, decode_run, load_run
+from rcilab.recording.run import decode_run, load_run
+from rcilab.recording.run_file import RunFile
 from rcilab.robots import ROBOT_NAMES
 from rcilab.sim.api import Refused, WorldStatus
 from rcilab.sim.api.lines import decode_world_answer, encode_world_answer
@@ -66,7 +66,7 @@ def program(*waypoints: Waypoint) -> Program:
 
 def bad_file(change: Callable[[str], str]) -> Callable[[], object]:
     text = program(Waypoint.line(moved(0.05))).to_json()
-    return lambda: read_program(change(text).encode(), "bad.json")
+    return lambda: Program.from_json(change(text).encode(), "bad.json")
 
 
 def closed_port() -> int:
@@ -147,8 +147,8 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "lost": lambda: require_ready(SupervisorStatus(phase="lost"), is_operator_overdue=False),
     "nobody there": lambda: require_ready(SupervisorStatus(phase="idle", q_c=MODEL.home), is_operator_overdue=True),
     "no robot there": robot_at_closed_port,
-    "a file of nothing": lambda: read_program(b"", "bad.json"),
-    "a file of bytes": lambda: read_program(b"\xff\xfe", "bad.json"),
+    "a file of nothing": lambda: Program.from_json(b"", "bad.json"),
+    "a file of bytes": lambda: Program.from_json(b"\xff\xfe", "bad.json"),
     "a file cut off": bad_file(lambda text: text[: len(text) // 2]),
     "a file with a number out of range": bad_file(lambda text: re.sub('"speed": [0-9.]+', '"speed": 8', text)),
     "a file with an unknown key": bad_file(lambda text: text.replace('"speed"', '"spede"')),

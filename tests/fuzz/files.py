@@ -11,9 +11,8 @@ import numpy as np
 import rcilab
 from rcilab.core.errors import RcilabError
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.motion.program_file import read_program
 from rcilab.recording.export import export_run
-from rcilab.recording.run_file import decode_run
+from rcilab.recording.run import decode_run
 from tests.fuzz.noise import spoilt
 from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles
 
@@ -58,7 +57,7 @@ def _table(content: bytes, folder: Path) -> object:
 KINDS: dict[str, tuple[Callable[[], Sequence[bytes]], Callable[[bytes, Path], object]]] = {
     "recording": (recordings, lambda content, folder: decode_run(content, max_rows=_ROWS)),
     "motion": (motions, lambda content, folder: Motion.load(BytesIO(content), max_rows=_ROWS)),
-    "program": (programs, lambda content, folder: read_program(content, "program.json")),
+    "program": (programs, lambda content, folder: Program.from_json(content, "program.json")),
     "CSV": (tables, _table),
 }
 

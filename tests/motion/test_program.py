@@ -20,7 +20,7 @@ import rcilab
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
-from rcilab.motion import Motion, Program, Waypoint, lined_json, plan_program, program_file
+from rcilab.motion import Motion, Program, Waypoint, lined_json, plan_program
 from rcilab.motion.program_file import SCHEMA
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
 
@@ -353,7 +353,7 @@ def test_far_too_many_waypoints_are_counted_and_not_read():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(lined_json, "Node", lambda value, line: read.append(line) or node(value, line))
         with pytest.raises(InvalidValueError, match="line 1, waypoints: 60000 must be 1 to 10000"):
-            program_file.read_program(text.encode(), "program.json")
+            Program.from_json(text.encode(), "program.json")
     assert len(read) < 12 * 10_000
 
 
@@ -361,4 +361,4 @@ def test_far_too_many_waypoints_are_counted_and_not_read():
 def test_too_many_waypoints_in_a_spoiled_file_are_one_kind_of_error(end: str):
     text = '{"waypoints": [' + ",".join(10_001 * ["1"]) + end
     with pytest.raises(InvalidValueError, match="waypoints: 10001 must be 1 to 10000"):
-        program_file.read_program(text.encode(), "program.json")
+        Program.from_json(text.encode(), "program.json")

@@ -9,7 +9,8 @@ import pytest
 import rcilab
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_columns, cycle_dtype
 from rcilab.core.state import RobotState
-from rcilab.recording.run_file import RunWriter, decode_run, load_run
+from rcilab.recording.run import decode_run, load_run
+from rcilab.recording.run_file import RunWriter
 from tests.recording.runs import MODEL, PLAN, some_cycles, some_run
 
 MODELS = [pytest.param("xMatePro7", id="7 axes"), pytest.param("xMate3", id="6 axes")]

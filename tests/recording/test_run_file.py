@@ -17,8 +17,8 @@ from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
-from rcilab.recording.run import Run, build_run
-from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, decode_run
+from rcilab.recording.run import Run, build_run, decode_run
+from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
 

@@ -24,7 +24,6 @@ from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, Ve
 from rcilab.i18n.error_messages import tell
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
-from rcilab.motion.program_file import read_program
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +107,7 @@ class ProgramActions:
         """Takes a program from a file, or says beside the button what is wrong; undo brings the old one back."""
         self._shelves.open()
         try:
-            program = read_program(request.content, request.name[:LONGEST_NAME] or "program")
+            program = Program.from_json(request.content, request.name[:LONGEST_NAME] or "program")
         except (InvalidValueError, VersionMismatchError) as error:
             self._refuse_file(message("program.file_bad", error=tell(error)))
             return
