@@ -33,9 +33,8 @@ from rcilab.makers.rokae.driver.transport import SocketTransport
 from rcilab.makers.rokae.wire import RecoveryStatus, StartStatus
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
-from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
+from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.named_poses import NamedPoseStore
-from rcilab.motion.samples import load_samples
 from rcilab.recording.chunks import MAGIC
 from rcilab.recording.optional_deps import MissingExtraError
 from rcilab.recording.run import decode_run, load_run
@@ -112,7 +111,7 @@ def read_samples_text(text: str) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "bad.csv"
         file.write_text(text)
-        load_samples(file)
+        Motion.load_samples(file)
 
 
 def refused_by_the_world() -> None:

@@ -262,7 +262,7 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
         (lines(GOOD) + "{}", "line 8: { follows after the end|follows after the end of the first value"),
         (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format: 'x' must be 'rcilab program'"),
         (lines(GOOD, head='"version": 1'), 'format is missing; a program has "rcilab program"'),
-        (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: xMatePro3"),
+        (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: .*xMatePro3"),
         (
             lines(GOOD, model="xMate3", start=[0.1] * 6),
             r"line 5, waypoint 1 \(nullspace\), psi: 0.1 has no meaning for xMate3",
