@@ -1,17 +1,19 @@
-"""Words of explanations: one catalogue a language, found by key, filled with values."""
+"""Sentences of explanations: one catalogue for each language, found by key, filled with values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from types import MappingProxyType
 
 from rcilab.i18n.locale import Language, load_words, require_language
+from rcilab.robots import ROBOTS_BY_MAKER
 
 __all__ = ["Language", "Phrase", "load_catalogue", "say"]
 
 
 class Phrase(str):
-    """English words that can also be said in the other languages.
+    """An English sentence that also exists in the other languages.
 
     Args:
         key: Of the sentence in the catalogues.
@@ -40,6 +42,8 @@ def say(language: Language, key: str, **values: str) -> str:
     return load_catalogue(require_language(language))[key].format(**values)
 
 
+@lru_cache
 def load_catalogue(language: Language) -> Mapping[str, str]:
-    """Returns all sentences of one language, by key."""
-    return load_words("rcilab.conformance", language)
+    """Returns all sentences of one language by key: those of the engine, and of every maker on its faults and rows."""
+    packages = ["rcilab.conformance", *(f"rcilab.makers.{maker}" for maker in ROBOTS_BY_MAKER)]
+    return MappingProxyType({key: text for package in packages for key, text in load_words(package, language).items()})

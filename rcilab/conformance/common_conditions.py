@@ -55,7 +55,7 @@ ACCELERATION_CUTOFF = 30.0  # [Hz] Below the first resonances of arms of this si
 YIELDING_ALLOWANCE = 8.0
 """Factor on the acceleration bounds of a compliant arm. The light last joints of an arm that is pushed with 30 N, or
 commanded a torque of a few N m, accelerate harder than any position command could ask for."""
-LOST_IN_ROW = 20  # [cycles] ROKAE: usually 10 to 20 (RCI manual, 4.6); Franka: 20.
+LOST_IN_ROW = 20  # [cycles] The largest threshold that the makers' manuals give.
 
 _NAMES = ("position", "velocity", "acceleration", "jerk")
 _UNITS = {"translation": "m", "rotation": "rad", "arm_angle": "rad"}

@@ -10,6 +10,11 @@ class FaultCode(IntEnum):
     """One fault that a controller reports; the value is its number there. Every maker derives its own enumeration."""
 
     @property
+    def maker(self) -> str:
+        """Name of the maker: its folder in `rcilab/makers`."""
+        raise NotImplementedError
+
+    @property
     def manual_name(self) -> str:
         """The name as the maker's manual or client library prints it."""
         return self.name.lower()

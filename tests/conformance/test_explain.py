@@ -75,8 +75,10 @@ def test_a_formula_with_words_in_it_has_them_in_every_language():
 
 def test_no_key_stands_twice_in_a_catalogue():
     for language in LANGUAGES:
-        text = (files("rcilab.conformance") / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
-        pairs = json.loads(text, object_pairs_hook=list)
+        pairs = []
+        for package in ("rcilab.conformance", "rcilab.makers.rokae", "rcilab.makers.franka"):
+            text = (files(package) / "catalogues" / f"{language}.json").read_text(encoding="utf-8")
+            pairs += json.loads(text, object_pairs_hook=list)
         assert len(pairs) == len(dict(pairs)), language
 
 
@@ -90,7 +92,7 @@ def test_english_words_are_those_of_the_table_and_of_the_faults():
         said = re.sub(r"RCI|SDK|URDF|rcilab|setCollisionBehavior|Hz|deg", "", explain_source(row, "zh"))
         assert not re.search(r"[A-Za-z]{2}", said), said
     for faults in (Fault, FrankaError):
-        assert [words[f"fault.{fault.name}"] for fault in faults] == [fault.cause for fault in faults]
+        assert [words[f"fault.{fault.maker}.{fault.name}"] for fault in faults] == [fault.cause for fault in faults]
 
 
 @pytest.mark.parametrize(
@@ -111,7 +113,7 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
         assert words["raises.nothing" if row.necessity == "recommended" else "raises.unnoticed"] in text
     else:
         assert row.fault.manual_name in text
-        assert words[f"fault.{row.fault.name}"] in text
+        assert words[f"fault.{row.fault.maker}.{row.fault.name}"] in text
     if row.stage == "throughout":
         assert re.search(r"t = 0\.412 s.*t = 0\.400 s.*25 ms", text)
         assert "t = 0.400 s" in explain_violation(violation_of(row, count=1, model=model), language)

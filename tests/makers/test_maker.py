@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,15 @@ def test_what_cannot_be_simulated_or_driven_is_refused_by_the_capabilities():
     for refuse in (require_driver, require_simulator):
         with pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*drive one of xMatePro3"):
             refuse(load_model("Panda"))
+
+
+@pytest.mark.parametrize("folder", ["conformance", "robots"])
+def test_neither_the_engine_nor_the_robot_format_names_a_maker(folder: str):
+    words = {
+        word for maker in all_makers() for word in (maker.name, maker.title.lower(), maker.conditions().name.lower())
+    }
+    for path in (Path(rcilab.__file__).parent / folder).rglob("*.py"):
+        assert not words & set(re.findall(r"[a-z]+", path.read_text(encoding="utf-8").lower())), path
 
 
 def test_loading_a_model_by_name_loads_neither_wire_nor_engine():

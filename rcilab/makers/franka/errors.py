@@ -56,6 +56,11 @@ class FrankaError(FaultCode):
     BASE_ACCELERATION_INVALID_READING = 40
 
     @property
+    def maker(self) -> str:
+        """The folder of Franka."""
+        return "franka"
+
+    @property
     def manual_name(self) -> str:
         """The name as the client library prints it, such as `joint_motion_generator_velocity_discontinuity`."""
         return self.name.lower().replace("tau_j", "tau_J")

@@ -37,6 +37,11 @@ class Fault(FaultCode):
     INSTABILITY_DETECTION = 19
 
     @property
+    def maker(self) -> str:
+        """The folder of ROKAE."""
+        return "rokae"
+
+    @property
     def manual_name(self) -> str:
         """The name as the manual prints it, such as `kCollision`."""
         return "k" + "".join(word.capitalize() for word in self.name.split("_"))
