@@ -9,7 +9,8 @@ import ipywidgets
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, PoseName
+from rcilab.core.arrays import JointVector
 from rcilab.i18n.rounding import fixed
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -18,6 +19,8 @@ from rcilab.notebook.style import block, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _STEP_DEG = 0.5
+_BUTTONS: dict[PoseName, str] = {"home": "home", "zero": "zero", "here": "arm", "undo": "undo"}
+"""Poses that a button takes, and what the catalogues call it."""
 
 
 class JogPanel(Part):
@@ -39,11 +42,10 @@ class JogPanel(Part):
         super().__init__(subject, language)
         limits = self.model.limits.joint
         low, high = np.degrees(limits.lower), np.degrees(limits.upper)
-        self._before: list[JointVector] = []
         self._writing = False
         if q is not None:
             self.state.pose(q)
-        here: list[float] = np.degrees(self.state.goal).tolist()
+        here: list[float] = np.degrees(self.state.now.goal.q).tolist()
         names = [self.text("jog.joint", joint=j + 1) for j in range(self.model.n)]
         self.sliders = [
             lean(
@@ -65,7 +67,7 @@ class JogPanel(Part):
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
             rows += [_row(slider, field), field.said]
-        buttons = [self._button(name) for name in ("home", "zero", "arm", "undo")]
+        buttons = [self._button(name) for name in _BUTTONS]
         self._pose, self._reach = block(), block()
         self.build([*rows, lean(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
         self.hear("goal", self._show)
@@ -73,18 +75,17 @@ class JogPanel(Part):
     @property
     def q(self) -> JointVector:
         """Joint angles of the goal, shape (n,), read-only, [rad]. Can be set; everything follows."""
-        return self.state.goal
+        return self.state.now.goal.q
 
     @q.setter
     def q(self, q: ArrayLike) -> None:
-        self._remember()
         self.state.pose(q)
 
     def _show(self) -> None:
         state = self.state
         self._writing = True
         try:
-            shown = np.degrees(state.goal).tolist()
+            shown = np.degrees(state.now.goal.q).tolist()
             for slider, echo, field, angle in zip(self.sliders, self._echoes, self.fields, shown, strict=True):
                 if abs(slider.value - angle) > 1e-9:
                     echo.give(angle)
@@ -93,16 +94,16 @@ class JogPanel(Part):
         finally:
             self._writing = False
         write(self._pose, self._tell_pose())
-        tone = state.reach.tone
-        write(self._reach, verdict(tone, self.text(f"reach.tone.{tone}"), self.text.say(state.reach.reason)))
+        reach = state.now.goal.reach
+        write(self._reach, verdict(reach.tone, self.text(f"reach.tone.{reach.tone}"), self.text.say(reach.reason)))
 
     def _tell_pose(self) -> str:
-        pose = self.model.forward(self.state.goal)
+        pose = self.model.forward(self.state.now.goal.q)
         numbers = np.round(np.concatenate((1e3 * pose.position, np.degrees(pose.rpy))), 1) + 0.0  # No -0.0.
         names = [self.text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
         units = [" mm"] * 3 + ["°"] * 3
         cells = [f"{name} <b>{number:.1f}</b>{unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
-        psi = self.state.arm_angle
+        psi = self.state.now.goal.psi
         if psi is not None:
             cells.append(f"{self.text('jog.arm_angle')} <b>{fixed(math.degrees(psi), 1)}</b>°")
         elif self.model.redundancy:
@@ -118,32 +119,16 @@ class JogPanel(Part):
         return lambda degrees: self._move(joint, math.radians(degrees))
 
     def _move(self, joint: int, angle: float) -> None:
-        q = np.array(self.state.goal)
-        q[joint] = angle
-        self._pose_inside(q)
+        self.state.ask(MoveJoint(joint=joint, angle=angle))
 
-    def _pose_inside(self, q: JointVector) -> None:
-        """Poses the arm as near as its limits allow: a session may have set soft ones since."""
-        limits = self.model.limits.joint
-        self.state.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))
+    def _on_button(self, name: PoseName) -> None:
+        self.state.ask(PoseGoal(name=name))
 
-    def _on_button(self, name: str) -> None:
-        if name == "undo":
-            if self._before:
-                self._pose_inside(self._before.pop())
-            return
-        self._remember()
-        named = {"home": self.model.home, "zero": np.zeros(self.model.n), "arm": self.state.here}
-        self._pose_inside(named[name])
-
-    def _remember(self) -> None:
-        self._before = [*self._before[-19:], self.state.goal]
-
-    def _button(self, name: str) -> Any:
+    def _button(self, name: PoseName) -> Any:
         button = lean(
             ipywidgets.Button,
-            description=self.text(f"jog.{name}"),
-            tooltip=self.text(f"jog.{name}_hint"),
+            description=self.text(f"jog.{_BUTTONS[name]}"),
+            tooltip=self.text(f"jog.{_BUTTONS[name]}_hint"),
             layout={"width": "auto"},
         )
         button.on_click(lambda _: self._on_button(name))

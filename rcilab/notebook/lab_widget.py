@@ -157,9 +157,9 @@ class Lab(Part):
         unpowered = status is not None and phase == "idle" and status.powered is False
         tone: Tone = "none" if status is None else "warn" if unpowered else PHASE_TONES.get(phase, "bad")
         chips = _chip(tone, name_phase(status, text))
-        if state.plan is not None:
-            ok = state.plan.report.ok
-            duration = f"{state.plan.motion.duration:.2f} s"
+        if state.now.plan is not None:
+            ok = state.now.plan.report.ok
+            duration = f"{state.now.plan.motion.duration:.2f} s"
             chips += _chip("good" if ok else "bad", f"{text('check.passed' if ok else 'check.failed')} {duration}")
         write(self._title, f'<span class="rl-title">rcilab · {esc(self.model.name)}</span>{chips}')
 

@@ -45,7 +45,7 @@ class ModeFields:
         self.mode: Any = lean(
             ipywidgets.Dropdown, description=text("mode.choose"),
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
-            value=state.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
+            value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
         self._note, self._held, self._said = block(), block(), block()
         self.fields: dict[ControlPart, list[NumberField]] = {}
@@ -67,31 +67,31 @@ class ModeFields:
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows mode, parameters and what the controller has of them."""
         state, text = self._state, self._text
-        self.mode.value = state.mode
+        self.mode.value = state.now.drive.mode
         self.mode.disabled = status is not None and status.phase in ("moving", "stopping")
-        write(self._note, soft(text(f"mode.{state.mode}_note")))
+        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note")))
         for part, folder in self.folders.items():
-            shown = None if part in PARTS_OF_MODE[state.mode] else "none"
+            shown = None if part in PARTS_OF_MODE[state.now.drive.mode] else "none"
             if folder.layout.display != shown:
                 folder.layout.display = shown
                 folder.selected_index = 0 if shown is None and part in _OPEN else None
-        if self._shown is not state.control:
-            self._shown = state.control
+        if self._shown is not state.now.drive.control:
+            self._shown = state.now.drive.control
             for part in self.fields:
                 self._fill(part)
         robot = state.robot
-        pending = status is not None and is_control_pending(state.control, status.setup.control)
+        pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
         self.send.layout.display = "none" if robot is None or robot.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"
         write(self._held, "" if status is None else self._tell_held(status, pending))
 
     def _tell_held(self, status: SupervisorStatus, pending: bool) -> str:
         state, text = self._state, self._text
-        if state.refusal is not None:
-            return problem(text("ready.control_refused", error=text.say(state.refusal)))
+        if state.now.drive.refusal is not None:
+            return problem(text("ready.control_refused", error=text.say(state.now.drive.refusal)))
         known = state.session is None and state.robot is not None and state.robot.is_virtual
         own = standard_control(state.model.limits) if known else ControllerParameters()
-        rows = held_rows(state.mode, status.setup.control, own, text)
+        rows = held_rows(state.now.drive.mode, status.setup.control, own, text)
         told = soft(text("control.held")) + table([], [list(row) for row in rows])
         return told + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
 
@@ -133,7 +133,7 @@ class ModeFields:
         return NumberField(self._text, name, unit, low, high, take, digits=None, widths=_WIDTHS)
 
     def _fill(self, part: ControlPart) -> None:
-        numbers = shown_numbers(self._state.control, part, self._state.model.limits)
+        numbers = shown_numbers(self._state.now.drive.control, part, self._state.model.limits)
         for field, number in zip(self.fields[part], numbers, strict=True):
             field.show(number)
 

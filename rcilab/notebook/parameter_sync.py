@@ -31,17 +31,17 @@ class ParameterSync:
         """Wants another number. A session is told the part it belongs to only: it may have been set up by a cell."""
         state, limits = self._state, self._state.model.limits
         with state.lock:
-            before = state.control
+            before = state.now.drive.control
             if before is None and state.session is None:
                 before = standard_control(limits)
-            state.control, state.refusal = with_number(before, part, place, value, limits), None
+            state.set_drive(control=with_number(before, part, place, value, limits), refusal=None)
             state.tell("robot")
 
     def reset(self) -> None:
         """Wants what a controller wakes up with."""
         state = self._state
         with state.lock:
-            state.control, state.refusal = standard_control(state.model.limits), None
+            state.set_drive(control=standard_control(state.model.limits), refusal=None)
             state.tell("robot")
 
     def press_send(self, robot: RobotBackend) -> Message | None:
@@ -51,28 +51,29 @@ class ParameterSync:
             self._asked_to_send = now
             return ask_to_send(robot.name)
         self._asked_to_send = -math.inf
-        self._state.refusal = None
+        self._state.set_drive(refusal=None)
         self._send(robot)
         return None
 
     def tick(self, robot: RobotBackend) -> None:
         """Tells our own controller what is new."""
         status = robot.status()
-        if robot.is_virtual and self._state.refusal is None and status.phase == "idle":
+        if robot.is_virtual and self._state.now.drive.refusal is None and status.phase == "idle":
             self._send(robot)
 
     def take(self, error: RcilabError | None) -> None:
         """Takes note of the answer."""
         self._is_under_way = False
         if error is not None:
-            self._state.refusal = tell_error(error)
+            self._state.set_drive(refusal=tell_error(error))
 
     def forget(self) -> None:
         """Expects no answer any more: another robot comes."""
-        self._is_under_way, self._state.refusal = False, None
+        self._is_under_way = False
+        self._state.set_drive(refusal=None)
 
     def _send(self, robot: RobotBackend) -> None:
-        control = self._state.control
+        control = self._state.now.drive.control
         if self._is_under_way or control is None or not is_control_pending(control, robot.status().setup.control):
             return
         self._is_under_way = True

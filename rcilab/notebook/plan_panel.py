@@ -8,6 +8,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.goal.goal_actions import SetLaw, SetPathType, SetSpeed
 from rcilab.app.planning import LAWS, Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
@@ -40,17 +41,17 @@ class PlanPanel(Part):
         wide = {"width": "24em"}
         self.way = lean(
             ipywidgets.Dropdown, description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS],
-            value=state.way,
+            value=state.now.way,
             layout=wide,
         )  # fmt: skip
         self.law = lean(
             ipywidgets.Dropdown, description=text("target.law"), options=[(text(f"law.{law}"), law) for law in LAWS],
-            value=state.law,
+            value=state.now.law,
             tooltip=text("target.law_hint"), layout=wide,
         )  # fmt: skip
         self.speed = lean(
             ipywidgets.FloatSlider, description=text("target.speed"), min=_SLOWEST, max=100.0, step=1.0,
-            value=100.0 * state.speed,
+            value=100.0 * state.now.speed,
             readout=False, tooltip=text("target.speed_hint"), layout={"width": "19em"},
         )  # fmt: skip
         self._speed_field = NumberField(text, "", "%", _SLOWEST, 100.0, self._set_speed)
@@ -90,12 +91,12 @@ class PlanPanel(Part):
         self.speed.observe(self._on_speed, names="value")
         self.plan.on_click(lambda _: self._make_plan())
         self.slow_down.on_click(lambda _: self._slow_down())
-        self._speed_field.show(100.0 * state.speed)
+        self._speed_field.show(100.0 * state.now.speed)
         self._ends.append(state.hear("goal", self._show))
         self.hear("plan", self._show)
 
     def _set_speed(self, percent: float) -> None:
-        self.state.speed = percent / 100.0
+        self.state.ask(SetSpeed(speed=percent / 100.0))
         if self.speed.value != percent:
             self._echo.give(percent)
             self.speed.value = percent
@@ -106,11 +107,10 @@ class PlanPanel(Part):
             self._set_speed(change["new"])
 
     def _on_way(self, change: Any) -> None:
-        self.state.way = change["new"]
-        self.law.disabled = change["new"] == "line"
+        self.state.ask(SetPathType(kind=change["new"]))
 
     def _on_law(self, change: Any) -> None:
-        self.state.law = change["new"]
+        self.state.ask(SetLaw(law=change["new"]))
 
     def halt(self) -> None:
         """Gives up what is being worked out."""
@@ -124,7 +124,7 @@ class PlanPanel(Part):
         self._begin(None, self.state.planning())
 
     def _slow_down(self) -> None:
-        plan = self.state.plan
+        plan = self.state.now.plan
         if plan is not None:
             report = plan.report  # What passes is slowed down for what is recommended, as on the page.
             self._begin(plan, lambda progress: report.slow_down(recommended=report.ok, progress=progress))
@@ -139,7 +139,7 @@ class PlanPanel(Part):
             self.state.show(message("plan.failed", error=tell(found)))
         elif not isinstance(found, SlowDown):
             self.state.show(found)
-        elif about is not None and about is self.state.plan:  # Else somebody has planned anew.
+        elif about is not None and about is self.state.now.plan:  # Else somebody has planned anew.
             if found.motion is None or found.report is None:
                 self._slowed = about, found
                 return
@@ -150,11 +150,11 @@ class PlanPanel(Part):
 
     def _show(self) -> None:
         state, text = self.state, self.text
-        plan = state.plan
+        plan = state.now.plan
         self.plan.disabled = self.slow_down.disabled = self._work.is_busy
         self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
-            said = "" if state.no_plan is None else verdict("warn", "▲", text.say(state.no_plan))
+            said = "" if state.now.no_plan is None else verdict("warn", "▲", text.say(state.now.no_plan))
             write(self._said, said or soft(text("check.nothing")))
             return
         report = plan.report

@@ -16,9 +16,9 @@ def obstacle(state: LabState) -> Message | None:
     if status.phase == "closed" and state.session is not None:
         return message("ready.session_closed")
     resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed)
-    if resting is not None or state.plan is None:
+    if resting is not None or state.now.plan is None:
         return resting or plan_obstacle(None, status.q_c)
     robot = state.robot
     address = None if robot is None or robot.is_virtual else robot.name
-    untold = control_obstacle(state.control, status.setup.control, state.refusal, address)
-    return untold or plan_obstacle(state.plan, status.q_c)
+    untold = control_obstacle(state.now.drive.control, status.setup.control, state.now.drive.refusal, address)
+    return untold or plan_obstacle(state.now.plan, status.q_c)

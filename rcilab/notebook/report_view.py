@@ -33,12 +33,12 @@ class ReportView(Part):
         """What is shown; None while there is nothing to judge."""
         if self._own is not None:
             return self._own
-        return None if self.state.plan is None else self.state.plan.report
+        return None if self.state.now.plan is None else self.state.now.plan.report
 
     def _show(self) -> None:
         text, report = self.text, self.report
         if report is None:
-            reason = self.state.no_plan
+            reason = self.state.now.no_plan
             write(self._verdict, soft(text("check.nothing") if reason is None else text.say(reason)))
             write(self._rows, "")
             return

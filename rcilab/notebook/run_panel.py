@@ -199,7 +199,7 @@ class RunPanel(Part):
         self._show()
 
     def _on_execute(self) -> None:
-        reason, plan = obstacle(self.state), self.state.plan
+        reason, plan = obstacle(self.state), self.state.now.plan
         if reason is not None:
             write(self._said, problem(self.text.say(reason)))
             return
@@ -213,14 +213,14 @@ class RunPanel(Part):
 
     def _move(self) -> None:
         self._forget_question()
-        reason, plan = obstacle(self.state), self.state.plan
+        reason, plan = obstacle(self.state), self.state.now.plan
         if reason is None and plan is not None:
             self.state.exhibit(None)
             self.state.look_at(None)
             write(self._outcome, "")
             self._running = plan.motion.duration
             try:
-                self._robot.execute(plan, self.state.pace)
+                self._robot.execute(plan, self.state.now.drive.pace)
             except PlanningError as error:
                 write(self._outcome, problem(self.text.say(tell_refusal(error, self.state.model, self.state.status))))
 
@@ -257,7 +257,7 @@ class RunPanel(Part):
             write(self._where, problem(text("run.deaf")) if self._heart.is_deaf else soft(text("run.by_cell")))
         else:
             write(self._where, "" if is_moving or not told else soft(told))
-        plan = state.plan
+        plan = state.now.plan
         if plan is None:
             write(self._plan, "")
         else:

@@ -108,7 +108,7 @@ class Scene(Part):
 
     def _make_film(self) -> Preview:
         plan = self.state.seen_arm
-        what = self.state.goal if plan is None else plan.motion
+        what = self.state.now.goal.q if plan is None else plan.motion
         return Preview(what, self.model, live=False, height=self.height, language=self.text.language)
 
 
@@ -135,12 +135,12 @@ class _LivePicture:
         seen = state.seen_arm
         moment = None if state.moment is None or seen is None else seen.motion.at(state.moment).q
         robot = None if status is None else status.q
-        solid = state.goal if robot is None and moment is None else moment if robot is None else robot
+        solid = state.now.goal.q if robot is None and moment is None else moment if robot is None else robot
         assert solid is not None
         self._arm.show(solid)
-        self._see("goal", self._goal, state.goal, solid)
+        self._see("goal", self._goal, state.now.goal.q, solid)
         self._see("plan", self._ghost, None if robot is None else moment, solid)
-        tint = _REFUSED if state.reach.tone == "bad" else _REACHED
+        tint = _REFUSED if state.now.goal.reach.tone == "bad" else _REACHED
         if tint != self._tint:
             self._tint = tint
             self._goal.set_look(color=tint)

@@ -34,7 +34,7 @@ class SpeedFields:
         self._writing = False
         self.pause = self._button("run.pause", desk.pause, icon="pause", style="warning")
         self.resume = self._button("run.resume", desk.resume, icon="play", style="info")
-        percent, slowest = 100.0 * state.pace, 100.0 * SLOWEST_PACE
+        percent, slowest = 100.0 * state.now.drive.pace, 100.0 * SLOWEST_PACE
         self.slider: Any = lean(
             ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
             readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},
@@ -57,7 +57,7 @@ class SpeedFields:
         self.pause.layout.display = "none" if is_held else None
         self.pause.disabled = not running
         self.resume.layout.display = None if is_held else "none"
-        percent = 100.0 * self._state.pace
+        percent = 100.0 * self._state.now.drive.pace
         if self.slider.value != percent:
             self._writing = True
             try:

@@ -27,7 +27,7 @@ class SpeedOverride:
     def choose(self, pace: float) -> None:
         """Wants motions to run at part of their planned speed; one that is held keeps waiting."""
         with self._state.lock:
-            self._state.pace = pace
+            self._state.set_drive(pace=pace)
             self._wish.choose(pace, self._state.status)
             self._state.tell("robot")
 
@@ -39,7 +39,7 @@ class SpeedOverride:
     def resume(self) -> None:
         """Goes on with a motion that is held."""
         with self._state.lock:
-            self._wish.go_on(self._state.pace)
+            self._wish.go_on(self._state.now.drive.pace)
 
     def tick(self, robot: RobotBackend) -> None:
         """Hands over what is wanted now."""

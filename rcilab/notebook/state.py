@@ -1,7 +1,7 @@
-"""What the parts of a notebook's lab share: the arm, the goal, the plan, the moment that is looked at, the robot.
+"""What the parts of a notebook's lab share: the application's state and commands, the robot, the moment shown.
 
-A part is given a model, a session or another part; parts of the same state move together. Everything is computed by
-the library's own calls; here is only who hears of it.
+A part is given a model, a session or another part; parts of the same state move together. Goal, plan and settings are
+the values of `rcilab.app`, changed by its requests as the page changes them.
 """
 
 from __future__ import annotations
@@ -10,27 +10,32 @@ import sys
 import threading
 import weakref
 from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, TypeGuard
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeGuard
 
 from numpy.typing import ArrayLike
 
-from rcilab.app.goal.target_status import TargetStatus, evaluate_joints, evaluate_pose
-from rcilab.app.planning import Plan, PlannableLaw, build_plan_view, make_plan
+from rcilab.app.app_state import AppState
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
+from rcilab.app.goal.target_status import evaluate_joints
+from rcilab.app.planning import Plan, build_plan_view
+from rcilab.app.request import Handlers, Request
+from rcilab.app.run.drive_state import choose_mode
+from rcilab.app.run.plan_readiness import ArmStatus
+from rcilab.app.state_store import StateStore
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.background_job import ProgressCallback
-from rcilab.core.errors import InvalidValueError, KinematicsError, RcilabError
+from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode, require_mode
-from rcilab.i18n.error_messages import tell
-from rcilab.i18n.translator import Message, message
+from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel, require_model
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.demo_motion import DemoMotion
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
-    from rcilab.makers.configuration import ControllerParameters
     from rcilab.motion.motion import Motion
     from rcilab.notebook.cell_run import CellRun
     from rcilab.notebook.robot_side import RobotBackend
@@ -53,16 +58,15 @@ class LabState:
     """
 
     def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
-        self._model = require_model(model)
-        self._own_limits = self._model.limits.joint  # Without what a controller was told here.
+        require_model(model)
+        self._own_limits = model.limits.joint  # Without what a controller was told here.
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotBackend | None = None
-        self.goal: JointVector = readonly_copy(model.home)
-        self.target: Pose = model.forward(self.goal)
-        self.reach: TargetStatus = evaluate_joints(model, self.goal)
-        self.plan: Plan | None = None
-        self.no_plan: Message | None = None
+        self._rest: JointVector = readonly_copy(model.home)  # Where the arm is as long as no robot reports it.
+        self.store: StateStore[AppState] = StateStore(AppState(model=model, goal=goal_at(model, self._rest)))
+        self.goals = GoalActions(self.store, _Arm(self), plans_at_once=False)
+        self._handlers: Handlers = {**self.goals.handlers, PlanGoal: lambda _: self.make_plan()}
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
         self.exhibition: DemoMotion | CellRun | None = None
@@ -74,18 +78,6 @@ class LabState:
         self._ran: Plan | None = None  # The plan as it was run, where its pace was changed on the way.
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
-        self.speed = 0.5
-        self.pace = 1.0
-        """Part of its planned speed that a motion runs at."""
-        self.law: PlannableLaw = "torque_rate_limited"
-        self.way: Way = "joint"
-        self.mode: Mode = "joint_position"
-        """How a motion is commanded; its conditions judge the plan."""
-        self.control: ControllerParameters | None = None
-        """Parameters of the modes as somebody wants them; None: nobody has touched them."""
-        self.refusal: Message | None = None
-        """Why the controller did not take them."""
-        self._rest: JointVector = self.goal  # Where the arm stands as long as no robot says otherwise.
         self._hearers: dict[Topic, list[Callable[[], None]]] = {}
 
     def hear(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
@@ -108,8 +100,34 @@ class LabState:
                     act()
 
     @property
+    def now(self) -> AppState:
+        """The values of this moment; of a session with the tool, the load and the soft limits that it has set since."""
+        if self.session is not None and self.session.model is not self.store.state.model:
+            self.store.update(model=self.session.model)
+        return self.store.state
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm."""
+        return self.now.model
+
+    def ask(self, request: Request) -> None:
+        """Carries out a request of a feature at once; every part that shows what it changes follows."""
+        with self.lock:
+            goal = self.now.goal
+            self._handlers[type(request)](request)
+            if self.now.goal is not goal:
+                self._leave_preview()
+                self.tell("goal")
+
+    def set_drive(self, **changes: Any) -> None:
+        """Changes how motions are executed: fields of `DriveState`."""
+        with self.lock:
+            self.store.update(drive=replace(self.now.drive, **changes))
+
+    @property
     def status(self) -> SupervisorStatus | None:
-        """How the robot stands; None while none is connected."""
+        """The status of the robot; None while none is connected."""
         return None if self.robot is None else self.robot.status()
 
     @property
@@ -119,19 +137,14 @@ class LabState:
         return self._rest if status is None or status.q_c is None else readonly_copy(status.q_c)
 
     @property
-    def model(self) -> RobotModel:
-        """The arm; of a session with the tool, the load and the soft limits that it has set since."""
-        return self._model if self.session is None else self.session.model
-
-    @property
     def seen(self) -> Plan | None:
         """What timeline and curves show: the plan, as it was run if it was, or what is on show in its place."""
-        return self._ran or self.plan if self.exhibition is None else self.exhibition.plan
+        return self._ran or self.now.plan if self.exhibition is None else self.exhibition.plan
 
     @property
     def seen_arm(self) -> Plan | None:
         """Where the scene shows the arm at a moment."""
-        return self._ran or self.plan if self.exhibition is None else self.exhibition.scene
+        return self._ran or self.now.plan if self.exhibition is None else self.exhibition.scene
 
     @property
     def seen_run(self) -> Run | None:
@@ -141,14 +154,19 @@ class LabState:
         return self.run if self.is_run_of_plan else None
 
     def start_from(self, q: ArrayLike) -> None:
-        """Says where the arm stands while no robot is connected, shape (n,), [rad]."""
+        """Sets where the arm is while no robot is connected, shape (n,), [rad]."""
         with self.lock:
             self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
-            self.plan, self.no_plan, self.moment, self.exhibition, self._ran = None, None, None, None, None
+            self.store.update(plan=None, no_plan=None)
+            self.moment, self.exhibition, self._ran = None, None, None
             self.tell("plan", "moment", "goal")
 
     def pose(self, q: ArrayLike) -> None:
-        """Wants the arm at joint angles, shape (n,), [rad]; the plan stays until somebody plans anew."""
+        """Sets the goal to joint angles, shape (n,), [rad]; the plan stays until it is planned again.
+
+        Raises:
+            InvalidValueError: An angle is outside its limits.
+        """
         angles = as_vector(q, self.model.n, "q", "rad")
         limits = self.model.limits.joint
         for joint, (angle, low, high) in enumerate(zip(angles, limits.lower, limits.upper, strict=True), start=1):
@@ -157,36 +175,18 @@ class LabState:
                     f"q of joint {joint}", float(angle), f"must be from {low:.4f} to {high:.4f} rad"
                 )
         with self.lock:
-            self.goal = readonly_copy(angles)
-            self.target = self.model.forward(self.goal)
-            self.reach = evaluate_joints(self.model, self.goal)
-            self._look_away()
+            self.store.remember()
+            self.goals.pose(readonly_copy(angles))
+            self._leave_preview()
             self.tell("goal")
 
-    def aim(self, target: Pose, *, psi: float | None = None, near: ArrayLike | None = None) -> None:
-        """Wants the tool at a pose; the arm takes the nearest branch, or comes as near as it can.
-
-        Args:
-            target: Pose of the tool in base.
-            psi: Arm angle to take, [rad]; None keeps the present one.
-            near: Joint angles that choose the branch, shape (n,), [rad]; the present goal when absent.
-        """
-        around = self.goal if near is None else as_vector(near, self.model.n, "near", "rad")
+    def aim(self, target: Pose) -> None:
+        """Sets the goal to a pose of the tool in base: the nearest branch, or the reachable pose nearest to it."""
         with self.lock:
-            self.reach = evaluate_pose(self.model, target, around, psi)
-            self.goal, self.target = self.reach.q, target
-            self._look_away()
+            self.store.remember()
+            self.goals.aim(target)
+            self._leave_preview()
             self.tell("goal")
-
-    @property
-    def arm_angle(self) -> float | None:
-        """Arm angle of the goal, [rad]; None where there is none."""
-        if not self.model.redundancy:
-            return None
-        try:
-            return self.model.arm_angle(self.goal)
-        except KinematicsError:
-            return None
 
     def make_plan(self) -> None:
         """Plans from where the arm stands to the goal and judges it, collisions too."""
@@ -198,8 +198,7 @@ class LabState:
         It takes its time, so it is not for a thread that somebody waits for.
         """
         with self.lock:
-            make = self._line() if self.way == "line" else self._joint()
-            mode = self.mode
+            make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
 
         def run(progress: ProgressCallback) -> Plan | Message:
             made = make()
@@ -214,8 +213,9 @@ class LabState:
         from rcilab.motion.motion import require_motion
 
         require_motion(motion)
-        report = check(motion, self.model, mode=self.mode)
-        self.show(replace(build_plan_view(self.model, motion, report), mode=self.mode, complete=True))
+        mode = self.now.drive.mode
+        report = check(motion, self.model, mode=mode)
+        self.show(replace(build_plan_view(self.model, motion, report), mode=mode, complete=True))
 
     def follow(self, mode: Mode) -> None:
         """Chooses how motions are commanded; the plan is judged by the conditions of that mode.
@@ -224,15 +224,13 @@ class LabState:
             mode: One of `rcilab.core.state.MODES`.
         """
         with self.lock:
-            self.mode = require_mode(mode)
-            if self.plan is not None:
-                self.plan = self.plan.completed(mode)
+            choose_mode(self.store, require_mode(mode))
             self.tell("plan")
 
     def show(self, made: Plan | Message) -> None:
         """Shows a plan, or why there is none."""
         with self.lock:
-            self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
+            self.goals.show(made)
             self.run, self.moment, self.exhibition, self._ran = None, None, None, None
             self.tell("plan", "moment")
 
@@ -245,15 +243,16 @@ class LabState:
         """
         with self.lock:
             if self.session is None:  # A session has them already.
-                self._model = self._model.with_joint_limits(lower, upper)
-            self.reach = evaluate_joints(self.model, self.goal)
+                self.store.update(model=self.model.with_joint_limits(lower, upper))
+            goal = self.now.goal
+            self.store.update(goal=replace(goal, reach=evaluate_joints(self.model, goal.q)))
             self.tell("goal")
-            if self.plan is not None:
-                self.take_motion(self.plan.motion)
+            if self.now.plan is not None:
+                self.take_motion(self.now.plan.motion)
 
     def free_joints(self) -> None:
         """Takes the arm's range back that it had before a controller that is gone was told soft limits."""
-        own, now = self._own_limits, self._model.limits.joint
+        own, now = self._own_limits, self.model.limits.joint
         if now is not own:
             self.limit_joints(own.lower, own.upper)
 
@@ -262,8 +261,9 @@ class LabState:
         with self.lock:
             self.run, self.error, self.is_run_of_plan, before = run, error, True, self._ran
             self._ran = None
-            if run is not None and run.paced and run.plan is not None and self.plan is not None:
-                self._ran = build_plan_view(self.model, run.plan, self.plan.report, self.plan.box)
+            plan = self.now.plan
+            if run is not None and run.paced and run.plan is not None and plan is not None:
+                self._ran = build_plan_view(self.model, run.plan, plan.report, plan.box)
             if self._ran is not before:  # Its times are others now.
                 self.moment = None
                 self.tell("plan", "moment")
@@ -312,38 +312,35 @@ class LabState:
 
     @property
     def is_goal_of_plan(self) -> bool:
-        """Whether the plan still leads to the goal: nobody has moved it since."""
-        return self.plan is not None and bool(abs(self.plan.motion.goal - self.goal).max() < 1e-6)
+        """Whether the plan still leads to the goal."""
+        plan, goal = self.now.plan, self.now.goal
+        return plan is not None and bool(abs(plan.motion.goal - goal.q).max() < 1e-6)
 
-    def _look_away(self) -> None:
+    def _leave_preview(self) -> None:
         self.exhibit(None)
         if self.moment is not None:
             self.moment = None
             self.tell("moment")
 
-    def _joint(self) -> Callable[[], Plan | Message]:
-        start, goal, speed, law, short = self.here, self.goal, self.speed, self.law, self.reach.short
 
-        def make() -> Plan | Message:
-            made = make_plan(self.model, start, goal, speed, law)
-            return replace(made, short=short) if isinstance(made, Plan) else made
+@dataclass(frozen=True, slots=True)
+class _Standing:
+    q_c: JointVector
+    phase: str = "closed"
 
-        return make
 
-    def _line(self) -> Callable[[], Plan | Message]:
-        start, goal, speed = self.here, self.goal, self.speed
+class _Arm:
+    """Where the arm of a lab is, also without a robot."""
 
-        def make() -> Plan | Message:
-            from rcilab.conformance.check import check
-            from rcilab.motion.cartesian import plan_line
+    def __init__(self, state: LabState) -> None:
+        self._state = weakref.ref(state)
 
-            try:
-                motion = plan_line(self.model, start, self.model.forward(goal), speed=speed)
-                return build_plan_view(self.model, motion, check(motion, self.model, start=start, distance=None))
-            except RcilabError as error:
-                return message("plan.failed", error=tell(error))
-
-        return make
+    def status(self) -> ArmStatus:
+        """Returns the robot's status; without one the arm is where it was left."""
+        state = self._state()
+        assert state is not None
+        status = state.status
+        return status if status is not None and status.q_c is not None else _Standing(state.here)
 
 
 _of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()

@@ -8,10 +8,10 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
+from rcilab.app.goal.goal_actions import ChooseBranch, SetArmAngle
 from rcilab.app.goal.target_status import margin, telling_joints
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.solutions import Solutions
 from rcilab.notebook.arc_circle import draw_circle
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -46,7 +46,6 @@ class TargetPanel(Part):
         self.branches = lean(ipywidgets.Dropdown, description=text("target.branch"), tooltip=text("target.branch_hint"),
             layout=ipywidgets.Layout(width="22em"), style={"description_width": "8em"},
         )  # fmt: skip
-        self._solutions: Solutions | None = None
         self.branches.observe(self._on_branch, names="value")
         pairs = [
             lean(
@@ -85,7 +84,7 @@ class TargetPanel(Part):
 
     def _taker(self, index: int) -> Any:
         def take(value: float) -> None:
-            target = self.state.target
+            target = self.state.now.goal.target
             position, rpy = np.array(target.position), np.array(target.rpy)
             if index < 3:
                 position[index] = value / 1000.0
@@ -96,28 +95,28 @@ class TargetPanel(Part):
         return take
 
     def _turn(self, degrees: float) -> None:
-        self.state.aim(self.state.target, psi=math.radians(degrees))
+        self.state.ask(SetArmAngle(psi=math.radians(degrees)))
 
     def _on_psi(self, change: Any) -> None:
         if not self._writing and self._psi_echo.is_hand(change["new"]):
             self._turn(change["new"])
 
     def _on_branch(self, change: Any) -> None:
-        solutions = self._solutions
-        if not self._writing and change["new"] is not None and solutions is not None:
-            self.state.aim(self.state.target, near=solutions[change["new"]])
+        if not self._writing and change["new"] is not None:
+            self.state.ask(ChooseBranch(index=change["new"]))
 
     def _show(self) -> None:
         state, text = self.state, self.text
         self._writing = True
         try:
-            values = (*(1e3 * state.target.position), *np.degrees(state.target.rpy))
+            goal = state.now.goal
+            values = (*(1e3 * goal.target.position), *np.degrees(goal.target.rpy))
             for field, value in zip(self.fields, values, strict=True):
                 field.show(float(value))
-            tone = state.reach.tone
-            said = verdict(tone, text(f"reach.tone.{tone}"), text.say(state.reach.reason))
-            if state.reach.short is not None:
-                said += soft(text("target.leads_short", short=text.say(state.reach.short)))
+            tone = goal.reach.tone
+            said = verdict(tone, text(f"reach.tone.{tone}"), text.say(goal.reach.reason))
+            if goal.reach.short is not None:
+                said += soft(text("target.leads_short", short=text.say(goal.reach.short)))
             write(self._reach, said)
             if self.psi is not None:
                 self._show_arm_angle()
@@ -126,7 +125,7 @@ class TargetPanel(Part):
             self._writing = False
 
     def _show_arm_angle(self) -> None:
-        psi = self.state.arm_angle
+        psi = self.state.now.goal.psi
         if psi is not None:
             degrees = math.degrees(psi)
             if abs(self.psi.value - degrees) > 1e-6:
@@ -134,28 +133,19 @@ class TargetPanel(Part):
                 self.psi.value = degrees
             self._psi_field.show(degrees)
         try:
-            arcs = self.model.feasible_arcs(self.model.forward(self.state.goal))
+            arcs = self.model.feasible_arcs(self.model.forward(self.state.now.goal.q))
         except KinematicsError:
             write(self._circle, soft(self.text("jog.no_arm_angle")))
             return
         write(self._circle, draw_circle(arcs, psi, self.text))
 
-    def _solve(self) -> Solutions | None:
-        """Returns the branches at the goal, also where it was posed joint by joint; None out of reach."""
-        state = self.state
-        if state.reach.solutions is not None or state.reach.tone == "bad":
-            return state.reach.solutions
-        try:
-            return self.model.inverse(state.target, state.arm_angle, state.goal)
-        except KinematicsError:
-            return None
-
     def _show_branches(self) -> None:
         state, text = self.state, self.text
-        solutions = self._solutions = self._solve()
+        goal = state.now.goal
+        solutions = goal.reach.solutions
         if solutions is None or not len(solutions):
             self.branches.layout.display = "none"
-            code = "target.out_of_reach" if state.reach.tone == "bad" else "target.no_branches"
+            code = "target.out_of_reach" if goal.reach.tone == "bad" else "target.no_branches"
             write(self._table, soft(text(code)))
             return
         here, rows, chosen = state.here, [], None
@@ -166,7 +156,7 @@ class TargetPanel(Part):
             way = text("target.way", number=number + 1, margin=f"{math.degrees(least.angle):.1f}", joint=least.joint,
                        away=f"{away:.1f}")  # fmt: skip
             rows.append(" · ".join([way, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
-            if float(np.abs(np.angle(np.exp(1j * (q - state.goal)))).max()) < 1e-6:
+            if float(np.abs(np.angle(np.exp(1j * (q - goal.q)))).max()) < 1e-6:
                 chosen = number
         options = [(row, number) for number, row in enumerate(rows)]
         if tuple(options) != self.branches.options:

@@ -78,7 +78,7 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
     with notebook.MotionPlot(panel) as plot, notebook.Timeline(panel) as timeline:
         panel.state.pose(robot.state.q_c + 0.1)
         panel.state.make_plan()
-        planned = panel.state.plan
+        planned = panel.state.now.plan
         assert planned is not None
         wait_for(lambda: not panel.execute.disabled, what="Execute")
         cell = execute(robot)
@@ -94,7 +94,7 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
         wait_for(lambda: "Stopped before its end" in panel._outcome.value, what="the outcome in words")
         assert "A cell moved the arm" in panel._outcome.value
         assert panel.state.run is run
-        assert panel.state.plan is planned  # The person's own is still there.
+        assert panel.state.now.plan is planned  # The person's own is still there.
         assert "rl-panels" in plot.html
         assert timeline.slider.max == round(1000.0 * run.plan.duration)
         panel.state.pose(robot.state.q_c)

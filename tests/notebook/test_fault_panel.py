@@ -39,7 +39,7 @@ def require_at_moment(exhibit: FaultDemo, scene: Scene, timeline: Timeline, plot
     np.testing.assert_allclose(picture._arm._shown, exhibit.moved.at(exhibit.time).q)
     assert 'class="rl-violation"' in plot.html
     assert "left:" in plot._cursor.value
-    assert scene.state.plan is None  # It is never one to execute.
+    assert scene.state.now.plan is None  # It is never one to execute.
 
 
 def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_is_left_alone() -> None:

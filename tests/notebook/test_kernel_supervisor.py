@@ -47,7 +47,7 @@ until(lambda: panel.state.status.powered)
 MOVE = """
 panel.state.error = None
 sign = 1.0 if panel.state.here[0] < 0.0 else -1.0
-panel.state.speed = 0.005  # Minutes: an arrival is no stop.
+panel.state.store.update(speed=0.005)  # Minutes: an arrival is no stop.
 panel.state.pose(model.home + 0.5 * sign)
 panel.state.make_plan()
 panel._show()
@@ -83,7 +83,7 @@ slow.on_click(lambda _: time.sleep(2.0))
 CLICK: dict[str, Any] = {"method": "custom", "content": {"event": "click"}}
 STANDS = """
 until(lambda: panel.state.error is not None)
-panel.state.status.phase, panel.state.status.motion_time < panel.state.plan.motion.duration - 1.0
+panel.state.status.phase, panel.state.status.motion_time < panel.state.now.plan.motion.duration - 1.0
 """
 
 

@@ -216,7 +216,10 @@ def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without
     while not ended.exists() or ended.read_text() != LEFT_ALONE:
         assert time.monotonic() < deadline, "the cell's arm goes on although nobody is there"
         time.sleep(0.1)
-    told = {"phase": "lab.state.status.phase", "left": "lab.state.plan.motion.duration - lab.state.status.motion_time"}
+    told = {
+        "phase": "lab.state.status.phase",
+        "left": "lab.state.now.plan.motion.duration - lab.state.status.motion_time",
+    }
     while True:
         reply = client.execute_interactive("", user_expressions=told, timeout=30)
         phase, left = (reply["content"]["user_expressions"][name]["data"]["text/plain"] for name in told)

@@ -17,6 +17,7 @@ from ipywidgets.widgets import widget
 import rcilab
 import rcilab.notebook
 from rcilab import notebook
+from rcilab.app.goal.goal_actions import SetLaw
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.locale import LANGUAGES, load_words
 from rcilab.i18n.translator import load_face
@@ -183,9 +184,9 @@ def test_a_typed_target_is_reached_as_the_library_reaches_it(fresh: Lab) -> None
     fresh.jog.q = GOAL
     height = 1000.0 * PRO7.forward(GOAL).position[2]
     fresh.target.fields[2].box.value = f"{height - 20.0:.1f}"
-    wanted = PRO7.closest(fresh.state.target, GOAL).q
-    np.testing.assert_allclose(fresh.state.goal, wanted, atol=1e-12)
-    assert PRO7.forward(fresh.state.goal).position[2] == pytest.approx(fresh.state.target.position[2])
+    wanted = PRO7.closest(fresh.state.now.goal.target, GOAL).q
+    np.testing.assert_allclose(fresh.state.now.goal.q, wanted, atol=1e-12)
+    assert PRO7.forward(fresh.state.now.goal.q).position[2] == pytest.approx(fresh.state.now.goal.target.position[2])
 
 
 def test_branches_and_the_arm_angle_keep_the_tool_where_it_is(fresh: Lab) -> None:
@@ -195,15 +196,15 @@ def test_branches_and_the_arm_angle_keep_the_tool_where_it_is(fresh: Lab) -> Non
     fresh.target.branches.value = next(
         number for _, number in fresh.target.branches.options if number != fresh.target.branches.value
     )
-    assert np.abs(fresh.state.goal - GOAL).max() > 0.1
-    assert PRO7.forward(fresh.state.goal).is_close(pose, 1e-6)
+    assert np.abs(fresh.state.now.goal.q - GOAL).max() > 0.1
+    assert PRO7.forward(fresh.state.now.goal.q).is_close(pose, 1e-6)
     fresh.target.psi.value = fresh.target.psi.value + 5.0
-    assert PRO7.forward(fresh.state.goal).is_close(pose, 1e-6)
+    assert PRO7.forward(fresh.state.now.goal.q).is_close(pose, 1e-6)
 
 
 def test_a_target_out_of_reach_is_said_and_the_nearest_pose_taken(fresh: Lab) -> None:
     fresh.target.fields[0].box.value = "2500"
-    assert fresh.state.reach.tone == "bad"
+    assert fresh.state.now.goal.reach.tone == "bad"
     assert "Not reachable" in text_of(fresh.target._reach)
 
 
@@ -217,23 +218,23 @@ def test_what_a_browser_rounds_to_the_steps_of_a_slider_moves_nothing(fresh: Lab
     fresh.tabs.selected_index = 1
     fresh.jog.q = q = PRO7.home + 0.3
     fresh.plan._speed_field.box.value = "40.3"
-    before = fresh.state.speed
+    before = fresh.state.now.speed
     fresh.jog.sliders[1].value = round(np.degrees(PRO7.home[1]))  # What it showed before, told back late.
     for slider in (*fresh.jog.sliders, fresh.target.psi, fresh.plan.speed):
         slider.value = round(slider.value / slider.step) * slider.step  # As noUiSlider does with what it is given.
-    np.testing.assert_array_equal(fresh.state.goal, q)
-    assert fresh.state.speed == before == pytest.approx(0.403)
+    np.testing.assert_array_equal(fresh.state.now.goal.q, q)
+    assert fresh.state.now.speed == before == pytest.approx(0.403)
     for slider in (fresh.jog.sliders[0], fresh.plan.speed):
         slider.value += slider.step
-    assert np.degrees(fresh.state.goal[0]) == pytest.approx(17.5)
-    assert fresh.state.speed == pytest.approx(0.41)
+    assert np.degrees(fresh.state.now.goal.q[0]) == pytest.approx(17.5)
+    assert fresh.state.now.speed == pytest.approx(0.41)
 
 
 def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.speed.value = 40.0
     fresh.plan.plan.click()
-    plan = fresh.state.plan
+    plan = fresh.state.now.plan
     assert plan is not None
     np.testing.assert_array_equal(
         plan.motion.q, rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=0.4, law="torque_rate_limited").q
@@ -259,43 +260,43 @@ def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: L
     assert "Not safe" in text_of(fresh.report._verdict)
     assert "rl-bad" in fresh.report._rows.value
     fresh.plan.slow_down.click()
-    assert fresh.state.plan is not None
-    assert fresh.state.plan.report.ok
+    assert fresh.state.now.plan is not None
+    assert fresh.state.now.plan.report.ok
 
 
 def test_what_takes_longer_shows_how_far_it_is_and_can_be_given_up(fresh: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     panel, go_on = fresh.plan, threading.Event()
     fresh.jog.q = GOAL
     panel.plan.click()
-    before = fresh.state.plan
+    before = fresh.state.now.plan
     assert before is not None
     monkeypatch.setattr(
         "rcilab.notebook.long_task.kernel_cells", lambda: SimpleNamespace(is_calling=False)
     )  # A hand's.
-    monkeypatch.setattr("rcilab.notebook.state.make_plan", lambda *_: go_on.wait(20.0) and before)
+    monkeypatch.setattr("rcilab.app.goal.goal_actions.make_plan", lambda *_: go_on.wait(20.0) and before)
     panel.plan.click()
     assert panel.plan.disabled
     wait_for(lambda: panel.cancel.layout.display is None, what="Cancel")
     panel.cancel.click()
     wait_for(lambda: not panel.plan.disabled, what="the end of it")
     assert panel.cancel.layout.display == panel.progress.layout.display == "none"
-    assert fresh.state.plan is before
+    assert fresh.state.now.plan is before
     panel.plan.click()
     go_on.set()
-    wait_for(lambda: fresh.state.plan is not before, what="the plan")
+    wait_for(lambda: fresh.state.now.plan is not before, what="the plan")
 
 
 def test_what_only_goes_against_advice_can_be_slowed_down_too(fresh: Lab) -> None:
     fresh.jog.q = GOAL
-    fresh.state.law = "jerk_limited"
+    fresh.state.ask(SetLaw(law="jerk_limited"))
     fresh.plan.plan.click()
-    plan = fresh.state.plan
+    plan = fresh.state.now.plan
     assert plan is not None
     assert plan.report.ok
     assert plan.report.warnings
     assert fresh.plan.slow_down.layout.display is None
     fresh.plan.slow_down.click()
-    slower = fresh.state.plan
+    slower = fresh.state.now.plan
     assert slower is not None
     assert len(slower.report.warnings) < len(plan.report.warnings)
     assert fresh.plan.slow_down.layout.display == "none"
@@ -303,10 +304,10 @@ def test_what_only_goes_against_advice_can_be_slowed_down_too(fresh: Lab) -> Non
 
 def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
     fresh.state.take_motion(rcilab.Motion.from_cycles(rcilab.plan_joint(PRO7, PRO7.home, GOAL, speed=1.0).q[::9]))
-    broken = fresh.state.plan
+    broken = fresh.state.now.plan
     assert broken is not None
     fresh.plan.slow_down.click()
-    assert fresh.state.plan is broken
+    assert fresh.state.now.plan is broken
     assert broken.report.slow_down().explain("en") in text_of(fresh.plan._said)
 
 
@@ -322,13 +323,13 @@ def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
 def test_the_timeline_moves_cursor_and_arm_together(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.plan.click()
-    assert fresh.state.plan is not None
+    assert fresh.state.now.plan is not None
     fresh.timeline.slider.value = 300
     assert fresh.state.moment == pytest.approx(0.3)
     assert "left:" in fresh.plot._cursor.value
     picture = fresh.scene._picture
     assert picture is not None
-    np.testing.assert_allclose(picture._arm._shown, fresh.state.plan.motion.at(0.3).q)
+    np.testing.assert_allclose(picture._arm._shown, fresh.state.now.plan.motion.at(0.3).q)
     fresh.timeline.live.click()
     assert fresh.state.moment is None
     np.testing.assert_allclose(picture._arm._shown, GOAL)
@@ -420,14 +421,14 @@ def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later()
         with pytest.raises(InvalidValueError, match="q of joint 2"):
             state.pose(PRO7.home)
         jog.sliders[0].value = 20.0  # The goal is beyond the soft limit meanwhile: it comes inside.
-        assert state.goal[0] == pytest.approx(np.radians(20.0))
-        assert state.goal[1] == upper[1]
+        assert state.now.goal.q[0] == pytest.approx(np.radians(20.0))
+        assert state.now.goal.q[1] == upper[1]
         jog.sliders[1].value = np.degrees(joint.upper[1])
-        assert state.goal[1] == upper[1]
+        assert state.now.goal.q[1] == upper[1]
         robot.power_on()
         state.take_motion(rcilab.plan_joint(PRO7, PRO7.home, PRO7.home + 0.05))
-        assert state.plan is not None
-        assert not state.plan.report.ok, "it leaves the soft range"
+        assert state.now.plan is not None
+        assert not state.now.plan.report.ok, "it leaves the soft range"
 
 
 def test_a_slip_in_the_name_of_an_attribute_is_not_taken_in_silence():

@@ -10,6 +10,7 @@ import pytest
 
 import rcilab
 from rcilab import notebook
+from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
@@ -38,10 +39,10 @@ def held(panel: RunPanel) -> ControllerParameters | None:
 
 def run_in(panel: RunPanel, mode: str, speed: float, way: float) -> Any:
     panel.modes.mode.value = mode
-    panel.state.speed = speed
+    panel.state.ask(SetSpeed(speed=speed))
     panel.state.pose(panel.state.here + way)
     panel.state.make_plan()
-    plan = panel.state.plan
+    plan = panel.state.now.plan
     assert plan is not None
     assert plan.mode == mode
     panel.execute.click()
@@ -87,7 +88,7 @@ def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> 
             run = run_in(panel, mode, speed, 0.01)
             assert run.setup.mode == mode
             assert not run.stopped
-            np.testing.assert_allclose(run.q[-1], panel.state.goal, atol=5e-3)  # Torques lead it there softly.
+            np.testing.assert_allclose(run.q[-1], panel.state.now.goal.q, atol=5e-3)  # Torques lead it there softly.
 
 
 class Real:

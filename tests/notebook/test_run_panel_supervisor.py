@@ -12,6 +12,7 @@ import pytest
 
 import rcilab
 from rcilab import notebook
+from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
@@ -43,7 +44,7 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
         power_on(panel)
         assert panel.execute.disabled
         jog.q = PRO7.home + 0.1
-        panel.state.speed = 0.3
+        panel.state.ask(SetSpeed(speed=0.3))
         panel.state.make_plan()
         assert not panel.execute.disabled
         panel.execute.click()
@@ -78,7 +79,7 @@ def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch)
     with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         power_on(panel)
         panel.state.pose(PRO7.home + 0.3)
-        panel.state.speed = 0.05
+        panel.state.ask(SetSpeed(speed=0.05))
         panel.state.make_plan()
         heart._on_answer({})  # A browser was there.
         panel.execute.click()
@@ -117,7 +118,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         power_on(panel)
         assert pace.pause.disabled
         panel.state.pose(PRO7.home - 0.6)
-        panel.state.speed = 0.1
+        panel.state.ask(SetSpeed(speed=0.1))
         panel.state.make_plan()
         panel.execute.click()
         wait_for(lambda: not pace.pause.disabled, what="a motion that can be held")
@@ -175,7 +176,7 @@ def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
         for typed in ("5", "120", "fast", "nan"):
             panel.pace.field.box.value = typed
             assert "rl-problem" in panel.pace.field.said.value
-            assert panel.state.pace == 1.0
+            assert panel.state.now.drive.pace == 1.0
 
 
 class Real:
@@ -271,7 +272,7 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         wait_for(lambda: phase(panel) == "idle", what="a robot")
         panel.state.pose(PRO7.home + np.eye(7)[0])
         panel.state.make_plan()
-        assert panel.state.plan.report.ok
+        assert panel.state.now.plan.report.ok
         limits = panel.limits
         limits.folder.selected_index = 0
         limits.fields[0][1].box.value = "-200"
@@ -279,11 +280,11 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         limits.fields[0][1].box.value = "30"
         limits.send.click()
         wait_for(lambda: np.isclose(panel.model.limits.joint.upper[0], np.radians(30.0)), what="the limit in the model")
-        wait_for(lambda: not panel.state.plan.report.ok, what="the plan checked anew")
+        wait_for(lambda: not panel.state.now.plan.report.ok, what="the plan checked anew")
         assert panel.state.status.setup.joints.upper[0] == pytest.approx(np.radians(30.0))
         assert panel.execute.disabled
         panel.state.make_plan()
-        assert panel.state.plan is None or not panel.state.plan.report.ok
+        assert panel.state.now.plan is None or not panel.state.now.plan.report.ok
         with pytest.raises(RcilabError, match="joint 1"):
             panel.state.pose(PRO7.home + np.eye(7)[0])
         limits.auto.value = True

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol, TypeAlias
 
 import numpy as np
 
@@ -15,15 +15,12 @@ from rcilab.app.goal.elbow import nearest_free
 from rcilab.app.goal.goal import Goal, goal_at, goal_toward
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
-from rcilab.app.run.plan_readiness import is_done, is_moving
+from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
 from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
-
-if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
@@ -33,6 +30,9 @@ SLOWEST = 0.01
 SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long has come to rest.
 _ONE_DRAG = 1.0  # [s] A choice: what moves again within that time is one drag, or one turn at a slider's keys.
 RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
+
+
+PoseName: TypeAlias = Literal["zero", "home", "here", "start", "undo"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,7 @@ class MoveJoint(Request):
 class PoseGoal(Request):
     """Pose the goal in a named way."""
 
-    name: Literal["zero", "home", "here", "start", "undo"]
+    name: PoseName
     """"start" is where the plan begins, or its program."""
 
 
@@ -134,8 +134,8 @@ class SetLaw(Request):
 class StatusSource(Protocol):
     """Where the arm is."""
 
-    def status(self) -> SupervisorStatus:
-        """Returns how the robot stands; `q_c` is where a plan begins."""
+    def status(self) -> ArmStatus:
+        """Returns the status; a plan begins at its `q_c`."""
         ...
 
 
@@ -180,8 +180,8 @@ class GoalActions:
         q = np.array(self._store.state.goal.q)
         limits = model.limits.joint
         self._remember_hand(f"joint {request.joint}")
-        q[request.joint] = min(max(request.angle, limits.lower[request.joint]), limits.upper[request.joint])
-        self.pose(readonly_copy(q))
+        q[request.joint] = request.angle
+        self.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))  # The others too: soft limits may be new.
 
     def pose_goal(self, request: PoseGoal) -> None:
         """Poses the candidate arm by name."""

@@ -12,6 +12,8 @@ from rcilab.makers.configuration import ControllerParameters, ControlPart
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 
 if TYPE_CHECKING:
+    from rcilab.app.app_state import AppState
+    from rcilab.app.state_store import StateStore
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
@@ -41,6 +43,13 @@ class DriveState:
         """Returns the state with another number among the parameters."""
         control = with_number(self.wanted_control(model), part, place, value, model.limits)
         return replace(self, control=control, refusal=None)
+
+
+def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
+    """Chooses how motions are commanded; the plan is checked by the conditions of that mode."""
+    state = store.state
+    plan = None if state.plan is None else state.plan.completed(mode)
+    store.update(drive=replace(state.drive, mode=mode), plan=plan)
 
 
 def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | None:

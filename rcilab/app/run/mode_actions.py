@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, cast
 
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.drive_state import control_field, is_pending
+from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.setup.configuration_sender import SetupPost
@@ -74,9 +74,8 @@ class ModeActions:
             if is_moving(status):
                 self._store.say("warn", message("notice.moving"))
                 return
-            mode = cast("Mode", request.mode)
-            plan = None if state.plan is None else state.plan.completed(mode)
-            self._store.update(drive=replace(state.drive, mode=mode), plan=plan, asked=None)
+            choose_mode(self._store, cast("Mode", request.mode))
+            self._store.update(asked=None)
         if request.pace is not None and math.isfinite(request.pace):
             pace = min(max(request.pace, SLOWEST_PACE), 1.0)
             self._store.update(drive=replace(self._store.state.drive, pace=pace))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -10,9 +10,6 @@ from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.translator import Finished, Message, message
 from rcilab.motion.extent import measure_extent
-
-if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus
 
 _SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
 _NOT_IDLE = {
@@ -25,6 +22,20 @@ _NOT_IDLE = {
     "crashed": "ready.lost",
     "closed": "ready.closed",
 }
+
+
+class ArmStatus(Protocol):
+    """Where an arm is and what it does."""
+
+    @property
+    def phase(self) -> str:
+        """Of the control process."""
+        ...
+
+    @property
+    def q_c(self) -> JointVector | None:
+        """Commanded joint angles, shape (n,), [rad]; None while unknown."""
+        ...
 
 
 def arm_obstacle(phase: str, powered: bool | None, *, is_pressed: bool = False) -> Message | None:
@@ -74,7 +85,7 @@ def ask_to_move(plan: Plan, address: str) -> Message:
     )
 
 
-def is_moving(status: SupervisorStatus) -> bool:
+def is_moving(status: ArmStatus) -> bool:
     """Returns whether the arm is being moved by us."""
     return status.phase in ("moving", "stopping")
 
