@@ -128,7 +128,7 @@ class LimitFields:
             try:
                 self._robot().set_auto_limit(bool(change["new"]))
             except RcilabError as error:
-                write(self.said, problem(str(esc(error))))
+                write(self.said, problem(esc(str(error))))
 
     def _on_open(self, change: Any) -> None:
         """Makes the fields when they are wanted: fourteen of them would delay the cell."""
@@ -149,7 +149,7 @@ class LimitFields:
             own = describe_robot(self._state.model.name).limits.joint
             bound = float(getattr(own, end)[joint])  # Where it stands in the field, rounded, it is meant.
             angle = math.radians(degrees)
-            self._typed["lower upper".split().index(end)][joint] = bound if abs(angle - bound) < 1e-5 else angle
+            self._typed[0 if end == "lower" else 1][joint] = bound if abs(angle - bound) < 1e-5 else angle
 
         label = self._text(f"softlimits.{end}", joint=joint + 1)
         low, high = round(float(least), 6), round(float(largest), 6)
