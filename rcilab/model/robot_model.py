@@ -18,6 +18,7 @@ from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.model.dynamics.friction import JointFriction, simulated_friction
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.model.kinematics.frames import Frame
 from rcilab.model.kinematics.manipulability import Manipulability, ManipulabilityPath, dexterity, dexterity_path
@@ -26,7 +27,6 @@ from rcilab.model.kinematics.workspace import Workspace, sample_workspace
 from rcilab.robots import RobotDescription, describe_robot
 
 if TYPE_CHECKING:
-    from rcilab.model.dynamics.friction import JointFriction
     from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.model.kinematics.collision import Clearance, CollisionGeometry
 
@@ -235,8 +235,6 @@ class RobotModel(ReachingArm):
         terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
         if friction is False:
             return terms
-        from rcilab.model.dynamics.friction import JointFriction, simulated_friction
-
         law = simulated_friction(self.limits.joint) if friction is True else friction
         if not isinstance(law, JointFriction):
             raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
