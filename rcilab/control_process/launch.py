@@ -1,4 +1,4 @@
-"""Starting a virtual controller of our own in a process of its own."""
+"""Starting a private virtual controller in a process of its own."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class VirtualController(ManagedProcess):
 
     @property
     def address(self) -> str | None:
-        """Where it listens, or None as long as it does not.
+        """Address at which it listens, or None as long as it does not.
 
         Raises:
             ConnectionLostError: It has ended, or has not been ready for too long; the message contains its output.
@@ -63,13 +63,13 @@ class VirtualController(ManagedProcess):
                     self._address = found[1]
                     return self._address
             if not is_alive:
-                words = self.last_words or "it said nothing"
+                words = self.last_words or "it printed nothing"
                 raise ConnectionLostError(f"{self.name} did not start ({self.how_it_ended}): {words}").coded(
                     "no_process"
                 )
             if time.monotonic() - self._started > START_TIMEOUT:
                 raise ConnectionLostError(
-                    f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.last_words or 'it said nothing'}; "
+                    f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.last_words or 'it printed nothing'}; "
                     "try again when the machine is less busy"
                 ).coded("slow_start", seconds=f"{START_TIMEOUT:g}")
         return self._address

@@ -153,7 +153,7 @@ class ManagedProcess:
             self._read_status(_REPORT_TIMEOUT)
         code = self._exit_code
         if code is None:
-            return "nobody saw how"
+            return "unknown how"
         return f"signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"exit code {code}"
 
     @property

@@ -1,4 +1,4 @@
-"""The keeper of our processes, control process and virtual controller: launch, deaths, restarts, end."""
+"""The supervisor of control process and virtual controller: start, exits, restarts, end."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError
 
-ANSWER_TIMEOUT = 3.0  # [s] for the connection and for every answer of the controller.
+ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every answer of the controller.
 LOAD_TIMEOUT = START_TIMEOUT  # [s] for the control process to load; as long as the virtual controller may take.
-FROZEN_AFTER = 1.0  # [s] without a sign of life of the control process; a choice above every wait of its own.
-END_TIMEOUT = 3.0  # [s] for the control process to bring the arm to rest and go; the longest stop takes 0.4 s.
-MODE_DELAY = 0.2  # [s] Of our own controller: our client wants none of it.
-PREFILL = 40  # [cycles] Play-out of our own controller: beside a browser pauses of tens of ms are common. A choice.
-_RESTARTS, _RESTART_WINDOW = 3, 60.0  # Restarts by itself, in so many seconds.
+FROZEN_AFTER = 1.0  # [s] Without a heartbeat of the control process; longer than any wait of its own.
+END_TIMEOUT = 3.0  # [s] For the control process to stop the arm and exit; the longest stop takes 0.4 s.
+MODE_DELAY = 0.2  # [s] Of our own controller: our client needs no delay after a change of mode.
+PREFILL = 40  # [cycles] Play-out of our own controller: with a browser open pauses of tens of ms are common.
+_RESTARTS, _RESTART_WINDOW = 3, 60.0  # Automatic restarts, in so many seconds.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessExit:
-    """A process of ours ended, or froze and was ended, without anybody having wanted that."""
+    """An unexpected end of a process of ours: it ended by itself, or it froze and was ended."""
 
     code: str
     """Key of `MESSAGES`."""
     message: str
-    """One English sentence: what died, how, and what happens next."""
+    """One English sentence: what ended, how, and what happens next."""
     is_worker: bool
-    """Whether it was the control process: every request under way is lost with it."""
+    """Whether it was the control process: every pending request is lost with it."""
 
 
 class ProcessSupervisor:
     """Owns the control process and, where the controller is ours, the virtual controller.
 
-    It has no thread and no lock: `look()` is called often, and every call is guarded by the lock of whoever owns it.
+    It has no thread and no lock: `look()` is called often, and every call is guarded by its owner's lock.
     Nothing here waits, except `end()`.
 
     Args:
-        block: What the control process is handed.
+        block: Shared memory for the control process.
         model_name: Name of the arm, for the virtual controller.
         plant: What the virtual controller moves: "ideal" or "mujoco".
-        address: Where a controller is that is not ours; None to start a virtual one.
-        auto_restart: Whether what died is started again by itself (at most 3 times a minute).
+        address: Address of a controller that is not ours; None to start a virtual one.
+        auto_restart: Whether a process that ended is started again automatically (at most 3 times a minute).
     """
 
     def __init__(
@@ -67,28 +67,28 @@ class ProcessSupervisor:
 
     @property
     def worker_pid(self) -> int | None:
-        """Process id of the control process; None when it does not run."""
+        """Process id of the control process; None when it is not running."""
         return self._worker.pid if self._worker is not None and self._worker.is_alive else None
 
     @property
     def controller_pid(self) -> int | None:
-        """Process id of the virtual controller; None when there is none of ours or it does not run."""
+        """Process id of the virtual controller; None when it is not ours or not running."""
         return self._controller.pid if self._controller is not None and self._controller.is_alive else None
 
     @property
     def world_address(self) -> str | None:
-        """Where the world port of our virtual controller is, as HOST:PORT; None when there is none."""
+        """Address of our virtual controller's simulation port, HOST:PORT; None without one."""
         return self._controller.world_address if self._controller is not None and self.address is not None else None
 
     @property
     def is_ready(self) -> bool:
-        """Whether the control process listens and there is a controller to send it to."""
+        """Whether the control process takes requests and a controller is there to connect to."""
         return (
             self.address is not None and self._block.counters[Counter.WORKER_BEAT] != 0 and self.worker_pid is not None
         )
 
     def launch(self) -> None:
-        """Starts what belongs to us and returns at once; earlier restarts are forgiven.
+        """Starts our processes and returns at once; the count of restarts begins again.
 
         Raises:
             ConnectionLostError: A process could not be started.
@@ -100,11 +100,11 @@ class ProcessSupervisor:
         self._start_worker()
 
     def look(self) -> list[ProcessExit]:
-        """Buries what has died or frozen since the last look and starts it again where that is wanted."""
-        return [death for death in (self._look_after_controller(), self._look_after_worker()) if death is not None]
+        """Reaps what has ended or frozen since the last call and restarts it where that is enabled."""
+        return [death for death in (self._check_controller(), self._check_worker()) if death is not None]
 
     def end(self) -> None:
-        """Ends both processes; the control process has `END_TIMEOUT` to go by itself if it was asked to."""
+        """Ends both processes; the control process has `END_TIMEOUT` to exit by itself if that was requested."""
         worker, self._worker = self._worker, None
         if worker is not None:
             worker.wait(END_TIMEOUT)
@@ -119,7 +119,7 @@ class ProcessSupervisor:
 
     def _start_worker(self) -> None:
         words = self._block.counters
-        # Whatever lay in the mailboxes was for a process that is no more.
+        # Pending messages were for a process that has ended.
         for word in (Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN):
             words[word] = 0
         words[Counter.WORKER_BEAT] = 0
@@ -132,7 +132,7 @@ class ProcessSupervisor:
             [self._block.descriptor],
         )
 
-    def _look_after_controller(self) -> ProcessExit | None:
+    def _check_controller(self) -> ProcessExit | None:
         controller = self._controller
         if controller is None:
             return None
@@ -146,14 +146,14 @@ class ProcessSupervisor:
             return None
         how = controller.how_it_ended
         self._end_controller()
-        return self._succeed("crashed.controller", self._start_controller if was_ready else None, how=how)
+        return self._restart("crashed.controller", self._start_controller if was_ready else None, how=how)
 
-    def _look_after_worker(self) -> ProcessExit | None:
+    def _check_worker(self) -> ProcessExit | None:
         worker = self._worker
         if worker is None:
             return None
         if worker.is_alive:
-            silence = self._silence_of_worker()
+            silence = self._heartbeat_age()
             if silence < FROZEN_AFTER:
                 return None
             worker.kill()
@@ -164,10 +164,10 @@ class ProcessSupervisor:
             code, facts = "crashed.worker", {"how": how}
         worker.end()
         self._worker = None
-        return self._succeed(code, self._start_worker, **facts)
+        return self._restart(code, self._start_worker, **facts)
 
-    def _silence_of_worker(self) -> float:
-        """Returns how long the control process has given no sign of life, [s]; 0 while that is to be expected."""
+    def _heartbeat_age(self) -> float:
+        """Returns the time since the last heartbeat of the control process, [s]; 0 while none is expected."""
         beat = self._block.counters[Counter.WORKER_BEAT]
         if beat == 0:  # It is still loading.
             loading = time.monotonic() - self._worker_started
@@ -177,13 +177,13 @@ class ProcessSupervisor:
         is_connecting = read_snapshot(self._block.snapshot, self._block.counters).phase == "connecting"
         return 0.0 if is_connecting and silence < 3.0 * ANSWER_TIMEOUT else silence
 
-    def _succeed(self, code: str, start: Callable[[], None] | None, **facts: Any) -> ProcessExit:
-        """Starts a successor of what died, if that is wanted, and returns the death in words.
+    def _restart(self, code: str, start: Callable[[], None] | None, **facts: Any) -> ProcessExit:
+        """Restarts a process that ended, if that is enabled, and returns the event.
 
         Args:
             code: Key of `MESSAGES`.
-            start: Starts the successor; None when there shall be none.
-            **facts: What the message tells.
+            start: Starts the process again; None when it is not to be restarted.
+            **facts: What the message contains.
         """
         now = time.monotonic()
         is_often = len(self._restarts) == _RESTARTS and now - self._restarts[0] < _RESTART_WINDOW

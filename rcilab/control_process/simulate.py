@@ -25,16 +25,16 @@ def simulate(
     """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
 
     Args:
-        model: The arm, with its tool, load and soft limits; the virtual controller is told of all three.
-        plant: "ideal" (the arm is where it is told to be) or "mujoco".
+        model: The arm, with its tool, load and soft limits; the virtual controller receives all three.
+        plant: "ideal" (the arm follows the command exactly) or "mujoco".
         lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
             bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
         record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
 
     Raises:
-        InvalidValueError: The model is none, or the plant is unknown.
+        InvalidValueError: `model` is not a robot model, or the plant is unknown.
         ModelError: The arm does not speak the RCI.
-        ConnectionLostError: The virtual controller did not start; the message carries what it said.
+        ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
     from rcilab.makers.maker import require_simulator
     from rcilab.model.robot_model import load_model, require_model
@@ -46,7 +46,7 @@ def simulate(
         assert controller.address is not None  # start_controller waits for it.
         session = open_session(
             controller.address,
-            model.with_tool(IDENTITY),  # As the controller wakes up; it is told of the tool below.
+            model.with_tool(IDENTITY),  # As the controller starts; it receives the tool below.
             ANSWER_TIMEOUT,
             record_all=record_all,
             realtime=not lockstep,
@@ -69,7 +69,7 @@ def simulate(
     except BaseException:
         session.close()
         raise
-    weakref.finalize(session, controller.end)  # A cell that runs again drops the session of its last run.
+    weakref.finalize(session, controller.end)  # A cell that runs again drops its earlier session.
     return session
 
 

@@ -112,7 +112,7 @@ def test_a_fork_server_that_does_not_answer_is_replaced(run):
     assert child.pid is None
     child.end(timeout=0.1)
     assert not child.is_alive
-    assert child.how_it_ended == "nobody saw how"
+    assert child.how_it_ended == "unknown how"
     assert run("pass").wait(SOON)
     assert fork_server_pid() != stuck
 
@@ -123,7 +123,7 @@ def test_without_their_fork_server_copies_end_and_the_next_one_has_another():
         first = fork_server_pid()
         os.kill(first, signal.SIGKILL)
         assert controller.wait(SOON)
-        assert controller.how_it_ended == "nobody saw how"
+        assert controller.how_it_ended == "unknown how"
         following = start_controller("xMatePro7")
         following.end()
         assert following.how_it_ended == "exit code 0"

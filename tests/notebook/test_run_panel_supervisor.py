@@ -133,8 +133,12 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         assert panel.state.status.pace == 0.0  # It keeps waiting.
         pace.resume.click()
         wait_for(lambda: "50 %" in pace._way.value, what="half the speed")
-        assert panel.state.status.motion_place is not None
-        assert panel.state.status.motion_place < (panel.state.status.motion_time or 0.0)
+        wait_for(
+            lambda: (
+                (now := panel.state.status).motion_place is not None and now.motion_place < (now.motion_time or 0.0)
+            ),
+            what="the plan falling behind the clock",
+        )
         assert pace.resume.layout.display == "none"
         pace.slider.value = 100.0
         wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, what="all of it")

@@ -1,4 +1,4 @@
-"""An empty page of viser's own: what to measure beside, and to measure parts of ours on."""
+"""An empty page of viser's own: the reference, and a place for parts of ours to be measured."""
 
 from __future__ import annotations
 

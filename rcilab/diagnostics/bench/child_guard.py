@@ -1,8 +1,8 @@
 """Programs that a bench starts and that end with it, whatever ends it: its own end, Ctrl-C, SIGTERM or SIGKILL.
 
-A keeper stands between: a small process in a session of its own that runs the program and holds one end of a pipe. The
-system closes the other end when the bench dies, of whatever; then the keeper ends the program with all its helpers and
-clears away its directory.
+A guard stands between: a small process in a session of its own that runs the program and holds one end of a pipe. The
+system closes the other end when the bench ends, however that happens; then the guard ends the program with all its
+helpers and removes its directory.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ _PATIENCE = 10.0  # [s] Between asking a program to end and ending it.
 
 
 @contextmanager
-def keeper(
-    command: Sequence[str], *, directory: str = "", said: IO[str] | None = None
+def guard(
+    command: Sequence[str], *, directory: str = "", output: IO[str] | None = None
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Keeps a program ready to run until the block is left: `launch` starts it.
+    """Holds a program ready to run until the block is left: `launch` starts it.
 
     Args:
         command: The program and its arguments.
         directory: What it may fill, and is removed after it.
-        said: Where its output goes; nowhere when absent.
+        output: Where its output goes; nowhere when absent.
 
     Yields:
-        The keeper's process; it ends when the program does, with its exit code.
+        The guard's process; it ends when the program does, with its exit code.
 
     Raises:
-        ConnectionLostError: The keeper did not start.
+        ConnectionLostError: The guard did not start.
     """
     process = subprocess.Popen(
         [sys.executable, "-m", "rcilab.diagnostics.bench.child_guard", directory, *command],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL if said is None else said,
+        stderr=subprocess.DEVNULL if output is None else output,
         start_new_session=True,  # What is sent to our group, such as Ctrl-C, is not for it.
     )
     assert process.stdin is not None
@@ -60,14 +60,14 @@ def keeper(
 
 
 def launch(process: subprocess.Popen[bytes]) -> None:
-    """Starts the program of a keeper."""
+    """Starts the program of a guard."""
     assert process.stdin is not None
     process.stdin.write(b"\n")
     process.stdin.flush()
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the keeper: a directory, or nothing, and the command; returns the program's exit code."""
+    """Runs the guard: a directory, or nothing, and the command; returns the program's exit code."""
     directory, *command = arguments
     sys.stdout.write("ready\n")
     sys.stdout.flush()

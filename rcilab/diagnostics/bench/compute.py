@@ -1,4 +1,4 @@
-"""What planning and judging cost: the calls a person waits for at every drag of the target."""
+"""What planning and checking cost: the calls a user waits for at every drag of the target."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def bench_inverse_batch() -> Measurement:
     growth = _growth(model.inverse_batch, {n: poses[:n] for n in (10, 100, 1000, count)})
     one, many = _panda_inverse(count)
     note = (
-        f"{_ROBOT}, time a pose in batches of {count}, limits judged; whole batches: {growth}; Panda, whose offsets "
+        f"{_ROBOT}, time a pose in batches of {count}, limits checked; whole batches: {growth}; Panda, whose offsets "
         f"make it a polynomial of degree 16: {one:.0f} us single, {many:.1f} us a pose"
     )
     return summarise("inverse_batch", np.array(times) / count, "us", 2.0, note)
@@ -151,13 +151,13 @@ def bench_program_close() -> Measurement:
 
 
 def bench_check() -> Measurement:
-    """The judgement of a 7-joint motion of 10 s while somebody drags: all but collisions."""
+    """The check of a 7-joint motion of 10 s during a drag: every condition but collisions."""
     model = load_model(_ROBOT)
     return _bench_check("check", lambda motion: check(motion, model, distance=None), model, 10.0)
 
 
 def bench_check_full() -> Measurement:
-    """The judgement of a 7-joint motion of 10 s by every condition, torques and collisions too."""
+    """The check of a 7-joint motion of 10 s by every condition, torques and collisions too."""
     model = load_model(_ROBOT)
     found = _bench_check("check_full", lambda motion: check(motion, model), model, 150.0)
     geometry, motion = model.collision_geometry(), motion_of(model, 10.0)
@@ -169,7 +169,7 @@ def bench_check_full() -> Measurement:
 
 
 def bench_check_joint_rows() -> Measurement:
-    """The judgement of a 7-joint motion of 10 s by the conditions on joint angles alone."""
+    """The check of a 7-joint motion of 10 s by the conditions on joint angles alone."""
     model = load_model(_ROBOT)
     judge = check(motion_of(model, 1.0), model, distance=None).check_again
     rows = tuple(row for row in RCI_CONDITIONS.motion if row.signal == "joint")
@@ -177,7 +177,7 @@ def bench_check_joint_rows() -> Measurement:
 
 
 def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel, target: float) -> Measurement:
-    """Measures a judgement, each time of a fresh motion, so that nothing is cached, and how it grows with length."""
+    """Measures a check, each time of a new motion, so that nothing is cached, and how it grows with length."""
     motions = [motion_of(model, 10.0) for _ in range(30)]
     times = time_calls(call, motions, warm_up=0)
     some = ([motion_of(model, duration) for _ in range(5)] for duration in _LENGTHS)

@@ -42,7 +42,7 @@ Command = Callable[[int, int], bytes]
 
 
 def bench_controller_ideal() -> Measurement:
-    """A cycle while every joint moves: command in, judged, plant moved, state out."""
+    """A cycle while every joint moves: command in, checked, plant moved, state out."""
     return _bench_plant("ideal")
 
 

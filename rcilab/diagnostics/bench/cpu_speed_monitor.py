@@ -12,7 +12,7 @@ import time
 
 _ROUNDS = 20_000  # Some 1 ms of Python.
 _PERIOD = 0.5  # [s] between two looks: 0.2 % of a core.
-SLOW = 1.2  # A choice: from here on it is worth a word.
+SLOW = 1.2  # Reported from here on: other rows vary by 10 % from run to run, so that less says nothing.
 
 
 class CpuSpeedMonitor:

@@ -1,4 +1,4 @@
-"""The 1 kHz loop of the control process while pages are open: streamed for a while, judged beside the machine."""
+"""The 1 kHz loop of the control process while pages are open: measured together with the machine's own pauses."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LOOK = 5e-3  # [s] How often something is looked at that is waited for.
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Streamed:
-    """What became of a motion that was streamed cycle by cycle."""
+    """The result of a motion that was streamed cycle by cycle."""
 
     duration: float
     """[s]."""
@@ -62,7 +62,7 @@ class Streamed:
         return int(self.watch.explains(moments, late["lateness"] + _MEMORY).sum())
 
     def tell_loop(self) -> str:
-        """Returns in words how punctual the loop was."""
+        """Returns the loop's timing as text."""
         lateness = self.after.lateness
         return (
             f"p50 {lateness.p50:.0f}, p99 {lateness.p99:.0f}, p99.9 {lateness.p999:.0f}, max {lateness.max:.0f} us; "
@@ -70,7 +70,7 @@ class Streamed:
         )
 
     def tell_machine(self) -> str:
-        """Returns in words what the machine itself did meanwhile, and how many of the late cycles it explains."""
+        """Returns the machine's own pauses as text, and how many of the late cycles they explain."""
         chance = self.watch.explains(1e-9 * self.rows["received_ns"], _MEMORY).mean()
         long = self.watch.pauses[:, 1] - self.watch.pauses[:, 0]
         return (
@@ -118,16 +118,16 @@ def stream(bench: Workbench, supervisor: Supervisor, seconds: float) -> Streamed
 
 
 def wait_for(what: str, condition: Callable[[], bool], patience: float = _PATIENCE, *, look: float = _LOOK) -> None:
-    """Waits until something holds.
+    """Waits until a condition is true.
 
     Args:
         what: What is waited for, in words.
-        condition: Whether it holds.
+        condition: Returns whether it is true.
         patience: How long it may take, [s].
         look: How often to look, [s]; where the wait is measured, that is part of it.
 
     Raises:
-        DeadlineError: It does not come to hold.
+        DeadlineError: It did not become true.
     """
     deadline = time.monotonic() + patience
     while not condition():

@@ -1,4 +1,4 @@
-"""A measurement: a named number beside its target, or the reason why there is none."""
+"""A measurement: a named number and its target, or the reason why it is missing."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Absent:
 
     name: str
     note: str
-    """Why there is none, and what to do."""
+    """The reason, and what to do."""
     ok: bool | None = None
     """False when it was tried and failed; None when it cannot be tried here."""
 
@@ -79,7 +79,7 @@ def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, wa
 
 
 def cost_by_length(call: Callable[[Any], object], cases: Iterable[tuple[float, Sequence[object]]]) -> str:
-    """Returns in words how the cost of a call grows with the length of the motion that it plans or judges.
+    """Returns as text how the cost of a call grows with the length of the motion that it plans or checks.
 
     Args:
         call: What to time.

@@ -20,7 +20,7 @@ from rcilab.views.viser_scene import ViserScene
 
 _ROBOT = "xMatePro7"
 _RATE = 60.0  # [Hz]
-_PART = 1.5  # [s] of standing still and of moving, by turns: what else the machine does burdens both alike.
+_PART = 1.5  # [s] of standing still and of moving, in turns, so that other load on the machine affects both.
 _PARTS = 6
 _PAGE = """
 import sys
@@ -32,7 +32,7 @@ with connect("ws" + url[4:], origin=url.rstrip("/"), subprotocols=[protocol], ma
     for _ in link:
         pass
 """
-"""Hears everything and draws nothing, in a process of its own: what a page costs is not what mirroring costs."""
+"""Receives everything and draws nothing, in a process of its own: the cost of a page is not the cost of mirroring."""
 
 
 def bench_mirror() -> Measurement:
@@ -41,7 +41,7 @@ def bench_mirror() -> Measurement:
     poses = model.home + 0.3 * np.sin(0.1 * np.arange(int(_RATE * _PART))[:, np.newaxis] + np.arange(model.n))
     with bare_page() as (server, url):
         arm = ArmView(ViserScene(server), "live", model)
-        with _listening(url):
+        with _receiving(url):
             costs: list[float] = []
             for _ in range(_PARTS):
                 idle, moving = _processor_time(lambda step: None), _processor_time(lambda step: arm.show(poses[step]))
@@ -51,8 +51,8 @@ def bench_mirror() -> Measurement:
 
 
 @contextmanager
-def _listening(url: str) -> Iterator[None]:
-    """Has something connected that hears as a page does."""
+def _receiving(url: str) -> Iterator[None]:
+    """Keeps a client connected that receives what a page does."""
     command = [sys.executable, "-c", _PAGE, url, f"viser-v{version('viser')}"]
     page = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:

@@ -1,4 +1,4 @@
-"""What a notebook makes a person wait for: the lab in its cell, and the arm behind a slider."""
+"""Latencies of a notebook: the lab in its cell, and the arm behind a slider."""
 
 from __future__ import annotations
 
@@ -77,15 +77,15 @@ def _run(client: Any, code: str) -> Any:
     request, value = client.execute(code), None
     while True:
         try:
-            said = client.get_iopub_msg(timeout=_PATIENCE)
+            reply = client.get_iopub_msg(timeout=_PATIENCE)
         except queue.Empty as error:
-            raise DeadlineError(f"bench: the kernel was silent for {_PATIENCE:g} s") from error
-        if said["parent_header"].get("msg_id") != request:
+            raise DeadlineError(f"bench: the kernel sent nothing for {_PATIENCE:g} s") from error
+        if reply["parent_header"].get("msg_id") != request:
             continue
-        content = said["content"]
-        if said["msg_type"] == "error":
+        content = reply["content"]
+        if reply["msg_type"] == "error":
             raise RcilabError(f"bench: the notebook failed with {content['ename']}: {content['evalue']}")
-        if said["msg_type"] == "execute_result":
+        if reply["msg_type"] == "execute_result":
             value = ast.literal_eval(content["data"]["text/plain"])
-        if said["msg_type"] == "status" and content["execution_state"] == "idle":
+        if reply["msg_type"] == "status" and content["execution_state"] == "idle":
             return value

@@ -1,4 +1,4 @@
-"""What the workbench makes a person or a robot wait for: a drag of the target, and the 1 kHz loop beside the page."""
+"""Latencies of the workbench: a drag of the target, and the 1 kHz loop with the page open."""
 
 from __future__ import annotations
 

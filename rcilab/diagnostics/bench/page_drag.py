@@ -49,7 +49,7 @@ _WATCH = """(() => { const read = () => __viserMutable.nodeRefFromName['NODE'].m
 
 
 def bench_page_drag() -> Measurement | Absent:
-    """From the mouse on the target's handle to the pixels of the arm that follows, beside viser's own bare gizmo."""
+    """From the mouse on the target's handle to the pixels of the arm that follows, next to viser's own bare gizmo."""
     if (reason := why_no_page()) is not None:
         return Absent(name="page_drag", note=reason)
     bare: list[float] = []

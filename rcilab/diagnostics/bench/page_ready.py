@@ -1,4 +1,4 @@
-"""How long a person looks at a page that cannot be used yet."""
+"""How long a page that is open cannot be used yet."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The rows of `rcilab bench`, by name, and the process that measures one of them.
 
 Every row has a process of its own, so that what one loads, starts or breaks is no part of what the next one measures.
-`python -m rcilab.diagnostics.bench.rows NAME SECONDS FILE` is that process; it leaves its finding in the file.
+`python -m rcilab.diagnostics.bench.rows NAME SECONDS FILE` is that process; it writes its result to the file.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ ROWS = MappingProxyType(
 """Name of each row and the module of its function, in the order they run; the slow ones last."""
 
 _STREAMING = frozenset({"control_loop", "spectators"})
-"""They are told for how long to stream."""
+"""They take the time to stream as an argument."""
 
 
 def measure(name: str, seconds: float) -> Measurement | Absent:
@@ -75,7 +75,7 @@ def measure(name: str, seconds: float) -> Measurement | Absent:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measures a row and writes it down; its last word is the reason where that fails."""
+    """Measures a row and writes the result to a file; the last line on stderr is the reason where that fails."""
     name, seconds, file = arguments
     try:
         found = measure(name, float(seconds))

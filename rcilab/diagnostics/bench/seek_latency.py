@@ -1,4 +1,4 @@
-"""Whether a long recording follows the finger: in Python, and in a browser that draws it."""
+"""How quickly a long recording follows its slider: in Python, and in a browser that draws it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _RECORDED = 60.0  # [s]
 _SEEKS = 100
 _SCRUB_TIME = 8.0  # [s] From one end of the recording to the other and back.
 _MOVE_TIME = 0.04  # [s] Between two moves of the mouse.
-_STALL = 500.0  # [ms] A choice: longer than this the picture stands still for somebody who scrubs.
+_STALL = 500.0  # [ms] Longer than this the user sees the picture stop while scrubbing.
 _PAGE = 1  # Client id of the page that asks: only the one with the controls may.
 _READY = """!!window.__viserMutable?.nodeRefFromName?.['/live/joint1']
   && __viserTestpoints.rendererInfo.render.frame > 3 && document.querySelectorAll('.u-over .rl-cursor').length > 3"""

@@ -1,4 +1,4 @@
-"""What a person waits for at the very beginning: the import, and `rcilab` until its page is served."""
+"""What a user waits for at the start: the import, and `rcilab` until its page is served."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import IO
 import numpy as np
 
 from rcilab.core.errors import ConnectionLostError, DeadlineError
-from rcilab.diagnostics.bench.child_guard import keeper, launch
+from rcilab.diagnostics.bench.child_guard import guard, launch
 from rcilab.diagnostics.bench.measure import Measurement, summarise
 
 _RUNS = 5
@@ -57,16 +57,16 @@ def _time_python(code: str) -> float:
 def _time_page() -> tuple[float, int]:
     """Returns how long the page took, [s], and how large it is, [bytes]."""
     port = free_port()
-    with tempfile.TemporaryFile("w+", encoding="utf-8") as said:
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
         command = [sys.executable, "-m", "rcilab.cli", "--no-browser", "--port", str(port)]
-        with keeper(command, said=said) as process:
+        with guard(command, output=output) as process:
             start = time.perf_counter()
             launch(process)
-            page = _wait_for_page(f"http://127.0.0.1:{port}/", process, said)
+            page = _wait_for_page(f"http://127.0.0.1:{port}/", process, output)
             return time.perf_counter() - start, len(page)
 
 
-def _wait_for_page(url: str, process: subprocess.Popen[bytes], said: IO[str]) -> bytes:
+def _wait_for_page(url: str, process: subprocess.Popen[bytes], output: IO[str]) -> bytes:
     deadline = time.monotonic() + _PATIENCE
     while time.monotonic() < deadline:
         try:
@@ -75,6 +75,6 @@ def _wait_for_page(url: str, process: subprocess.Popen[bytes], said: IO[str]) ->
         except urllib.error.URLError:
             time.sleep(_POLL)
         if process.poll() is not None:
-            said.seek(0)
-            raise ConnectionLostError(f"rcilab ended with exit code {process.returncode}: {said.read().strip()}")
+            output.seek(0)
+            raise ConnectionLostError(f"rcilab ended with exit code {process.returncode}: {output.read().strip()}")
     raise DeadlineError(f"rcilab served no page at {url} within {_PATIENCE:g} s")

@@ -1,4 +1,4 @@
-"""Whether those who only watch disturb the 1 kHz loop."""
+"""Whether pages that only watch disturb the 1 kHz loop."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.diagnostics.bench.measure import Absent, Measurement
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 
 _SPECTATORS = 3
-_PATIENCE = 120.0  # [s] Four pages that one processor draws.
+_PATIENCE = 120.0  # [s] Four pages drawn on one processor.
 
 
 def bench_spectators(seconds: float = 30.0) -> Measurement | Absent:

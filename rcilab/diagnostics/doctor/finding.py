@@ -15,7 +15,7 @@ class Finding:
 
     name: str
     verdict: Verdict
-    """`note`: works, with a drawback, or cannot be told; `bad`: a part of rcilab does not work."""
+    """`note`: works, with a drawback, or cannot be determined; `bad`: a part of rcilab does not work."""
     value: str
     """What was found, in words."""
     advice: str = ""

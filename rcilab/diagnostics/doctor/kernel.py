@@ -39,7 +39,7 @@ def check_kernel(system: System) -> Finding:
 
 
 def check_preemption(system: System) -> Finding:
-    """Can a waking real-time loop interrupt whatever the kernel does for somebody else?"""
+    """Can a real-time loop that becomes ready interrupt the kernel's work for another process?"""
     name, version = "preemption", system.read("/proc/sys/kernel/version")
     if _is_realtime(system):
         return Finding(name, "ok", "full (PREEMPT_RT)")

@@ -15,7 +15,7 @@ from rcilab.realtime.punctual import PRIORITY
 _POLICIES = {"0": "SCHED_OTHER", "1": "SCHED_FIFO", "2": "SCHED_RR", "3": "SCHED_BATCH", "5": "SCHED_IDLE"}
 _REALTIME_POLICIES = ("1", "2")
 _POLICY_FIELD = 38  # proc_pid_stat(5): field 41, counted from 0 after pid and (comm).
-_FASTER = PRIORITY + 1  # A choice: packets for the control process arrive before it goes on computing.
+_FASTER = PRIORITY + 1  # Packets for the control process arrive before it continues to compute.
 _OWN_ADDRESS = "192.168.0.22/24"  # RCI manual 2.5, its example for a computer wired to the robot directly.
 
 

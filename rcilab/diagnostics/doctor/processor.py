@@ -33,7 +33,7 @@ def check_isolation(cores: int, system: System) -> Finding:
         first = isolated.text.replace("-", ",").partition(",")[0]
         return Finding(name, "ok", f"{isolated.text}; use them with taskset, such as: taskset -c {first} rcilab run …")
     if cores < SPARE_CORES:
-        return Finding(name, "ok", f"none, and with {cores} there is none to spare")
+        return Finding(name, "ok", f"no isolated core, and with {cores} cores none to spare")
     last = cores - 1
     advice = (
         f"for a real arm boot with isolcpus={last} nohz_full={last} rcu_nocbs={last} (/etc/default/grub, then sudo "

@@ -1,8 +1,8 @@
 """How long a packet takes to the robot and back: ICMP echoes of the size of a state, at a tenth of its rate.
 
-An echo is answered by the other end's kernel. Nothing is said to a real robot's program, so this disturbs nobody who
-drives it, and says nothing about how quick that program is. A virtual controller on this machine is knocked at: it
-turns a second client away.
+An echo is answered by the other end's kernel. Nothing is sent to a real robot's program, so this does not disturb
+its client, and it does not measure how quick that program is. A virtual controller on this machine is connected to: it
+refuses a second client.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _PAYLOAD = 1247  # [bytes] As a state.
 _PATIENCE = 1.0  # [s] for an answer
 _MOST_LOST_IN_A_ROW = 3  # A host that answers nothing at all is given up after so many.
 _ECHO, _ANSWER = 8, 0  # RFC 792.
-_LONGEST = 5e-4  # [s] A choice: half a cycle for the network leaves the other half for state, callback and command.
+_LONGEST = 5e-4  # [s] Half a cycle for the network leaves the other half for state, callback and command.
 
 Echo = Callable[[int], float | None]
 """Sends echo number k and returns the time until its answer, [s], or None when none came."""
@@ -43,7 +43,7 @@ def check_round_trip(host: str) -> Finding:
             times = measure_round_trips(lambda number: _echo(link, number))
         except OSError as error:
             return Finding(name, "bad", f"{host}: {error.strerror or error}", "check the cable and the address")
-    return judge_round_trips(host, times)
+    return evaluate_round_trips(host, times)
 
 
 def check_controller(place: tuple[str, int], *, is_here: bool) -> Finding:
@@ -51,18 +51,18 @@ def check_controller(place: tuple[str, int], *, is_here: bool) -> Finding:
 
     Args:
         place: Address and TCP port.
-        is_here: Whether it is a virtual one on this machine; another one is left in peace.
+        is_here: Whether it is a virtual one on this machine; another one is not connected to.
     """
     name, (host, port) = "controller", place
     if not is_here:
         return Finding(
-            name, "ok", f"not knocked at: that could disturb whoever drives {host}; rcilab run and connect() will tell"
+            name, "ok", f"not connected to: that could disturb the client of {host}; rcilab run and connect() report it"
         )
     try:
         socket.create_connection(place, timeout=_PATIENCE).close()
     except OSError as error:
         advice = f"start one: rcilab controller --model NAME --host {host} --port {port}"
-        return Finding(name, "bad", f"nobody answers at {host}:{port}: {error.strerror or error}", advice)
+        return Finding(name, "bad", f"no answer from {host}:{port}: {error.strerror or error}", advice)
     return Finding(name, "ok", f"listens at {host}:{port}")
 
 
@@ -77,7 +77,7 @@ def measure_round_trips(echo: Echo, *, interval: float = _INTERVAL, count: int =
     return times
 
 
-def judge_round_trips(host: str, times: Sequence[float | None]) -> Finding:
+def evaluate_round_trips(host: str, times: Sequence[float | None]) -> Finding:
     """Returns what measured times, [s], None for a lost echo, mean for a control loop."""
     name, answered = "round trip", np.array([t for t in times if t is not None])
     if not len(answered):
@@ -119,7 +119,7 @@ def _echo(link: socket.socket, number: int) -> float | None:
         spent = time.monotonic() - start
         if link.type == socket.SOCK_RAW:
             answer = answer[4 * (answer[0] & 0x0F) :]  # RFC 791: a raw socket hands over the IP header too.
-        # The kernel writes an identifier of its own on the echoes of the other kind, so only the payload tells ours.
+        # The kernel gives echoes of the other kind an identifier of its own: only the payload identifies ours.
         if answer[:1] == bytes([_ANSWER]) and answer[6:] == packet[6:]:
             return spent
     return None

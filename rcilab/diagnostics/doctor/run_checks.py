@@ -1,4 +1,4 @@
-"""Every question in its order, the most basic first, answered one after the other."""
+"""Every check in order, the most basic first."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def examine(
     """Yields the findings about this machine as they are found.
 
     Args:
-        system: Where to read what the kernel tells about itself.
-        robot: Whom to look for; None: for nobody.
+        system: Where to read what the kernel reports about itself.
+        robot: Address of the robot to look for; None: no robot.
         seconds: How long to measure jitter, [s]; 0 does not.
         progress: Called about once a second with the time spent so far and the largest lateness so far, [s].
     """

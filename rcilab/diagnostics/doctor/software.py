@@ -10,7 +10,7 @@ from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.host import find_browser
 
 OLDEST_PYTHON = (3, 11)
-CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens unless told otherwise.
+CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens by default.
 CONTROLLER_PORT = 1337
 
 

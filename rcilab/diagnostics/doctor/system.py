@@ -1,4 +1,4 @@
-"""The files in which Linux tells about itself. What cannot be read is an answer too, never an exception."""
+"""The files in which Linux reports about itself. A file that cannot be read is a result too, never an exception."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a file said, or why it said nothing."""
+    """The content of a file, or why it could not be read."""
 
     text: str | None
     """Content without white space at the ends; None when it cannot be read."""

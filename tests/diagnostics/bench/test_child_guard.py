@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from rcilab.diagnostics.bench.child_guard import keeper, launch
+from rcilab.diagnostics.bench.child_guard import guard, launch
 
 PATIENCE = 30.0  # [s]
 PROGRAM = """
@@ -23,9 +23,9 @@ time.sleep(600)
 """
 BENCH = """
 import signal, sys, time
-from rcilab.diagnostics.bench.child_guard import keeper, launch
+from rcilab.diagnostics.bench.child_guard import guard, launch
 signal.signal(signal.SIGINT, signal.default_int_handler)  # What runs in the background is started to ignore it.
-with keeper(sys.argv[2:], directory=sys.argv[1]) as process:
+with guard(sys.argv[2:], directory=sys.argv[1]) as process:
     launch(process)
     time.sleep(600)
 """
@@ -79,7 +79,7 @@ def test_a_signal_that_ends_the_bench_ends_the_program_its_helper_and_its_direct
 def test_leaving_the_block_ends_the_program_too(tmp_path):
     place = tmp_path / "profile"
     place.mkdir()
-    with keeper(program(place), directory=str(place)) as process:
+    with guard(program(place), directory=str(place)) as process:
         assert not (place / "pids").exists()
         launch(process)
         pids = pids_in(place)
@@ -88,13 +88,13 @@ def test_leaving_the_block_ends_the_program_too(tmp_path):
 
 
 def test_a_program_that_ends_by_itself_is_told_by_its_exit_code():
-    with keeper([sys.executable, "-c", "raise SystemExit(7)"]) as process:
+    with guard([sys.executable, "-c", "raise SystemExit(7)"]) as process:
         launch(process)
         assert process.wait(PATIENCE) == 7
 
 
 def test_what_was_never_launched_never_ran(tmp_path):
-    with keeper([sys.executable, "-c", f"open({str(tmp_path / 'ran')!r}, 'w')"]) as process:
+    with guard([sys.executable, "-c", f"open({str(tmp_path / 'ran')!r}, 'w')"]) as process:
         pass
     assert process.returncode == 0
     assert os.listdir(tmp_path) == []

@@ -86,10 +86,10 @@ def _ssik_module(urdf: str) -> ModuleType:
         path, written = Path(directory) / "arm.urdf", Path(directory) / "arm_ik.py"
         path.write_text(urdf, encoding="utf-8")
         arguments = ["build", str(path), "--base", "base", "--ee", "flange", "--out", str(written), "--no-validate"]
-        with redirect_stderr(StringIO()) as said:  # It tells of every step.
+        with redirect_stderr(StringIO()) as output:  # It reports every step.
             failed = main(arguments)
         if failed:
-            raise RuntimeError(f"ssik built no solver from our URDF: {said.getvalue()}")
+            raise RuntimeError(f"ssik built no solver from our URDF: {output.getvalue()}")
         spec = spec_from_file_location("arm_ik", written)
         assert spec is not None
         assert spec.loader is not None

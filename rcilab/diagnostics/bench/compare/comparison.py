@@ -13,7 +13,7 @@ _ROBOT = "xMatePro7"
 
 
 def compare() -> Iterator[Measurement | Absent]:
-    """Yields a row for everybody who can do a task, named TASK/WHO; those not installed say what to install.
+    """Yields a row for every package that can do a task, named TASK/PACKAGE; those not installed say what to install.
 
     home: one answer to a random reachable pose, asked from the home pose. near: the same with the arm 0.1 rad away in
     every joint. branches: all answers at 16 arm angles. line: the timing of a straight line. All times are processor

@@ -1,4 +1,4 @@
-"""The inverse of the same random poses by everybody who is installed, turn by turn, and what the answers are worth."""
+"""The inverse of the same random poses by every installed package, in turns, and how accurate the answers are."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _ONE = {
     "pinocchio": iterative.clik,
     "pink": iterative.pink,
 }
-"""Who gives one answer next to where the arm is."""
+"""The solvers that give one answer next to where the arm is."""
 _ALL = {"rcilab": closed_form.ours_all_round, "ssik": closed_form.ssik_all_round}
-"""Who gives all answers at as many arm angles."""
+"""The solvers that give all answers at as many arm angles."""
 
 
 @dataclass(slots=True)
@@ -74,7 +74,7 @@ class Tally:
 
 
 def compare_inverse(model: RobotModel, count: int = 1000) -> Iterator[Measurement | Absent]:
-    """Yields how everybody solves random reachable poses: from home, from nearby, and all branches all round.
+    """Yields how every package solves random reachable poses: from home, from nearby, and all branches all round.
 
     Args:
         model: A 7-axis arm without a tool.

@@ -24,11 +24,11 @@ _REQUIREMENTS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Solver:
-    """Somebody's inverse kinematics of one arm."""
+    """One package's inverse kinematics of one arm."""
 
     solve: Solve
     about: str
-    """Who it is, in which version, and how it was asked."""
+    """Its package, the version, and how it was called."""
 
 
 def absent(name: str, error: ModuleNotFoundError) -> Absent:
