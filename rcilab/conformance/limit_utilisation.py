@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.condition import Condition
 
 FREE = 0.8
-"""Part of a joint's range, or of the way to a face of the safety box, that counts as unused, so that
+"""Part of a joint's range, or of the distance to a face of the safety box, that counts as unused, so that
 most of a path has one colour."""
 
 
@@ -25,7 +25,7 @@ class Usage:
     row: NDArray[np.intp]
     """Which condition, as a place in `conditions`, shape (N,)."""
     conditions: tuple[Condition, ...]
-    """Those that hold throughout a motion and were looked at."""
+    """Those that hold throughout a motion and were evaluated."""
 
     def at_most(self, rows: Iterable[int]) -> Array:
         """Returns the largest ratio from each of these rows up to the next: what few points can show of many.

@@ -22,7 +22,7 @@ class LimitViolation(NamedTuple):
     bound: float
     """The bound that it passed."""
     links: LinkPair | None = None
-    """Between whom, for a distance."""
+    """The two links of a distance."""
 
     @property
     def text(self) -> str:
@@ -40,7 +40,7 @@ class LimitViolation(NamedTuple):
 
     @property
     def remark(self) -> Remark:
-        """The same for faces, which have words of their own for it."""
+        """The same as a code with values, for user interfaces with texts of their own."""
         row = self.condition
         if row.is_clearance:
             return Remark(self.text)

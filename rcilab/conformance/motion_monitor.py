@@ -37,7 +37,7 @@ class Monitor:
     """Checks one command a cycle by the rows that `check` uses for a whole motion, in the same mode.
 
     Owned by the thread that runs the cycle. It is used alike for every arm, with the table of the arm's maker.
-    Standstill at the ends of a motion is checked with the first commands and with the one that says `finished`.
+    Standstill at the ends of a motion is checked with the first commands and with the last one, which is `finished`.
 
     Args:
         model: The arm with its tool and load.
@@ -118,7 +118,7 @@ class Monitor:
             self._start_side = model.elbow(state.q)[1]
 
     def _open_from(self, q: JointVector) -> None:
-        """Makes the monitors of what bounds a motion from here: outside its range or box, the way in is open."""
+        """Makes the monitors of what bounds a motion from here: outside its range or box, the path inwards is open."""
         joint = range_from(self._model.limits.joint, q, RECOVERY_RANGE)
         limits = replace(self._model.limits, joint=joint)
         position = self._model.forward(q).parts[1]

@@ -129,7 +129,7 @@ class RobotDescription:
     conditions: Callable[[], ConditionTable] | None = None
     """Returns the conditions of the maker's interface; None checks the common ones, which raise no fault."""
     elbow_flip: float | None = None
-    """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker knows no flip."""
+    """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker defines no flip."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """What base and links are drawn and collide as, base first; None for arms with designed housings."""
 

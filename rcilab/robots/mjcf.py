@@ -53,7 +53,7 @@ def build_mjcf(
     T_flange_tool: Pose = IDENTITY,
     load: FlangeLoad | None = None,
 ) -> str:
-    """Returns the MJCF of an arm; without meshes it needs no file beside it.
+    """Returns the MJCF of an arm; without meshes it needs no other file.
 
     Bodies are base and link1 ... linkN, joints joint1 ... jointN, motors motor1 ... motorN with the torque limits of
     the manual as control range, sites flange and tool.
@@ -163,7 +163,7 @@ def _capsule(capsule: Capsule) -> str:
 
 
 def _contacts(description: RobotDescription) -> list[str]:
-    """Returns the pairs that never collide: neighbours share a joint, and their neighbours fold beside each other."""
+    """Returns the pairs that never collide: neighbours share a joint, and their neighbours fold next to each other."""
     names = ["base", *(f"link{number}" for number in range(1, description.n + 1))]
     pairs = [(names[i], names[j]) for i in range(len(names)) for j in range(i + 1, min(i + 3, len(names)))]
     return ["  <contact>", *(f'    <exclude body1="{a}" body2="{b}"/>' for a, b in pairs), "  </contact>"]

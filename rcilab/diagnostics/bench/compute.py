@@ -163,7 +163,7 @@ def bench_check_full() -> Measurement:
     geometry, motion = model.collision_geometry(), motion_of(model, 10.0)
     query, looks = ClearanceQuery(geometry), 0
     for ask in (query.links, query.floor):
-        looks += clearance_path(ask, motion.q, motion.start, geometry.levers, (0.0, ADVISED_DISTANCE)).looks
+        looks += clearance_path(ask, motion.q, motion.start, geometry.levers, (0.0, ADVISED_DISTANCE)).queries
     travel = float((np.abs(np.diff(motion.q, axis=0)) @ geometry.levers).sum())
     return replace(found, note=f"{found.note}; {looks} looks for collisions on {travel:.1f} m of travel")
 

@@ -181,7 +181,7 @@ _REMEDIES = {
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
     Fault.COMMAND_TORQUE_DISCONTINUITY: _GAINS,
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: _GAINS,
-    Fault.INSTABILITY_DETECTION: "look at the network and the real-time set-up, and let the controller play "
+    Fault.INSTABILITY_DETECTION: "look at the network and the real-time configuration, and let the controller play "
     "commands later (a virtual one: --prefill 50); only where ever so many in a row were lost does a higher "
     "packet-loss threshold help (usually 10 to 20); an emergency stop can also raise this bit",
 }
