@@ -126,8 +126,8 @@ def _tool_velocity(scene: Scene) -> Callback:
 
 
 def _joint_acceleration(scene: Scene) -> Callback:
-    bound = scene.limits.joint.acceleration[3 if scene.robot.n == 7 else 2]
-    return joint_stream(scene.start.q_c, scene.robot.n - 4, path(rise(0.97, 2.0 * bound, 80)))
+    bound = scene.limits.joint.acceleration[3 if scene.robot.model.n == 7 else 2]
+    return joint_stream(scene.start.q_c, scene.robot.model.n - 4, path(rise(0.97, 2.0 * bound, 80)))
 
 
 def _tool_acceleration(scene: Scene) -> Callback:
@@ -156,7 +156,7 @@ def _singular(scene: Scene) -> Callback:
 
 def _torque_rate(scene: Scene) -> Callback:
     step = _PAST * 2.0 * scene.limits.joint.torque_rate[0] * CYCLE_TIME
-    return torque_stream(scene.robot.n, 0, np.where(np.arange(40) < _PAUSE, 0.0, step))
+    return torque_stream(scene.robot.model.n, 0, np.where(np.arange(40) < _PAUSE, 0.0, step))
 
 
 def _torque_range(scene: Scene) -> Callback:
@@ -164,7 +164,7 @@ def _torque_range(scene: Scene) -> Callback:
     limits, robot = scene.limits.joint, scene.robot
     tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - _PAUSE, 0)
     axis = robot.model.rigid_body.link_jacobian(scene.start.q, _HELD_LINK, np.zeros(3))[3:, 1]
-    stream = torque_stream(robot.n, 1, tau)
+    stream = torque_stream(robot.model.n, 1, tau)
     strongest = _HOLD * limits.collision_threshold[1]
 
     def callback(state: RobotState, t: float) -> Command:

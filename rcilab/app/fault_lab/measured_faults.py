@@ -51,7 +51,7 @@ def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> 
 
 
 def _soft_joints(scene: Scene) -> Scene:
-    n = scene.robot.n
+    n = scene.robot.model.n
     scene.robot.rci.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
     return scene.yielding()
 
@@ -68,7 +68,7 @@ def _firm_tool(scene: Scene) -> Scene:
 
 
 def _touchy(scene: Scene) -> Scene:
-    thresholds = np.full(scene.robot.n, 10.0)
+    thresholds = np.full(scene.robot.model.n, 10.0)
     scene.robot.rci.set_collision_behavior(thresholds)
     return scene.guarded(thresholds)
 
@@ -97,7 +97,7 @@ def _elbow(scene: Scene) -> Callback:
 
 def _swing(scene: Scene) -> Callback:
     ramp = np.minimum(0.01 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 0.1)
-    return torque_stream(scene.robot.n, scene.robot.n - 1, ramp)
+    return torque_stream(scene.robot.model.n, scene.robot.model.n - 1, ramp)
 
 
 def _turn(scene: Scene) -> Callback:
@@ -107,7 +107,7 @@ def _turn(scene: Scene) -> Callback:
 
 def _throw(scene: Scene) -> Callback:
     ramp = np.minimum(0.9 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 30.0)
-    return torque_stream(scene.robot.n, scene.robot.n - 3, ramp)
+    return torque_stream(scene.robot.model.n, scene.robot.model.n - 3, ramp)
 
 
 def _twist(scene: Scene) -> Callback:
