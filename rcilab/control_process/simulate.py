@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,8 @@ from rcilab.control_process.launch import require_plant, start_controller
 from rcilab.core.spatial import IDENTITY
 from rcilab.execution.session import RobotSession, open_session
 from rcilab.execution.simulation_control import SimulationControl
-
-if TYPE_CHECKING:
-    from rcilab.model.robot_model import RobotModel
+from rcilab.makers.maker import require_simulator
+from rcilab.model.robot_model import RobotModel, load_model, require_model
 
 ANSWER_TIMEOUT = 10.0  # [s] The other end is on this machine: if it is slow, the machine is busy.
 SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has no deadlines to keep for long.
@@ -36,9 +34,6 @@ def simulate(
         ModelError: The arm does not speak the RCI.
         ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
-    from rcilab.makers.maker import require_simulator
-    from rcilab.model.robot_model import load_model, require_model
-
     require_simulator(require_model(model))
     require_plant(plant)
     controller = start_controller(model.name, plant, lockstep)

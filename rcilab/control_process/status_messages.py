@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT
 from rcilab.core.errors import CertificateError, ConnectionLostError, ControlError, InvalidValueError, RcilabError
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import tell
@@ -90,6 +91,4 @@ def _tell_loss(code: str, status: SupervisorStatus) -> Message:
     if status.target == "virtual":
         return message("incident.lost.virtual")
     known = code if code in _LOST else "lost.unreachable"
-    from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT
-
     return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")
