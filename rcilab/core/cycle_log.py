@@ -47,7 +47,7 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
     command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
-    faults                  the error bits as one number, bit k = `Fault(k)`
+    faults                  the error bits as one number of 64 bits, bit k = fault k of the maker
     lost                    controller cycles between the previous row and this one that never reached us
     robot_mode, controller_mode, motion_generator_mode    as on the wire
     braking                 1: what was sent in answer brings the arm to rest, whatever was planned
@@ -81,13 +81,12 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
             ("q_c", *vector),
             ("dq", *vector),
             ("command", *vector),
-            ("faults", "<u4"),
+            ("faults", "<u8"),
             ("lost", "<u4"),
             ("robot_mode", "u1"),
             ("controller_mode", "u1"),
             ("motion_generator_mode", "u1"),
             ("braking", "u1"),
-            ("reserved", "u1", (4,)),
             ("tau", *vector),
             ("command_pose", "<f8", (4, 4)),
             ("command_psi", "<f8"),
@@ -133,7 +132,6 @@ UNITS = {
 }
 """Unit of each field that has one and only one; see `_unit` for the others."""
 
-_HIDDEN = ("reserved",)
 _CHUNK = 2000  # Rows of a CSV between two reports of progress.
 
 
@@ -246,7 +244,7 @@ def _write_csv(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
 
 
 def _fields(cycles: NDArray[np.void]) -> list[str]:
-    return [name for name in cycles.dtype.names or () if name not in _HIDDEN]
+    return list(cycles.dtype.names or ())
 
 
 _WRITERS = {".csv": _write_csv, ".npz": write_npz}

@@ -52,13 +52,13 @@ class Recorder:
         memory = bytearray(capacity * self._size) if buffer is None else buffer
         self._memory = memory
         self._rows: NDArray[np.void] = np.frombuffer(memory, dtype=dtype, count=capacity)
-        start = f"<Qdqqdd{4 * n}dIIBBBB4x{2 * n + 17}d"
+        start = f"<Qdqqdd{4 * n}dQIBBBB{2 * n + 17}d"
         rest = self._size - struct.calcsize(start)
         self._unknown = np.full(rest // 8, math.nan).tobytes()
         self._pack = struct.Struct(f"{start}{rest}s").pack_into
         self._pack_start = struct.Struct("<Qdqqd").pack_into
         self._pack_lost = struct.Struct("<I").pack_into
-        self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dI")
+        self._lost_offset = struct.calcsize(f"<Qdqqdd{4 * n}dQ")
         self._nothing = (math.nan,) * n
 
     def write(

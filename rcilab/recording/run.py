@@ -26,7 +26,7 @@ from rcilab.recording.run_file import decode_content, read_run
 from rcilab.recording.run_html import run_html
 from rcilab.recording.setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
-from rcilab.robots import describe_robot
+from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
@@ -81,6 +81,8 @@ class Run:
     """The arm, with its tool and load; None when it is not known."""
     setup: Setup = field(default_factory=Setup)
     """Where and how it was made."""
+    maker: str = ""
+    """Name of the maker whose faults the bits of `cycles["faults"]` are; empty: that of the arm."""
     paced: bool = False
     """Whether the pace was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
     is_complete: bool = True
@@ -160,8 +162,11 @@ class Run:
     def faults(self) -> tuple[FaultCode, ...]:
         """Every fault that was seen, in wire order."""
         bits = int(np.bitwise_or.reduce(self.cycles["faults"])) if len(self.cycles) else 0
-        arm = describe_robot(_FIRST_ARM) if self.model is None else self.model.description
-        return tuple(fault for fault in arm.faults if bits >> fault & 1)
+        if self.model is not None:
+            known = self.model.description.faults
+        else:
+            known = describe_robot(next(iter(ROBOTS_BY_MAKER.get(self.maker, (_FIRST_ARM,))))).faults
+        return tuple(fault for fault in known if bits >> fault & 1)
 
     @property
     def duration(self) -> float:
@@ -379,6 +384,7 @@ def build_run(
     model: RobotModel | None = None,
     setup: Setup | None = None,
     paced: bool = False,
+    maker: str = "",
 ) -> Run:
     """Returns the run in a recording: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
@@ -392,6 +398,7 @@ def build_run(
         model=model,
         setup=setup or Setup(),
         paced=paced,
+        maker=maker,
     )
 
 

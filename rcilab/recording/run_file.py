@@ -4,6 +4,7 @@ The file is a row of blocks (`blocks.py`), in this order:
 
     HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia]} or null,
             "fields": [[name, type as numpy spells it, shape], ...] of one cycle, "bytes": its size,
+            "maker": whose faults the bits of "faults" are; the first versions had 32 bits, of Rokae,
             "realtime": whether timing means something, "setup": where and how (`Setup`),
             "report": the verdict on the plan, one object a condition, or null}
     PLAN    the planned motion as `Motion.save` writes it; missing for a callback. A motion whose pace was changed has
@@ -72,6 +73,7 @@ class RunWriter:
         setup: Where and how.
         report: The verdict on the plan.
         realtime: False in lock-step.
+        maker: Whose faults the bits are; that of the arm when empty.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class RunWriter:
         setup: Setup | None = None,
         report: Report | None = None,
         realtime: bool = True,
+        maker: str = "",
     ) -> None:
         self._stream = stream
         self._dtype = dtype
@@ -92,6 +95,7 @@ class RunWriter:
             "arm": None if model is None else _arm_facts(model),
             "fields": [[name, field[0].base.str, list(field[0].shape)] for name, field in _fields(dtype)],
             "bytes": dtype.itemsize,
+            "maker": maker or ("" if model is None else model.description.maker),
             "realtime": realtime,
             "setup": (setup or Setup()).as_dict(),
             "report": None if report is None else report_facts(report),
@@ -210,6 +214,7 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
         setup=run.setup,
         report=run.report,
         realtime=run.realtime,
+        maker=run.maker,
     )
     writer.add(run.cycles)
     writer.finish(stopped=run.stopped, truncated=run.truncated, paced=run.paced)
@@ -297,6 +302,7 @@ def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
         realtime=head["realtime"],
         model=None if head["arm"] is None else _build_arm(head["arm"]),
         setup=Setup.from_dict(head["setup"]),
+        maker=str(head.get("maker", "")),
         paced=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )
@@ -325,6 +331,8 @@ def _layout_for(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
         ValueError: Something is missing that every version recorded, or is there that none did.
     """
     theirs = _written(dtype)
+    if theirs.get("faults") == np.dtype("<u4"):  # As the first versions wrote them.
+        theirs["faults"] = np.dtype("<u8")
     n = theirs["q"].shape[0] if "q" in theirs else 0
     ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
     known = _written(ours)

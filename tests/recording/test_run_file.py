@@ -6,6 +6,7 @@ import io
 import struct
 import zlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from rcilab.recording.chunks import MAGIC, encode_block, encode_header
 from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run
-from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter
+from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, write_run
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
 
 
@@ -127,11 +128,16 @@ def test_what_was_written_before_a_crash_is_there(tmp_path):
 
 def test_a_file_from_before_its_cycles_told_of_braking_is_read():
     ours = cycle_dtype(7)
-    fields = [(name, field[0].base, field[0].shape) for name, field in ours.fields.items() if name != "braking"]
-    older = np.dtype([*((name, *rest) if name != "reserved" else (name, "u1", (5,)) for name, *rest in fields)])
+    fields = [(name, field[0].base, field[0].shape) for name, field in ours.fields.items()]
+    before = {"faults": ("faults", "<u4"), "braking": ("reserved", "u1", (5,))}
+    older = np.dtype([before.get(field[0], field) for field in fields])
     stream, cycles = io.BytesIO(), some_cycles()
+    old = np.zeros(len(cycles), older)
+    for name in ours.names:
+        if name != "braking":
+            old[name] = cycles[name]
     writer = RunWriter(stream, older, plan=PLAN, model=MODEL)
-    writer.add(cycles.view(older))
+    writer.add(old)
     writer.finish()
     back = decode_run(stream.getvalue())
     assert back.cycles.dtype == ours
@@ -212,6 +218,32 @@ def test_the_delay_of_a_run_that_a_fault_ended_is_found_from_what_came_before_it
     run = build_run(cycles, plan=PLAN, model=MODEL)
     assert run.delay == delay
     assert run.largest_error < 1e-9
+
+
+def test_a_file_with_faults_of_32_bits_is_read_as_before():
+    run = rcilab.load_run(Path(__file__).with_name("faults_of_32_bits.rcirun"))  # Written at 0.1, before the change.
+    assert run.cycles.dtype == some_cycles().dtype
+    assert run.faults == (Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, Fault.INSTABILITY_DETECTION)
+    assert np.flatnonzero(run.cycles["faults"]).tolist() == [9, 10, 11]
+    assert run.model is not None
+    assert run.model.fingerprint == MODEL.fingerprint
+    assert run.stopped == "a fault"
+    assert run.is_complete
+    for name in ("q", "command", "t", "sent_ns", "lost", "robot_mode"):
+        assert run.cycles[name].tobytes() == some_cycles(12)[name].tobytes()
+
+
+def test_faults_beyond_32_bits_keep_their_number_and_their_maker():
+    panda = rcilab.load_model("Panda")
+    last = max(panda.description.faults)
+    assert last > 31
+    cycles = some_cycles(5).copy()
+    cycles["faults"][2:] = 1 << int(last)
+    for model, maker in ((panda, ""), (None, "franka")):
+        stream = io.BytesIO()
+        write_run(build_run(cycles, plan=None, model=model, maker=maker), stream)
+        assert b'"maker": "franka"' in stream.getvalue()
+        assert decode_run(stream.getvalue()).faults == (last,)
 
 
 def test_what_is_no_file_name_is_said_to_be_none():
