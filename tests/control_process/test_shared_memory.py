@@ -263,7 +263,9 @@ FAMILY = (
 
 
 def kinds_of(kind: type) -> set[type]:
-    return {kind}.union(*(kinds_of(other) for other in kind.__subclasses__() if other.__module__ == errors.__name__))
+    return {kind}.union(
+        *(kinds_of(other) for other in kind.__subclasses__() if other.__module__.startswith("rcilab.core.error"))
+    )
 
 
 def test_every_class_of_the_family_passes_through_pickle_whole():
