@@ -18,6 +18,7 @@ from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:
     from rcilab.app.run.recording import Recording
+    from rcilab.motion.motion import Motion
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +39,15 @@ class AppState:
     """Values of the features that page and notebook have in common."""
 
     model: RobotModel
+    target: str = "virtual"
+    """"virtual" or an address, rci://HOST:PORT."""
     drive: DriveState = field(default_factory=DriveState)
     goal: Goal
     plan: Plan | None = None
     no_plan: Message | None = None
     """Why there is no plan."""
+    asked: Motion | None = None
+    """The motion that a foreign robot is to make and that awaits a second yes."""
     recording: Recording | None = None
     last_run: Recording | None = None
     """The run that was made last, whatever was planned since: for its table and for export."""

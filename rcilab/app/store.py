@@ -25,7 +25,6 @@ from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.app.run.export_actions import Export
-    from rcilab.motion import Motion
 
 Theme = Literal["light", "dark"]
 
@@ -47,8 +46,6 @@ class RunsFolder:
 class UiState(AppState):
     """Everything that the operator has set on the page, and everything that was computed from it."""
 
-    target: str = "virtual"
-    """"virtual" or an address, rci://HOST:PORT."""
     plant: Plant = "ideal"
     """What the virtual controller moves."""
     push: PushState = field(default_factory=PushState)
@@ -65,8 +62,6 @@ class UiState(AppState):
     program: ProgramState = field(default_factory=ProgramState)
     check: CheckState = field(default_factory=CheckState)
     learn: LearnState = field(default_factory=LearnState)
-    asked: Motion | None = None
-    """The motion that a foreign robot is to make and that awaits a second yes."""
     record: bool = True
     """Whether every cycle of a motion is written to a file as well."""
     runs: Path | None = None

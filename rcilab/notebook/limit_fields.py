@@ -17,7 +17,7 @@ from rcilab.makers.configuration import SoftJointLimits
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.robot_side import RobotBackend
 from rcilab.notebook.state import LabState
-from rcilab.notebook.style import block, esc, problem, soft, verdict, write
+from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 from rcilab.robots import describe_robot
 
@@ -128,7 +128,7 @@ class LimitFields:
             try:
                 self._robot().set_auto_limit(bool(change["new"]))
             except RcilabError as error:
-                write(self.said, problem(esc(str(error))))
+                write(self.said, problem(str(error)))
 
     def _on_open(self, change: Any) -> None:
         """Makes the fields when they are wanted: fourteen of them would delay the cell."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
 from rcilab.app.run.mode_parameters import (
     PARTS_OF_MODE,
     held_rows,
@@ -21,7 +22,6 @@ from rcilab.i18n.translator import Text
 from rcilab.makers.configuration import ControllerParameters, ControlPart
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.parameter_sync import ParameterSync
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, write
 from rcilab.notebook.widget_sharing import lean
@@ -36,11 +36,11 @@ class ModeFields:
     Args:
         state: What the parts share.
         text: Words.
-        desk: Tells the robot.
+        modes: Asks the robot.
     """
 
-    def __init__(self, state: LabState, text: Text, desk: ParameterSync) -> None:
-        self._state, self._text, self._desk = state, text, desk
+    def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
+        self._state, self._text, self._modes = state, text, modes
         self._ranges = control_ranges(state.model.limits)
         self.mode: Any = lean(
             ipywidgets.Dropdown, description=text("mode.choose"),
@@ -52,7 +52,7 @@ class ModeFields:
         """Those of the parts that somebody has opened."""
         self.folders: dict[ControlPart, Any] = {part: self._folder(part) for part in self._ranges}
         self.send = self._button("control.send", self._on_send)
-        self.reset = self._button("control.reset", desk.reset)
+        self.reset = self._button("control.reset", partial(self._ask, PressControl(what="reset")))
         self._shown: ControllerParameters | None = None
         self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
         self.parameters = lean(ipywidgets.VBox, [
@@ -99,10 +99,20 @@ class ModeFields:
         self._state.follow(change["new"])
 
     def _on_send(self) -> None:
-        robot = self._state.robot
-        if robot is not None:
-            question = self._desk.press_send(robot)
-            write(self._said, "" if question is None else verdict("warn", "▲", self._text.say(question)))
+        before = self._state.now.notice
+        self._ask(PressControl(what="send"))
+        notice = self._state.now.notice
+        write(
+            self._said, "" if notice is None or notice is before else verdict("warn", "▲", self._text.say(notice.text))
+        )
+
+    def _ask(self, request: PressControl | SetControl) -> None:
+        with self._state.lock:
+            self._modes.handlers[type(request)](request)
+            self._state.tell("robot")
+
+    def _set_number(self, part: ControlPart, place: int, value: float) -> None:
+        self._ask(SetControl(part=part, place=place, value=value))
 
     def _folder(self, part: ControlPart) -> Any:
         """Returns a folder whose fields are made when it is opened: forty of them would delay the cell."""
@@ -128,7 +138,7 @@ class ModeFields:
 
     def _field(self, part: ControlPart, place: int) -> NumberField:
         low, high, unit = self._ranges[part][place]
-        take = partial(self._desk.set_number, part, place)
+        take = partial(self._set_number, part, place)
         name = name_number(self._text, part, place)
         return NumberField(self._text, name, unit, low, high, take, digits=None, widths=_WIDTHS)
 

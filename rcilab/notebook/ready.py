@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rcilab.app.run.mode_parameters import control_obstacle
+from rcilab.app.run.drive_state import parameter_obstacle
 from rcilab.app.run.plan_readiness import arm_obstacle, plan_obstacle
 from rcilab.i18n.translator import Message, message
 from rcilab.notebook.state import LabState
@@ -18,7 +18,4 @@ def obstacle(state: LabState) -> Message | None:
     resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed)
     if resting is not None or state.now.plan is None:
         return resting or plan_obstacle(None, status.q_c)
-    robot = state.robot
-    address = None if robot is None or robot.is_virtual else robot.name
-    untold = control_obstacle(state.now.drive.control, status.setup.control, state.now.drive.refusal, address)
-    return untold or plan_obstacle(state.now.plan, status.q_c)
+    return parameter_obstacle(state.now, status) or plan_obstacle(state.now.plan, status.q_c)

@@ -19,7 +19,7 @@ from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
@@ -36,7 +36,7 @@ class Outcome:
     """What came of something that was asked for."""
 
     what: str
-    """"execute", "cell", "pace", "control", "power_on", "power_off", "recover", "output", "inputs", "reboot",
+    """"execute", "cell", "power_on", "power_off", "recover", "output", "inputs", "reboot",
     "limits", "auto_limit" or "connect"; cell: a motion of one."""
     run: Run | None = None
     error: RcilabError | None = None
@@ -93,11 +93,11 @@ class RobotBackend(Protocol):
         """
         ...
 
-    def set_control(self, control: ControllerParameters) -> None:
-        """Tells the controller parameters of the modes; what is acknowledged stands in the status.
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends parameters of the modes to the controller; the status has what it acknowledged.
 
         Raises:
-            UsageError: The arm moves, or something else is under way.
+            UsageError: The arm moves, or something else is in progress.
         """
         ...
 
@@ -121,13 +121,17 @@ class RobotBackend(Protocol):
         """Restarts the controller; the connection ends with it."""
         ...
 
-    def set_pace(self, pace: float) -> None:
-        """Runs the motion under way at part of its planned speed; 0 holds it. An outcome tells when that is taken.
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Runs the motion in progress at part of its planned speed.
 
         Raises:
-            PlanningError: There is no way within the limits to change from here; it goes on as it is.
-            UsageError: No motion is under way, or this machine is too busy.
+            PlanningError: The limits allow no change from here; it goes on as it is.
+            UsageError: No motion is in progress, or this machine is too busy.
         """
+        ...
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion in progress; raises as `set_pace`."""
         ...
 
     def stop(self) -> None:
@@ -212,9 +216,9 @@ class SupervisedRobot:
         self._live = LiveRecording(RunFacts(plan=plan.motion, model=self._model, setup=setup))
         self._tickets.append(("execute", self._supervisor.execute(plan.motion, certificate, plan.mode, pace=pace)))
 
-    def set_control(self, control: ControllerParameters) -> None:
-        """Tells the controller parameters of the modes."""
-        self._tickets.append(("control", self._supervisor.set_up(RobotConfiguration(control=control))))
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends parameters of the modes to the controller."""
+        return self._supervisor.set_up(setup)
 
     def set_joint_limit(self, joints: SoftJointLimits) -> None:
         """Tells the controller soft limits of the joint angles."""
@@ -254,10 +258,13 @@ class SupervisedRobot:
         """Restarts the controller; Recover makes another connection once it is up."""
         self._tickets.append(("reboot", self._supervisor.reboot()))
 
-    def set_pace(self, pace: float) -> None:
-        """Runs the motion under way at part of its planned speed; 0 holds it."""
-        asked = self._supervisor.set_pace(pace) if pace else self._supervisor.pause()
-        self._tickets.append(("pace", asked))
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Runs the motion in progress at part of its planned speed."""
+        return self._supervisor.set_pace(pace)
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion in progress."""
+        return self._supervisor.pause()
 
     def stop(self) -> None:
         """Brings a running motion to rest."""

@@ -8,14 +8,15 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.run.mode_actions import ModeActions
 from rcilab.app.run.plan_readiness import ask_to_move
+from rcilab.app.status_text import StartingError
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.notebook.browser_heartbeat import kernel_heart
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
-from rcilab.notebook.parameter_sync import ParameterSync
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_side import Outcome, RobotBackend, SupervisedRobot
@@ -23,13 +24,39 @@ from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, t
 from rcilab.notebook.session_robot import SessionRobot
 from rcilab.notebook.signal_fields import SignalFields
 from rcilab.notebook.speed_fields import SpeedFields
-from rcilab.notebook.speed_override import SpeedOverride
+from rcilab.notebook.state import LabState
 from rcilab.notebook.style import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
 
 _LOOK = 0.1  # [s] Between two looks at the robot.
 _TARGETS = ("ideal", "mujoco", "address")
+
+
+class _Connection:
+    """The robot of a lab, as the features of the application ask it.
+
+    Args:
+        state: What the parts share.
+    """
+
+    def __init__(self, state: LabState) -> None:
+        self._state = state
+
+    def status(self) -> SupervisorStatus:
+        """Returns its status; "closed" while none is connected."""
+        return self._state.status or SupervisorStatus()
+
+    def supervisor(self) -> RobotBackend:
+        """Returns the robot.
+
+        Raises:
+            StartingError: None is connected.
+        """
+        robot = self._state.robot
+        if robot is None:
+            raise StartingError("no robot is connected")
+        return robot
 
 
 class RunPanel(Part):
@@ -79,10 +106,10 @@ class RunPanel(Part):
         self._health, self._outcome = block(), block()
         self._was_cells = False
         self._running = 0.0  # [s] Planned duration of the motion under way.
-        self._pacing = SpeedOverride(self.state)
-        self.pace = SpeedFields(self.state, text, self._pacing)
-        self._desk = ParameterSync(self.state)
-        self.modes = ModeFields(self.state, text, self._desk)
+        connection = _Connection(self.state)
+        self._mode_actions = ModeActions(self.state.store, connection, keeps_rest=self.state.session is not None)
+        self.pace = SpeedFields(self.state, text, self._mode_actions)
+        self.modes = ModeFields(self.state, text, self._mode_actions)
         self.signals = SignalFields(text, lambda: self._robot, self._button)
         self.limits = LimitFields(self.state, text, lambda: self._robot, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
@@ -143,8 +170,10 @@ class RunPanel(Part):
         self.state.tell("robot")
 
     def _take(self, robot: RobotBackend) -> None:
-        self._desk.forget()
-        self._pacing.forget()
+        with self.state.lock:
+            self._mode_actions.forget()
+            self.state.store.update(target=VIRTUAL if robot.is_virtual else robot.name)
+            self.state.set_drive(refusal=None)
         self.state.robot = robot
         self._ending.clear()
         self._watcher = threading.Thread(target=self._watch, args=(robot,), name="rcilab-notebook-watch", daemon=True)
@@ -173,17 +202,11 @@ class RunPanel(Part):
                 robot.beat()
             for outcome in robot.outcomes():
                 self._take_in(outcome)
-            self._desk.tick(robot)
-            self._pacing.tick(robot)
+            with self.state.lock:
+                self._mode_actions.tick(robot.status())
             self.state.tell("robot")
 
     def _take_in(self, outcome: Outcome) -> None:
-        if outcome.what == "control":
-            self._desk.take(outcome.error)
-            return
-        if outcome.what == "pace":
-            self._pacing.take(outcome.error)
-            return
         if outcome.what == "limits":
             self.limits.take(outcome.error)
         if outcome.what == "execute":

@@ -7,9 +7,10 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from rcilab.control_process import SupervisorStatus
+from rcilab.app.status_text import StartingError
+from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, SoftJointLimits
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.driver import SIGNALS
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
@@ -126,14 +127,17 @@ class SessionRobot:
         go, self._way = self._session.execute, None
         self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode, pace=pace))
 
-    def set_control(self, control: ControllerParameters) -> None:
-        """Tells the controller parameters of the modes."""
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends parameters of the modes to the controller."""
+        if self._is_busy and self.is_virtual:
+            raise StartingError(f"{self._what} is in progress; try again in a moment")
 
-        def tell() -> None:
-            self._session.configure(RobotConfiguration(control=control))
-            self._held = self._held.updated(RobotConfiguration(control=control))
+        def send() -> None:
+            self._session.configure(setup)
+            self._held = self._held.updated(setup)
+            self._looked = float("-inf")  # What was acknowledged is not sent again.
 
-        self._do("control", tell)
+        return self._do("control", send)
 
     def set_joint_limit(self, joints: SoftJointLimits) -> None:
         """Tells the controller soft limits of the joint angles."""
@@ -174,13 +178,15 @@ class SessionRobot:
     def _read(self) -> None:
         self._inputs = tuple(self._session.rci.get_di(signal) for signal in SIGNALS)
 
-    def set_pace(self, pace: float) -> None:
-        """Runs the motion under way at part of its planned speed; 0 holds it."""
-        if pace:
-            self._session.set_pace(pace)
-        else:
-            self._session.pause()
-        self._done.append(Outcome(what="pace"))
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Runs the motion in progress at part of its planned speed."""
+        self._session.set_pace(pace)
+        return _settled("pace")
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion in progress."""
+        self._session.pause()
+        return _settled("pause")
 
     def stop(self) -> None:
         """Brings a running motion to rest, also one that a cell has started."""
@@ -210,9 +216,10 @@ class SessionRobot:
     def _is_busy(self) -> bool:
         return self._worker is not None and self._worker.is_alive()
 
-    def _do(self, what: str, act: Callable[[], object]) -> None:
+    def _do(self, what: str, act: Callable[[], object]) -> PendingRequest:
         if self._is_busy:
             raise BusyError(what, self._what)
+        request = PendingRequest(what)
 
         def work() -> None:
             error: RcilabError | None = None
@@ -221,11 +228,14 @@ class SessionRobot:
             except RcilabError as failure:
                 error = failure
             self._power_seen = float("-inf")
-            self._done.append(Outcome(what=what, run=self._run, error=error))
+            if what != "control":  # Its sender looks at the request itself.
+                self._done.append(Outcome(what=what, run=self._run, error=error))
+            request.settle(error)
 
         self._what, self._run = what, None
         self._worker = threading.Thread(target=work, name="rcilab-notebook-robot", daemon=True)
         self._worker.start()
+        return request
 
     def _hear_run(self, run: Run, error: BaseException | None) -> None:
         """In the thread that ran it, which does not wait for what is made of it."""
@@ -238,6 +248,12 @@ class SessionRobot:
         if time.monotonic() - self._power_seen > _POWER_LOOK and not self._is_busy:
             self._powered = self._session.is_powered()
             self._power_seen = time.monotonic()
+
+
+def _settled(what: str) -> PendingRequest:
+    request = PendingRequest(what)
+    request.settle()
+    return request
 
 
 def _tell_way(way: MotionProgress | None) -> dict[str, Any]:

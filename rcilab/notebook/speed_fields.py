@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import ipywidgets
 
+from rcilab.app.run.mode_actions import ModeActions, SetDrive
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.requested_speed import is_running
 from rcilab.i18n.translator import Text
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.speed_override import SpeedOverride
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, write
 from rcilab.notebook.subshell_routing import hear_at_once
@@ -26,14 +28,14 @@ class SpeedFields:
     Args:
         state: What the parts share.
         text: Words.
-        desk: Tells the robot.
+        modes: Asks the robot.
     """
 
-    def __init__(self, state: LabState, text: Text, desk: SpeedOverride) -> None:
-        self._state, self._text, self._desk = state, text, desk
+    def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
+        self._state, self._text, self._modes = state, text, modes
         self._writing = False
-        self.pause = self._button("run.pause", desk.pause, icon="pause", style="warning")
-        self.resume = self._button("run.resume", desk.resume, icon="play", style="info")
+        self.pause = self._button("run.pause", partial(self._ask, modes.pause), icon="pause", style="warning")
+        self.resume = self._button("run.resume", partial(self._ask, modes.resume), icon="play", style="info")
         percent, slowest = 100.0 * state.now.drive.pace, 100.0 * SLOWEST_PACE
         self.slider: Any = lean(
             ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
@@ -65,7 +67,7 @@ class SpeedFields:
                 self.field.show(percent)
             finally:
                 self._writing = False
-        refusal = self._desk.refusal
+        refusal = self._state.now.drive.pace_refusal
         said = "" if not running or status is None else soft(self._tell_way(status, is_held))
         write(self._way, said + ("" if refusal is None or not running else problem(self._text.say(refusal))))
 
@@ -80,7 +82,12 @@ class SpeedFields:
             self._choose(change["new"])
 
     def _choose(self, percent: float) -> None:
-        self._desk.choose(percent / 100.0)
+        self._ask(partial(self._modes.set_drive, SetDrive(pace=percent / 100.0)))
+
+    def _ask(self, act: Callable[[], None]) -> None:
+        with self._state.lock:
+            act()
+            self._state.tell("robot")
 
     def _button(self, code: str, act: Any, *, icon: str, style: str) -> Any:
         button = lean(

@@ -12,11 +12,11 @@ import rcilab
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE
-from rcilab.control_process import SupervisorStatus
+from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
-from rcilab.makers.configuration import ControllerParameters
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.rokae.driver.controller_parameters import standard_control
 from rcilab.notebook import robot_words
 from rcilab.notebook.robot_side import BusyError, Outcome
@@ -104,8 +104,10 @@ class Real:
     def status(self) -> SupervisorStatus:
         return self._status
 
-    def set_control(self, control: ControllerParameters) -> None:
-        self.told.append(control)
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        assert setup.control is not None
+        self.told.append(setup.control)
+        return PendingRequest("control")
 
     def outcomes(self) -> list[Outcome]:
         return []

@@ -13,7 +13,7 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
-from rcilab.control_process import SupervisorStatus
+from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
@@ -200,10 +200,14 @@ class Real:
     def execute(self, plan: Any, pace: float = 1.0) -> None:
         self.executed.append(plan)
 
-    def set_pace(self, pace: float) -> None:
+    def set_pace(self, pace: float) -> PendingRequest:
         self.paces.append(pace)
         if self.error is not None:
             raise self.error
+        return PendingRequest("pace")
+
+    def pause(self) -> PendingRequest:
+        return self.set_pace(0.0)
 
     def outcomes(self) -> list[Outcome]:
         return []

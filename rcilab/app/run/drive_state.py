@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending, with_number
+from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending
 from rcilab.app.text import Message
 from rcilab.core.state import Mode
 from rcilab.makers.configuration import ControllerParameters, ControlPart
@@ -34,15 +34,12 @@ class DriveState:
     """Why the controller did not take them."""
     pace: float = 1.0
     """Part of the planned speed to run at."""
+    pace_refusal: Message | None = None
+    """Why the motion in progress did not take another one."""
 
     def wanted_control(self, model: RobotModel) -> ControllerParameters:
         """Returns the parameters to show: those typed, or what a controller wakes up with."""
         return self.control if self.control is not None else standard_control(model.limits)
-
-    def with_number(self, model: RobotModel, part: ControlPart, place: int, value: float) -> DriveState:
-        """Returns the state with another number among the parameters."""
-        control = with_number(self.wanted_control(model), part, place, value, model.limits)
-        return replace(self, control=control, refusal=None)
 
 
 def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
@@ -61,12 +58,12 @@ def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | Non
     return None
 
 
-def is_pending(state: UiState, status: SupervisorStatus) -> bool:
+def is_pending(state: AppState, status: SupervisorStatus) -> bool:
     """Returns whether the controller has not taken the parameters yet."""
     return is_control_pending(state.drive.control, status.setup.control)
 
 
-def parameter_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
+def parameter_obstacle(state: AppState, status: SupervisorStatus) -> Message | None:
     """Returns why nothing may run with these parameters, or None when the controller has them."""
     address = None if state.target == "virtual" else state.target
     return control_obstacle(state.drive.control, status.setup.control, state.drive.refusal, address)

@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal, Protocol, cast
 
+from rcilab.app.app_state import AppState
 from rcilab.app.request import Handlers, Request, TypeField
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
-from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send
+from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.setup.configuration_sender import SetupPost
-from rcilab.app.store import Store
+from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
 from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.makers.rokae.driver.controller_parameters import ControlPart, control_ranges, standard_control
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 
 if TYPE_CHECKING:
@@ -48,11 +48,57 @@ class PressControl(Request):
     what: Literal["send", "reset"]
 
 
-class ModeActions:
-    """Mode, parameters, pause, pace. Our own controller is told at once, a foreign one when asked for twice."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetControl(Request):
+    """Change one number of the modes' parameters."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
+    part: ControlPart
+    place: int
+    """From 0."""
+    value: float
+
+
+class MotionRobot(Protocol):
+    """What takes parameters, and another speed during a motion. No method waits for the robot."""
+
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends tool, load, limits or parameters."""
+        ...
+
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Runs the motion in progress at part of its planned speed."""
+        ...
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion in progress."""
+        ...
+
+
+class MotionConnection(Protocol):
+    """The robot of the moment."""
+
+    def status(self) -> SupervisorStatus:
+        """Returns its status."""
+        ...
+
+    def supervisor(self) -> MotionRobot:
+        """Returns what takes requests."""
+        ...
+
+
+class ModeActions:
+    """Mode, parameters, pause, speed override. A virtual controller gets them at once, another one at a second press.
+
+    Args:
+        store: The state.
+        session: The robot.
+        keeps_rest: Whether parameters that were not changed stay as the controller has them; otherwise it gets the
+            standard ones with the first that is changed.
+    """
+
+    def __init__(self, store: StateStore[AppState], session: MotionConnection, *, keeps_rest: bool = False) -> None:
+        self._store, self._session, self._keeps_rest = store, session, keeps_rest
+        self._was_running = False
         self._post = SetupPost(session, self._refuse)
         self._wish = RequestedSpeed()
         self._changing: tuple[float, PendingRequest] | None = None  # A pace that the robot has not taken yet.
@@ -65,6 +111,7 @@ class ModeActions:
         return {
             SetDrive: self.set_drive,
             PressControl: self.press,
+            SetControl: self.set_control,
         }
 
     def set_drive(self, request: SetDrive) -> None:
@@ -104,9 +151,17 @@ class ModeActions:
             assert parsed.problem is not None
             self._store.complain(request.field, parsed.problem)
             return
-        drive = state.drive.with_number(state.model, part, place, parsed.value)
         self._store.clear_problems(request.field)
-        self._store.update(drive=drive)
+        self.set_control(SetControl(part=part, place=place, value=parsed.value))
+
+    def set_control(self, request: SetControl) -> None:
+        """Changes a parameter; a refusal of the ones before is forgotten."""
+        state = self._store.state
+        before = state.drive.control
+        if before is None and not self._keeps_rest:
+            before = standard_control(state.model.limits)
+        control = with_number(before, request.part, request.place, request.value, state.model.limits)
+        self._store.update(drive=replace(state.drive, control=control, refusal=None))
 
     def press(self, request: PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
@@ -130,8 +185,7 @@ class ModeActions:
         name = self._store.state.model.name
         if name != self._arm:
             self._arm = name
-            self._wish.forget()
-            self._post.forget()
+            self.forget()
         if self._post.is_underway:
             self._post.collect()
             status = self._session.status()  # What was acknowledged in the meantime is not sent again.
@@ -139,6 +193,13 @@ class ModeActions:
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send(status)
         self._change_pace(status)
+
+    def forget(self) -> None:
+        """Drops what was sent and not answered: another robot was chosen."""
+        self._wish.forget()
+        self._post.forget()
+        self._changing, self._was_running = None, False
+        self._store.update(drive=replace(self._store.state.drive, pace_refusal=None))
 
     def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state
@@ -155,13 +216,17 @@ class ModeActions:
         return False
 
     def _change_pace(self, status: SupervisorStatus) -> None:
+        running, before = is_running(status), self._was_running
+        self._was_running = running
         if self._changing is not None and self._changing[1].done:
             (pace, ticket), self._changing = self._changing, None
             self._tell_pace(ticket.error, pace)
-        is_under_way = self._changing is not None
-        wish = self._wish.due(status, is_under_way=is_under_way)
+        elif running and not before:
+            self._set_pace_refusal(None)
+        wish = self._wish.due(status, is_under_way=self._changing is not None)
         if wish is None:
             return
+        self._set_pace_refusal(None)
         supervisor = self._session.supervisor()
         try:
             self._changing = wish, supervisor.set_pace(wish) if wish else supervisor.pause()
@@ -171,4 +236,10 @@ class ModeActions:
     def _tell_pace(self, error: RcilabError | None, pace: float) -> None:
         refusal = None if error is None else tell_pace_refusal(error, pace, self._session.status())
         if refusal is not None:
+            self._set_pace_refusal(refusal)
             self._store.say("warn", refusal)
+
+    def _set_pace_refusal(self, refusal: Message | None) -> None:
+        drive = self._store.state.drive
+        if drive.pace_refusal is not refusal:
+            self._store.update(drive=replace(drive, pace_refusal=refusal))

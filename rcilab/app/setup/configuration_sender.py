@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.status_text import StartingError, tell_error
 from rcilab.app.text import Message
 from rcilab.core.errors import RcilabError
@@ -13,6 +12,22 @@ from rcilab.core.errors import RcilabError
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest
     from rcilab.makers.configuration import RobotConfiguration
+
+
+class ConfigurableRobot(Protocol):
+    """What takes a configuration."""
+
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends it, without waiting for the answer."""
+        ...
+
+
+class ConfigurationTarget(Protocol):
+    """The robot of the moment."""
+
+    def supervisor(self) -> ConfigurableRobot:
+        """Returns what takes requests."""
+        ...
 
 
 class SetupPost:
@@ -23,7 +38,7 @@ class SetupPost:
         refuse: Takes why the controller did not take a letter.
     """
 
-    def __init__(self, session: RobotConnection, refuse: Callable[[Message], None]) -> None:
+    def __init__(self, session: ConfigurationTarget, refuse: Callable[[Message], None]) -> None:
         self._session, self._refuse = session, refuse
         self._ticket: PendingRequest | None = None
 
