@@ -7,12 +7,20 @@ import select
 import socket
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeAlias
 
 from rcilab.core.errors import DecodeError, UsageError
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.wire import FrameReader
+from rcilab.sim.arrivals import (
+    Arrival,
+    ClientConnected,
+    ClientDisconnected,
+    ClientRefused,
+    DatagramArrived,
+    ExtraSocketsReady,
+    FrameArrived,
+    StrangerDetected,
+)
 
 _LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
 _DATAGRAMS_AT_ONCE = 512  # Read in one go; the rest waits for the next look, so that no flood can hold us.
@@ -20,78 +28,15 @@ _FRAME_BYTES_AT_ONCE = 4096
 _ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
 
 
-@dataclass(frozen=True, slots=True)
-class ClientConnected:
-    """Somebody connected."""
-
-    address: str
-
-
-@dataclass(frozen=True, slots=True)
-class ClientDisconnected:
-    """The connection is over."""
-
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class FrameArrived:
-    """A whole TCP frame."""
-
-    frame: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class DatagramArrived:
-    """A UDP datagram of the client's."""
-
-    datagram: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class StrangerHeard:
-    """The first UDP datagram on a connection that is not its client's; it is left out, as all others are."""
-
-    address: str
-    client: str
-    """Who the client is."""
-
-
-@dataclass(frozen=True, slots=True)
-class ClientRefused:
-    """Somebody connected while another client holds the controller."""
-
-    address: str
-    holder: str
-
-
-@dataclass(frozen=True, slots=True)
-class ExtraSocketsReady:
-    """Sockets of somebody else, watched along with ours, have something to read."""
-
-    sockets: list[socket.socket]
-
-
-Arrival: TypeAlias = (
-    ClientConnected
-    | ClientDisconnected
-    | FrameArrived
-    | DatagramArrived
-    | StrangerHeard
-    | ClientRefused
-    | ExtraSocketsReady
-)
-
-
 class Endpoint:
-    """Owns every socket of a controller. Never blocks longer than it is told to.
+    """Owns every socket of a controller. Never blocks longer than the timeout.
 
     Commands count that come from the address of the TCP client, or of `--client`, and from the port that states go to:
     both ends of the RCI have one port number for both ways. A client that sends from another port is taken at its first
     datagram's, until one comes from where states go. Others are strangers.
 
     Attributes:
-        strangers: Datagrams that were left out because somebody else sent them.
+        strangers: Datagrams that were ignored because they did not come from the client.
 
     Args:
         config: Addresses and ports.
@@ -110,7 +55,7 @@ class Endpoint:
         self._connection: socket.socket | None = None
         self._holder = ""
         self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
-        self._has_met_stranger = False
+        self._has_named_stranger = False
         self.strangers = 0
         self._reader = FrameReader()
         self._arrivals: deque[Arrival] = deque()
@@ -122,17 +67,17 @@ class Endpoint:
 
     @property
     def has_client(self) -> bool:
-        """Whether somebody is connected."""
+        """Whether a client is connected."""
         return self._connection is not None
 
-    def poll(self, timeout: float, guests: Sequence[socket.socket] = ()) -> list[Arrival]:
+    def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
         """Returns what has arrived; waits up to `timeout`, [s], for the first thing. Datagrams come before frames.
 
         Args:
             timeout: Longest wait, [s].
-            guests: Sockets of somebody else to be watched, too.
+            extra_sockets: Sockets of other parts to be watched, too.
         """
-        sockets = [self._datagrams, self._listener, *guests]
+        sockets = [self._datagrams, self._listener, *extra_sockets]
         if self._connection is not None:
             sockets.append(self._connection)
         readable = select.select(sockets, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
@@ -144,15 +89,15 @@ class Endpoint:
             self._receive_frames(self._connection)
         if self._listener in readable:
             self._accept()
-        ready_guests = [guest for guest in guests if guest in readable]
-        if ready_guests:
-            self._arrivals.append(ExtraSocketsReady(ready_guests))
+        ready = [sock for sock in extra_sockets if sock in readable]
+        if ready:
+            self._arrivals.append(ExtraSocketsReady(ready))
         arrivals = list(self._arrivals)
         self._arrivals.clear()
         return arrivals
 
     def send_state(self, datagram: bytes) -> None:
-        """Sends a state to where states go; nowhere when nobody is known. A state that cannot be sent is lost."""
+        """Sends a state to where states go; nowhere while that is unknown. A state that cannot be sent is lost."""
         if self._target is not None:
             try:
                 self._datagrams.sendto(datagram, self._target)
@@ -200,20 +145,20 @@ class Endpoint:
                 datagram, sender = self._datagrams.recvfrom(_LARGEST_DATAGRAM)
             except OSError:  # Nothing more, or an error report that concerns an earlier send.
                 return
-            if sender == self._sender or self._meets(sender):
+            if sender == self._sender or self._accepts(sender):
                 self._arrivals.append(DatagramArrived(datagram))
 
-    def _meets(self, sender: tuple[str, int]) -> bool:
-        """Returns whether a sender that was not heard just before is the client; others are counted, one is named."""
+    def _accepts(self, sender: tuple[str, int]) -> bool:
+        """Returns whether a sender other than the last one is the client; others are counted, one is named."""
         hosts = {self.fixed_host} if self._connection is None else {self._holder, self.fixed_host}
         if sender[0] in hosts and (self._sender is None or sender[1] == self._state_port):
             self._sender = sender
             return True
         self.strangers += 1
-        if not self._has_met_stranger:
-            self._has_met_stranger = True
+        if not self._has_named_stranger:
+            self._has_named_stranger = True
             self._arrivals.append(
-                StrangerHeard("{}:{}".format(*sender), "" if self._connection is None else self._holder)
+                StrangerDetected("{}:{}".format(*sender), "" if self._connection is None else self._holder)
             )
         return False
 
@@ -246,7 +191,7 @@ class Endpoint:
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection = connection
         self._holder = address
-        self._sender, self._has_met_stranger = None, False
+        self._sender, self._has_named_stranger = None, False
         self._reader = FrameReader()
         if self._fixed_target is None:
             self._target = (address, self._state_port)
@@ -299,7 +244,7 @@ def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, o
         )
     if error.errno == errno.EADDRNOTAVAIL:
         return (
-            f"{address} is no address of this machine; choose one with --host, such as 127.0.0.2, or start the "
+            f"{address} is not an address of this machine; choose one with --host, such as 127.0.0.2, or start the "
             "controller where that address is: ip netns exec NAME rcilab controller …"
         )
     if error.errno == errno.EACCES:
@@ -311,4 +256,6 @@ def _resolve(host: str) -> str:
     try:
         return socket.gethostbyname(host)
     except OSError as error:
-        raise UsageError(f"{host!r} is no address that can be found; use an IPv4 address such as 127.0.0.2") from error
+        raise UsageError(
+            f"{host!r} is not an address that can be resolved; use an IPv4 address such as 127.0.0.2"
+        ) from error

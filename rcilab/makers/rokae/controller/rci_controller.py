@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae import wire as rci
@@ -35,7 +36,9 @@ from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.limit_tables import LimitTable, cartesian_limits
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
 from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL
 from rcilab.sim.violations import Violations, describe_violations
@@ -46,6 +49,11 @@ RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choi
 _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
+}
+_BUTTONS: dict[rci.SafetyStop, SafetyButton] = {
+    rci.SafetyStop.NONE: "none",
+    rci.SafetyStop.ESTOP: "estop",
+    rci.SafetyStop.GSTOP: "gstop",
 }
 _POWER_OFF = Remark("the client switched motor power off in mid-motion", "power_off")
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
@@ -73,7 +81,6 @@ class RciController:
         faults: The error bits that are set, in wire order.
         reason: Why the last fault was raised, in words and numbers.
         state: The last reported state.
-        playout: The queue of commands, with its counts.
         ignored: Commands that came while none was wanted.
         safety_stop: Which emergency stop is pressed.
         limit_table: Whose bounds of the tool's motion commands are judged by; counts from the next motion on.
@@ -113,7 +120,6 @@ class RciController:
             model, plant, self.settings, prefill=prefill, torque_prefill=torque_prefill, lost_limit=lost_limit
         )
         self._reporter = StateReporter(model, self.settings)
-        self.playout = self._arm.playout
         self._requested = self._shown = _IDLE_MODES
         self._countdown = 0
         self._is_still = False
@@ -130,6 +136,45 @@ class RciController:
     def plant(self) -> Plant:
         """What moves."""
         return self._arm.plant
+
+    @property
+    def playout(self) -> JitterBuffer:
+        """The queue of commands, with its counts."""
+        return self._arm.playout
+
+    @property
+    def cycle_number(self) -> int:
+        """The number of the last state."""
+        return self.state.message_id
+
+    @property
+    def q(self) -> JointVector:
+        """Measured joint angles, shape (n,), [rad]."""
+        return self.state.q
+
+    @property
+    def phase_name(self) -> str:
+        """What the robot is doing, such as "idle"."""
+        return self.phase.name.lower()
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """The faults that are set, as the manual names them."""
+        return tuple(fault.manual_name for fault in self.faults)
+
+    @property
+    def safety_box(self) -> SafetyBox | None:
+        """The safety box that is configured."""
+        return self.settings.safety_box
+
+    @property
+    def button(self) -> SafetyButton:
+        """Which emergency stop is pressed."""
+        return _BUTTONS[self.safety_stop]
+
+    def press_button(self, button: SafetyButton) -> None:
+        """Presses an emergency stop, or releases it."""
+        self.press_safety_stop(rci.SafetyStop[button.upper()])
 
     @property
     def datagram(self) -> bytes:

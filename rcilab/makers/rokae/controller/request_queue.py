@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 from rcilab.core.errors import DecodeError
 from rcilab.makers.rokae.controller.endpoint import Endpoint
-from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_handlers import Reply
 from rcilab.makers.rokae.controller.state_machine import When
 from rcilab.makers.rokae.wire import Connect, Request, decode_request, encode_response
 from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
+from rcilab.sim.faulty_network import FaultyNetwork
 
 
 class RequestQueue:

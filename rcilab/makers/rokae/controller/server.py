@@ -23,19 +23,7 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.makers.maker import require_simulator
 from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.endpoint import (
-    Arrival,
-    ClientConnected,
-    ClientDisconnected,
-    ClientRefused,
-    DatagramArrived,
-    Endpoint,
-    ExtraSocketsReady,
-    FrameArrived,
-    StrangerHeard,
-)
-from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
-from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
+from rcilab.makers.rokae.controller.endpoint import Endpoint
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_queue import RequestQueue
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
@@ -44,8 +32,20 @@ from rcilab.makers.rokae.wire import COMMAND_SIZE, decode_command
 from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
+from rcilab.sim.arrivals import (
+    Arrival,
+    ClientConnected,
+    ClientDisconnected,
+    ClientRefused,
+    DatagramArrived,
+    ExtraSocketsReady,
+    FrameArrived,
+    StrangerDetected,
+)
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.cycle_timer import CycleTimer
+from rcilab.sim.environment import Environment, ServerCounters
+from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from rcilab.sim.plant import Plant
 from rcilab.sim.plants import build_plant
@@ -54,9 +54,11 @@ from rcilab.sim.simulation_port import SimulationPort
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
 LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
-PATIENCE = 60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
-SPOILED_PATIENCE = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
-FAREWELL = 20  # [cycles] In which a client learns of the end from the error bit of its states.
+COMMAND_TIMEOUT = (
+    60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
+)
+CORRUPTED_TIMEOUT = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
+SHUTDOWN_NOTICE = 20  # [cycles] In which a client learns of the end from the error bit of its states.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
 _parts_log = logging.getLogger("rcilab.makers.rokae.controller")
@@ -70,7 +72,7 @@ class ControllerServer:
 
     Attributes:
         cycle: The controller itself; owned by the thread that runs.
-        misfits: Datagrams that had not the size of a command.
+        bad_datagrams: Datagrams that did not have the size of a command.
 
     Args:
         config: How it is set up.
@@ -103,39 +105,39 @@ class ControllerServer:
         self.cycle.auto_limit = config.auto_limit
         self.cycle.loop_back = config.loop_back
         self.cycle.limit_table = config.limit_table
-        self.misfits = 0
-        self._is_out_of_patience = False
+        self.bad_datagrams = 0
+        self._has_timed_out = False
         self._lines: LogLines | None = None
         if log is None:
             self._lines = LogLines(_STDERR)
             log = self._lines.write
         self._log = log
         self._clock = SystemClock()
-        self._pace = CycleTimer(self._clock.now())
+        self._timer = CycleTimer(self._clock.now())
         self._is_ending = False
         self._next_look = 0.0
         self._cores = CpuLatencyLock()
         self._missed_before = 0
-        self._told: tuple[FaultCode, ...] = ()
-        self._seldom = SeldomLines(log, self._clock.now)
+        self._logged_faults: tuple[FaultCode, ...] = ()
+        self._rare_lines = SeldomLines(log, self._clock.now)
         self._endpoint = Endpoint(config)
         states_network = config.network if config.states_network is None else config.states_network
         self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
-        self._desk = RequestQueue(self.cycle, self._endpoint, self._network, log)
+        self._requests = RequestQueue(self.cycle, self._endpoint, self._network, log)
         self._stalls = StallSchedule()
-        self._surroundings = Environment(
+        self._environment = Environment(
             self.cycle,
             self._network,
             self._stalls,
             self._clock,
-            lambda: ServerCounters(self.missed, self.misfits, self._endpoint.strangers),
+            lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.strangers),
         )
-        self._world = self._open_world()
+        self._simulation_port = self._open_simulation_port()
 
     @property
     def missed(self) -> int:
         """Cycles that were left out because this process was not there for them, or put off; see `pace`."""
-        return self._pace.missed
+        return self._timer.missed
 
     @property
     def url(self) -> str:
@@ -151,7 +153,7 @@ class ControllerServer:
     @property
     def world_address(self) -> str | None:
         """Where the world port is, as ADDR:PORT; None: there is none."""
-        return None if self._world is None else "{}:{}".format(*self._world.address)
+        return None if self._simulation_port is None else "{}:{}".format(*self._simulation_port.address)
 
     def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
         """Runs until `request_stop`, then brings the arm to rest and closes every socket.
@@ -184,59 +186,59 @@ class ControllerServer:
     def close(self) -> None:
         """Closes the sockets of a server that does not run."""
         self._endpoint.close()
-        if self._world is not None:
-            self._world.close()
+        if self._simulation_port is not None:
+            self._simulation_port.close()
 
-    def _open_world(self) -> SimulationPort | None:
+    def _open_simulation_port(self) -> SimulationPort | None:
         if self.config.world_port is None:
             return None
         try:
-            return SimulationPort(self._endpoint.host, self.config.world_port, self._surroundings.handle)
+            return SimulationPort(self._endpoint.host, self.config.world_port, self._environment.handle)
         except UsageError:
             self._endpoint.close()
             raise
 
     def _loop(self, on_ready: Callable[[], None]) -> None:
-        self._pace.restart(self._clock.now())
-        self._stalls.replace(self.config.stalls, self._pace.deadline)
+        self._timer.restart(self._clock.now())
+        self._stalls.replace(self.config.stalls, self._timer.deadline)
         last_moment: float | None = None
-        farewell = 0
+        notice_left = 0
         is_ready = has_served = False
         while True:
             stall = self._stalls.take(self._clock.now())
             if stall > 0.0:
-                self._stand_still(stall)
+                self._stall(stall)
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
-                farewell = self._say_farewell()
+                notice_left = self._begin_shutdown()
             if last_moment is not None:
-                farewell -= 1
-                if (not self.cycle.is_moving and farewell < 0) or self._clock.now() > last_moment:
+                notice_left -= 1
+                if (not self.cycle.is_moving and notice_left < 0) or self._clock.now() > last_moment:
                     return
             if self.config.lockstep and self.cycle.wants_commands:
                 self._await_command()
-                self._pace.restart(self._clock.now())
+                self._timer.restart(self._clock.now())
             else:
-                due = self._pace.next(self._clock.now())
+                due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
                     self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
-                if self._pace.puts_off(self.cycle.is_starved):
+                if self._timer.puts_off(self.cycle.is_starved):
                     continue
-            has_served = self._step(self._pace.deadline)
+            has_served = self._step(self._timer.deadline)
             if not is_ready:
                 is_ready = True
                 on_ready()
 
-    def _say_farewell(self) -> int:
+    def _begin_shutdown(self) -> int:
         """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
         if self.cycle.phase is not Phase.MOVING:
             self.cycle.on_event(Event.CLIENT_LOST)
             return 0
         self.cycle.reason = Remark("the controller was told to end in mid-motion", "told_to_end")
         self.cycle.on_event(Event.FAULT, Fault.INSTABILITY_DETECTION)
-        return FAREWELL
+        return SHUTDOWN_NOTICE
 
-    def _stand_still(self, duration: float) -> None:
+    def _stall(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
         until = self._clock.now() + duration
         while self._clock.now() < until and not self._is_ending:
@@ -244,7 +246,7 @@ class ControllerServer:
 
     def _poll(self, timeout: float) -> None:
         """Serves the sockets once; waits up to `timeout`, [s], for something to serve."""
-        self._take(self._network.poll(timeout, () if self._world is None else self._world.sockets))
+        self._take(self._network.poll(timeout, () if self._simulation_port is None else self._simulation_port.sockets))
 
     def _await(self, deadline: float) -> None:
         """Serves the sockets until the deadline, and at least once."""
@@ -262,33 +264,33 @@ class ControllerServer:
         cycle = self.cycle
         is_first = not cycle.playout.is_playing
         late = cycle.playout.late
-        deadline = self._clock.now() + self._patience
+        deadline = self._clock.now() + self._command_timeout
         while True:
             remaining = min(deadline - self._clock.now(), _LOOK)
             self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else remaining)
-            self._look_for_parent()
+            self._check_parent()
             if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
-                self._is_out_of_patience = False
+                self._has_timed_out = False
                 return
             if self._network.has_lost:
                 return
-            if self._is_out_of_patience and cycle.playout.late > late:
-                self._is_out_of_patience = False
-                deadline = self._clock.now() + self._patience
+            if self._has_timed_out and cycle.playout.late > late:
+                self._has_timed_out = False
+                deadline = self._clock.now() + self._command_timeout
             if is_first:
                 self._send_state()
             elif self._clock.now() >= deadline:
-                self._is_out_of_patience = True
+                self._has_timed_out = True
                 return
 
     @property
-    def _patience(self) -> float:
+    def _command_timeout(self) -> float:
         """How long lock-step waits for the next command, [s]."""
-        if self._is_out_of_patience:
+        if self._has_timed_out:
             return CYCLE_TIME
         if self.config.patience is not None:
             return self.config.patience
-        return SPOILED_PATIENCE if any(faults.corrupt for faults in self._network.faults) else PATIENCE
+        return CORRUPTED_TIMEOUT if any(faults.corrupt for faults in self._network.faults) else COMMAND_TIMEOUT
 
     @property
     def _is_idle(self) -> bool:
@@ -297,7 +299,7 @@ class ControllerServer:
         A request may then show one state later, which matters to no arm at rest.
         """
         cycle = self.cycle
-        is_quiet = cycle.phase in _QUIET and not self._desk.is_waiting and self._endpoint.has_client
+        is_quiet = cycle.phase in _QUIET and not self._requests.is_waiting and self._endpoint.has_client
         return is_quiet and not (cycle.is_moving or self.config.lockstep)
 
     def _step(self, due: float) -> bool:
@@ -308,19 +310,19 @@ class ControllerServer:
         was_moving = self.cycle.is_moving
         is_idle = self._is_idle
         self._catch_up()
-        self._live()
+        self._advance()
         if is_idle:
             self._await(due)
         else:
             self._clock.sleep_until(due)
         self._send_state()
         if self.cycle.is_moving is not was_moving and not self.config.lockstep:
-            self._tell_slip()
-        self._desk.settle()
-        self._look_for_parent()
+            self._log_slip()
+        self._requests.settle()
+        self._check_parent()
         return is_idle
 
-    def _look_for_parent(self) -> None:
+    def _check_parent(self) -> None:
         if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
             self._next_look = self._clock.now() + _LOOK
             if os.getppid() != self.config.parent_pid:
@@ -334,27 +336,27 @@ class ControllerServer:
         extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
         for _ in range(extra):
             if self.cycle.wants_commands:
-                self._live(is_seen=False)
+                self._advance(is_seen=False)
 
-    def _tell_slip(self) -> None:
+    def _log_slip(self) -> None:
         """Says how much longer than it should a motion took, when one has ended."""
         if not self.cycle.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
             self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
         self._missed_before = self.missed
 
-    def _live(self, *, is_seen: bool = True) -> None:
+    def _advance(self, *, is_seen: bool = True) -> None:
         """Lives through one millisecond."""
         if self.config.realtime and not self.config.lockstep:
             self._cores.switch(self.cycle.is_moving)
         state = self.cycle.step(is_seen=is_seen)
-        self._surroundings.step()
-        if state.faults != self._told:
-            self._tell_faults(state.faults)
+        self._environment.step()
+        if state.faults != self._logged_faults:
+            self._log_faults(state.faults)
 
-    def _tell_faults(self, faults: tuple[FaultCode, ...]) -> None:
+    def _log_faults(self, faults: tuple[FaultCode, ...]) -> None:
         """Says why error bits were set, whoever set them: a condition, somebody at the world port, a request."""
-        self._told = faults
+        self._logged_faults = faults
         if faults:
             self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm comes to rest")
             if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost:
@@ -372,24 +374,24 @@ class ControllerServer:
                     if len(datagram) == COMMAND_SIZE:
                         self.cycle.receive(decode_command(datagram, self.cycle.model.n))
                     else:
-                        self.misfits += 1
+                        self.bad_datagrams += 1
                 case FrameArrived(frame):
-                    self._desk.take(frame)
+                    self._requests.take(frame)
                 case ClientConnected(address):
                     self._warn_of_other_target(address)
                     self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
                 case ClientDisconnected(reason):
                     self._lose_client(reason)
                 case ExtraSocketsReady(sockets):
-                    if self._world is not None:
-                        self._world.serve(sockets)
-                case StrangerHeard(address, client):
+                    if self._simulation_port is not None:
+                        self._simulation_port.serve(sockets)
+                case StrangerDetected(address, client):
                     whose = f"the client is at {client}" if client else "no client is connected"
                     line = f"left out a UDP datagram from {address}, and will all others: {whose}"
-                    self._seldom.write("stranger", line, "were left out")
+                    self._rare_lines.write("stranger", line, "were left out")
                 case ClientRefused(address, holder):
                     line = f"refused a second client from {address}: {holder} is connected; one at a time"
-                    self._seldom.write("refused", line, "were refused")
+                    self._rare_lines.write("refused", line, "were refused")
 
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
@@ -398,13 +400,13 @@ class ControllerServer:
                 f"{address} connected, but states go to {target}, as --client says: it will not see any; start with "
                 f"--client {address}, or without"
             )
-            self._seldom.write("elsewhere", line, "connected")
+            self._rare_lines.write("elsewhere", line, "connected")
 
     def _lose_client(self, reason: str) -> None:
         was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
-        self._desk.clear()
+        self._requests.clear()
         self.cycle.on_event(Event.CLIENT_LOST)
         if was_moving:
             self._log(f"the client {reason} in mid-motion: the arm comes to rest")
         elif reason != "closed the connection":
-            self._seldom.write("left", f"the client {reason}", "clients were lost")
+            self._rare_lines.write("left", f"the client {reason}", "clients were lost")

@@ -11,13 +11,13 @@ from rcilab.core.clock import ManualClock
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.endpoint import Endpoint
-from rcilab.makers.rokae.controller.environment import Environment, ServerCounters
-from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import load_model
 from rcilab.sim import api as world
 from rcilab.sim.api import NetworkFaults, WorldStatus
 from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.environment import Environment, ServerCounters
+from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.plants import build_plant
 from tests.sim.api.test_world_lines import REQUESTS
 

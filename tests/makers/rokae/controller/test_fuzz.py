@@ -63,7 +63,7 @@ def test_fuzzed_datagrams_change_nothing_while_nothing_moves(watcher: Watcher) -
 
 
 def arrived(place: Arena) -> int:
-    return place.server.misfits + place.cycle.ignored
+    return place.server.bad_datagrams + place.cycle.ignored
 
 
 def test_datagrams_of_a_wrong_size_do_not_disturb_a_motion() -> None:

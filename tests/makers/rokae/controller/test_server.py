@@ -265,7 +265,7 @@ def test_datagrams_of_another_size_are_counted_and_ignored(lockstep: Running) ->
         while peer.receive_state().message_id == state.message_id:
             pass
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
-    assert lockstep.server.misfits == 6
+    assert lockstep.server.bad_datagrams == 6
 
 
 def test_requests_split_into_single_bytes_and_joined_into_one_are_understood(lockstep: Running) -> None:

@@ -1,4 +1,4 @@
-"""What surrounds a virtual robot: hands, boxes, buttons, wires, the network and the clock; and requests to change it.
+"""What surrounds a virtual robot: forces, boxes, buttons, wires, the network and the clock; and requests to change it.
 
 Everything is done in the thread of the controller between two cycles, so a request takes effect at the next cycle, and
 in lock-step every run with the same requests at the same cycles comes out the same.
@@ -9,23 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
+from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME, Clock
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
-from rcilab.makers.rokae.controller.faulty_network import FaultyNetwork
-from rcilab.makers.rokae.controller.rci_controller import RciController
-from rcilab.makers.rokae.wire import SafetyStop
+from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import RobotModel
 from rcilab.sim.api import (
     AutoLimit,
     Done,
     Floor,
     GetStatus,
     Limits,
+    LimitTable,
     LoopBack,
     Mount,
     Network,
@@ -35,6 +37,7 @@ from rcilab.sim.api import (
     Refused,
     Release,
     RemoveBox,
+    SafetyButton,
     SetInput,
     StallClock,
     Walls,
@@ -43,51 +46,137 @@ from rcilab.sim.api import (
     WorldStatus,
 )
 from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.faulty_network import FaultyNetwork
+from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.plant import Plant
 
 _NOTHING = Push((0.0,) * 6)
 
 
 @dataclass(frozen=True, slots=True)
 class ServerCounters:
-    """What the server counts: cycles left out, datagrams of a wrong size, and those of somebody else."""
+    """What the server counts: cycles left out, datagrams of a wrong size, and datagrams of strangers."""
 
     missed: int
-    misfits: int
+    bad_datagrams: int
     strangers: int
+
+
+class SimulatedController(Protocol):
+    """A controller of any maker, as its surroundings see it."""
+
+    ignored: int
+    """Commands that came while none was expected."""
+    limit_table: LimitTable
+    """Whose limits of the tool's motion apply."""
+
+    @property
+    def loop_back(self) -> bool:
+        """Whether every digital output is wired to the input of the same number."""
+        ...
+
+    @loop_back.setter
+    def loop_back(self, on: bool) -> None: ...
+
+    @property
+    def auto_limit(self) -> bool:
+        """Whether commanded joint angles are stopped inside the soft limits instead of raising a fault."""
+        ...
+
+    @auto_limit.setter
+    def auto_limit(self, on: bool) -> None: ...
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm with its tool and load."""
+        ...
+
+    @property
+    def plant(self) -> Plant:
+        """What moves."""
+        ...
+
+    @property
+    def playout(self) -> JitterBuffer:
+        """The queue of commands."""
+        ...
+
+    @property
+    def cycle_number(self) -> int:
+        """The number of the last state."""
+        ...
+
+    @property
+    def q(self) -> JointVector:
+        """Measured joint angles, shape (n,), [rad]."""
+        ...
+
+    @property
+    def phase_name(self) -> str:
+        """What the robot is doing, such as "idle"."""
+        ...
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """The faults that are set, as the maker names them."""
+        ...
+
+    @property
+    def reason(self) -> Remark:
+        """Why the last fault was raised."""
+        ...
+
+    @property
+    def safety_box(self) -> SafetyBox | None:
+        """The safety box that is configured."""
+        ...
+
+    @property
+    def button(self) -> SafetyButton:
+        """Which emergency stop is pressed."""
+        ...
+
+    def press_button(self, button: SafetyButton) -> None:
+        """Presses an emergency stop, or releases it."""
+        ...
+
+    def set_input(self, signal: int, level: bool) -> None:
+        """Sets the level of a digital input."""
+        ...
 
 
 class Environment:
     """Carries out world requests. Owned by the thread that runs the controller.
 
     Args:
-        cycle: The controller.
+        controller: The controller.
         network: Its network.
         stalls: Pauses of its clock.
         clock: What these pauses are measured with.
-        mishaps: What the server has counted so far.
+        counters: What the server has counted so far.
     """
 
     def __init__(
         self,
-        cycle: RciController,
+        controller: SimulatedController,
         network: FaultyNetwork,
         stalls: StallSchedule,
         clock: Clock,
-        mishaps: Callable[[], ServerCounters],
+        counters: Callable[[], ServerCounters],
     ) -> None:
-        self._cycle = cycle
-        self._plant = cycle.plant
+        self._controller = controller
+        self._plant = controller.plant
         self._network = network
         self._stalls = stalls
         self._clock = clock
-        self._mishaps = mishaps
+        self._counters = counters
         self._is_pushed = False
         self._has_walls = False
         self._walls: SafetyBox | None = None
         self._end_of_push = math.inf  # Number of the cycle that ends it.
 
     def handle(self, request: WorldRequest) -> WorldAnswer:
-        """Carries a request out, or says why not."""
+        """Carries a request out, or returns why not."""
         if isinstance(request, GetStatus):
             return self._status()
         try:
@@ -98,34 +187,34 @@ class Environment:
         return Done()
 
     def step(self) -> None:
-        """Takes away what has pressed on the arm for long enough, and moves walls; called after every cycle."""
-        if self._cycle.state.message_id >= self._end_of_push:
+        """Ends a push whose time is over, and moves walls; called after every cycle."""
+        if self._controller.cycle_number >= self._end_of_push:
             self._push(_NOTHING)
         if self._has_walls and self._active_box() is not self._walls:
             self._walls = self._active_box()
             self._plant.set_walls(self._walls)
 
     def _active_box(self) -> SafetyBox | None:
-        return active_box(self._cycle.settings.safety_box)
+        return active_box(self._controller.safety_box)
 
     def _change(self, request: WorldRequest) -> None:
         match request:
             case Push():
                 self._push(request)
             case Release():
-                if self._cycle.safety_stop is not SafetyStop.NONE and not self._is_pushed:
+                if self._controller.button != "none" and not self._is_pushed:
                     raise UsageError("nothing pushes the arm; press button=none ends an emergency stop")
                 self._push(_NOTHING)
             case Press(button):
-                self._cycle.press_safety_stop(SafetyStop[button.upper()])
+                self._controller.press_button(button)
             case SetInput(signal, level):
-                self._cycle.set_input(signal, level)
+                self._controller.set_input(signal, level)
             case LoopBack(on):
-                self._cycle.loop_back = on
+                self._controller.loop_back = on
             case AutoLimit(on):
-                self._cycle.auto_limit = on
+                self._controller.auto_limit = on
             case Limits(table):
-                self._cycle.limit_table = table
+                self._controller.limit_table = table
             case Network(faults, direction):
                 self._network.replace(faults, direction)
             case StallClock():
@@ -149,27 +238,27 @@ class Environment:
         self._is_pushed = any(push.wrench)
         self._end_of_push = math.inf
         if push.duration is not None and self._is_pushed:
-            self._end_of_push = self._cycle.state.message_id + round(push.duration / CYCLE_TIME)
+            self._end_of_push = self._controller.cycle_number + round(push.duration / CYCLE_TIME)
 
     def _status(self) -> WorldStatus:
-        cycle, mishaps = self._cycle, self._mishaps()
+        controller, counters = self._controller, self._counters()
         commands, states = self._network.faults
         return WorldStatus(
-            model=cycle.model.name,
+            model=controller.model.name,
             plant=self._plant.kind,
-            cycle=cycle.state.message_id,
-            phase=cycle.phase.name.lower(),
-            faults=tuple(fault.manual_name for fault in cycle.faults),
-            reason=cycle.reason,
-            button=cycle.safety_stop.name.lower(),
-            q=tuple(cycle.state.q.tolist()),
-            lost=cycle.playout.lost,
-            lost_in_row=cycle.playout.most_in_row,
-            success_rate=cycle.playout.success_rate,
-            missed=mishaps.missed,
-            misfits=mishaps.misfits,
-            strangers=mishaps.strangers,
-            ignored=cycle.ignored,
+            cycle=controller.cycle_number,
+            phase=controller.phase_name,
+            faults=controller.fault_names,
+            reason=controller.reason,
+            button=controller.button,
+            q=tuple(controller.q.tolist()),
+            lost=controller.playout.lost,
+            lost_in_row=controller.playout.most_in_row,
+            success_rate=controller.playout.success_rate,
+            missed=counters.missed,
+            misfits=counters.bad_datagrams,
+            strangers=counters.strangers,
+            ignored=controller.ignored,
             pushed=self._is_pushed,
             stalls=self._stalls.count,
             commands=commands,

@@ -1,6 +1,6 @@
-"""The controller's sockets behind a network that can be bad: an `Endpoint` that loses, delays and spoils.
+"""The sockets of a virtual controller behind a network with faults: it loses, delays and corrupts what passes.
 
-Where nothing is wrong everything takes the direct way. Time is the machine's own here, in lock-step too: the simulated
+Without faults everything passes directly. Time is the machine's own here, in lock-step too: the simulated
 millisecond waits for a command, however late it is, but not for one that is known to be lost.
 """
 
@@ -8,30 +8,50 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Sequence
+from typing import Protocol
 
 from rcilab.core.clock import Clock
-from rcilab.makers.rokae.controller.endpoint import (
-    Arrival,
-    ClientConnected,
-    ClientDisconnected,
-    DatagramArrived,
-    Endpoint,
-)
 from rcilab.sim.api import Direction, NetworkFaults
+from rcilab.sim.arrivals import Arrival, ClientConnected, ClientDisconnected, DatagramArrived
 from rcilab.sim.network_impairment import DelayedDatagrams, SlowStream
+
+
+class Endpoint(Protocol):
+    """The sockets: one TCP client at a time, and datagrams both ways."""
+
+    @property
+    def has_client(self) -> bool:
+        """Whether a client is connected."""
+        ...
+
+    def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
+        """Returns what has arrived; waits up to `timeout`, [s], for the first thing."""
+        ...
+
+    def send_state(self, datagram: bytes) -> None:
+        """Sends a state."""
+        ...
+
+    def send_frame(self, frame: bytes) -> None:
+        """Sends an answer."""
+        ...
+
+    def drop_client(self, reason: str) -> None:
+        """Ends the connection; the next `poll` reports it."""
+        ...
 
 
 class FaultyNetwork:
     """Stands between a controller and its sockets. Owned by the thread that runs the controller.
 
     Attributes:
-        has_lost: Whether the newest state, or a command since, is lost: it may be that nothing answers this state.
+        has_lost: Whether the newest state, or a command since, is lost: this state may never be answered.
 
     Args:
         endpoint: The sockets.
         clock: What delays are measured with.
         commands: Faults towards the controller.
-        states: Faults towards the client; what it says about TCP counts.
+        states: Faults towards the client; they apply to TCP, too.
     """
 
     def __init__(self, endpoint: Endpoint, clock: Clock, commands: NetworkFaults, states: NetworkFaults) -> None:
@@ -45,28 +65,28 @@ class FaultyNetwork:
 
     @property
     def faults(self) -> tuple[NetworkFaults, NetworkFaults]:
-        """What is wrong just now: towards the controller, towards the client."""
+        """The faults in effect: towards the controller, towards the client."""
         return self._commands.faults, self._states.faults
 
     def replace(self, faults: NetworkFaults, direction: Direction) -> None:
-        """Changes what is wrong from now on. A connection that is through with its bytes breaks at once."""
+        """Changes the faults from now on. A connection whose byte budget is used up breaks at once."""
         if direction != "states":
             self._commands.replace(faults)
         if direction != "commands":
             self._states.replace(faults)
             self._answers.faults = faults
 
-    def poll(self, timeout: float, guests: Sequence[socket.socket] = ()) -> list[Arrival]:
-        """Returns what has come through; see `Endpoint.poll`. What is under way goes on meanwhile."""
+    def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
+        """Returns what has come through; see `Endpoint.poll`. Delayed data is sent meanwhile."""
         if self.is_clean:
-            return self._endpoint.poll(timeout, guests)
+            return self._endpoint.poll(timeout, extra_sockets)
         deadline = self._clock.now() + timeout
         had_lost = self.has_lost
         while True:
             self._send_what_is_due()
             now = self._clock.now()
             due = min(deadline, self._commands.next_due, self._states.next_due, self._answers.next_due)
-            arrivals = self._let_through(self._endpoint.poll(due - now, guests))
+            arrivals = self._let_through(self._endpoint.poll(due - now, extra_sockets))
             if arrivals or self.has_lost is not had_lost or self._clock.now() >= deadline:
                 self._send_what_is_due()
                 return arrivals
@@ -98,7 +118,7 @@ class FaultyNetwork:
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there is no fault in effect."""
         return self._commands.is_clean and self._states.is_clean and self._answers.is_clean
 
     def _send_what_is_due(self) -> None:
