@@ -98,7 +98,7 @@ class Actuator:
             commanded: The reference of the joints.
             tool_c: The same for the tool, up to date.
             measured: Where the arm is.
-            tau: Commanded torques, n plain floats, [N m], for TORQUE; None is none yet.
+            tau: Commanded torques, n plain floats, [N m], for TORQUE; None: none yet.
         """
         if law is not self._law:
             self._law, self._damper = law, ModalDamping()

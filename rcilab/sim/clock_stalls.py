@@ -1,4 +1,4 @@
-"""When the controller's clock has to stand still; told the time, it knows none itself."""
+"""When the controller's clock has to stall. It reads no clock: the time is an argument."""
 
 from __future__ import annotations
 

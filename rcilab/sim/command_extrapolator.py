@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-_CLEARLY = 4.0  # Times nearer, so that an unforeseen jerk does not decide; a choice.
+_CLEARLY = 4.0  # Times nearer, so that an unforeseen jerk does not decide; a tuning value.
 
 
 class CommandExtrapolator:

@@ -23,10 +23,10 @@ import numpy as np
 from rcilab.core.arrays import JointVector, Matrix
 from rcilab.model.dynamics.symmetric_solver import vibration_modes
 
-DAMPING_RATIO = 0.7  # of critical; a choice: some 5 % overshoot
-FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0; a choice
-SLOWEST_DAMPING = 1.0  # [rad/s] Modes without a spring are damped as if theirs were that slow; a choice
-DESIGN_PERIOD = 10  # [cycles] How long a design is kept; a joint at full speed turns by 0.02 rad meanwhile; a choice
+DAMPING_RATIO = 0.7  # of critical: some 5 % overshoot
+FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0
+SLOWEST_DAMPING = 1.0  # [rad/s] Modes without a spring are damped as if theirs were that slow; a tuning value
+DESIGN_PERIOD = 10  # [cycles] How long a design is kept; a joint at full speed turns by 0.02 rad meanwhile
 
 
 class Damping(NamedTuple):
@@ -66,7 +66,7 @@ def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLO
 
 
 class ModalDamping:
-    """Dampers that follow an arm, designed anew every few cycles. Owned by whoever computes torques cycle by cycle."""
+    """Dampers that follow an arm, redesigned every few cycles. Owned by the caller that computes torques."""
 
     def __init__(self) -> None:
         self._design: Damping | None = None

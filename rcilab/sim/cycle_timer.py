@@ -1,16 +1,16 @@
-"""When cycles are due, and what becomes of those that this process was not there for. Told the time, it knows none.
+"""When cycles are due, and what becomes of those that this process missed. It reads no clock: the time is an argument.
 
-A real controller's clock never stops; ours does whenever the machine gives us no core. Such cycles are left out and
-counted. What stopped us has mostly stopped a client on the same machine as well, and it may come back later than we do:
-it cannot be blamed for that. So for as long as we stood still ourselves, a cycle whose command is not there is put off,
-which is no lost command; after that it is one.
+A real controller's clock never stops; this one does whenever the machine gives the process no core. Such cycles are
+left out and counted. What stopped the controller has mostly stopped a client on the same machine as well, which may
+resume later. So for as long as the pause lasted, a cycle without a command is put off and its command does not count as
+lost; after that it does.
 """
 
 from __future__ import annotations
 
 from rcilab.core.clock import CYCLE_TIME
 
-LONGEST_PATIENCE = 250  # [cycles] However long we stood still; a choice: nobody streams commands through more.
+LONGEST_PATIENCE = 250  # [cycles] However long the pause was: no client streams commands through more.
 
 
 class CycleTimer:
@@ -30,7 +30,7 @@ class CycleTimer:
         self._patience = 0
 
     def restart(self, now: float) -> None:
-        """Begins the grid anew: before, cycles were lived through one by one as in lock-step."""
+        """Restarts the grid, after cycles that were not on it, as in lock-step."""
         self.deadline = now
 
     def next(self, now: float) -> float:
@@ -45,7 +45,7 @@ class CycleTimer:
         return self.deadline
 
     def puts_off(self, is_starved: bool) -> bool:
-        """Returns whether this cycle is not lived through yet.
+        """Returns whether this cycle is put off.
 
         Args:
             is_starved: Whether a motion runs whose next command is not there.

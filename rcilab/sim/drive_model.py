@@ -15,8 +15,8 @@ from rcilab.core.arrays import JointVector, Matrix, readonly_copy
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots.mjcf import ARMATURE_PER_TORQUE, DAMPING_PER_TORQUE
 
-GEAR_RATIO = 101.0  # motor turns a joint turn, N; a choice
-STIFFNESS_PER_TORQUE = 200.0  # [N m/rad per N m of torque limit] gear stiffness k: 17000 at 85 N m; a choice
+GEAR_RATIO = 101.0  # motor turns a joint turn, N; a typical strain-wave gear
+STIFFNESS_PER_TORQUE = 200.0  # [N m/rad per N m of torque limit] gear stiffness k: 17000 at 85 N m; a typical value
 
 
 class DriveModel:

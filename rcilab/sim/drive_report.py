@@ -41,7 +41,7 @@ class DriveReport:
 
         Args:
             measured: What the sensors say; the very same object again means that nothing has changed.
-            is_at_rest: Whether the arm is told to stay, so that the filter may come to its end.
+            is_at_rest: Whether the reference is stationary, so that the filter may settle.
         """
         last = self._last or measured
         q, dq, tau = measured.q, measured.dq, measured.tau

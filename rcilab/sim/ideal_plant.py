@@ -1,11 +1,11 @@
-"""The arm of theory: it is exactly where it was told to be, and torques move it as the rigid-body model says.
+"""The arm of theory: it is exactly at its setpoint, and torques move it as the rigid-body model says.
 
     POSITION   q = q_c; the joints carry what that takes: tau = M ddq_c + C dq_c + g - J^T w
     TORQUE     M ddq + C dq + g = tau_c + g_model + J^T w, integrated over 1 ms; no friction, no limit of torque
     BRAKED     stands still at once, whatever presses
 
 w presses from outside (`push`). g_model is gravity as the controller knows it, g that of the load that is really
-there (`mount`): the same, until somebody sets a wrong load. Nothing solid stands in the way of this arm.
+there (`mount`): the same, until a wrong load is configured. Nothing solid stands in the way of this arm.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class IdealPlant:
         return self._rest_at(readonly_copy(q))
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
-        """Lets something outside press on the arm until told otherwise; see `Plant.push`."""
+        """Applies an external force until the next call; see `Plant.push`."""
         self._push = Push(self._model, wrench, link, point)
         self._rests = False
 
@@ -87,7 +87,7 @@ class IdealPlant:
             raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def step(self, setpoint: Setpoint) -> Measurement:
-        """Lives through one millisecond."""
+        """Advances by one cycle."""
         last = self._measurement
         if setpoint.drive is Drive.TORQUE:
             return self._fall(self._zeros if setpoint.tau is None else np.asarray(setpoint.tau))

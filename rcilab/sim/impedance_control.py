@@ -23,7 +23,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import DAMPING_RATIO, ModalDamping, design_damping
 from rcilab.sim.plant import Measurement
 
-NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a choice
+NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a tuning value
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
 _PULL, _DRAG = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
 _DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] keeps feed-forward finite at a singularity; off it, it costs below 0.1 %

@@ -17,7 +17,7 @@
   answers that are out of order: then the command behind the gap continues the motion, and those with the ids of the
   gap come after it, in the order of their arrival.
 * Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
-  cycles; the loop is told to live through some more, or their delay would only ever grow.
+  cycles; the loop then runs some extra cycles, or their delay would only ever grow.
 * Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
 * A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
 """
@@ -31,9 +31,9 @@ from typing import NamedTuple
 from rcilab.sim.arm_command import ArmCommand
 
 CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the vendor client's worst bursts (about 92).
-WINDOW = 1000  # Cycles that the success rate looks back over, 1 s; a choice.
-STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter, a choice.
-SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer; a choice.
+WINDOW = 1000  # Cycles that the success rate looks back over, 1 s.
+STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter.
+SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer.
 FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
 
@@ -42,7 +42,7 @@ class Playback(NamedTuple):
     """What one cycle gets from the buffer."""
 
     command: ArmCommand | None
-    """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None when there is none."""
+    """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None: no command."""
     steps: int
     """Cycles from now to when `command` is due, 1 for now."""
     is_lost: bool
@@ -93,7 +93,7 @@ class JitterBuffer:
         self._last_id = 0
         self._was_lost = False  # The cycle `_last_id` had no command.
         self._surplus = 0  # Commands that had an id again, right before the next one in the queue.
-        self._passed_over: set[int] = set()  # Ids of a gap that was none: their commands may come yet.
+        self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still come.
         self._waited = 0
         self.is_playing = False
         self.is_finished = False

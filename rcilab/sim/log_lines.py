@@ -1,4 +1,4 @@
-"""Lines for a person, from a loop that must never wait: a thread of their own writes them, as far as somebody reads."""
+"""Lines for a person, from a loop that must never wait: a thread of their own writes them, as long as they are read."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 _MOST = 200  # Lines that wait; a tuning value: what a stream takes at once, and a person reads.
 _SELDOM = 10.0  # [s] A line that anybody can cause is written once in this time, and then counted; a tuning value.
-_GRACE = 0.5  # [s] For the last lines, when the controller ends and nobody reads.
+_GRACE = 0.5  # [s] For the last lines, when the controller ends and they are not read.
 
 
 class LineHandler(logging.Handler):
-    """Hands what the controller's own parts log to whoever writes lines, instead of to a stream.
+    """Hands what the controller's own parts log to a writer of lines, instead of to a stream.
 
     Args:
         write: Takes a line and never waits.
@@ -64,7 +64,7 @@ class LogLines:
 
     Args:
         descriptor: Where to, such as 2. It is written to directly: a stream's own lock would hold up the interpreter's
-            end for as long as nobody reads.
+            end for as long as they are not read.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -101,7 +101,7 @@ class LogLines:
                 try:
                     while data:
                         data = data[os.write(self._descriptor, data) :]
-                except OSError:  # Nobody can read it any more.
+                except OSError:  # The reader is gone.
                     return
             if self._is_ending:
                 return

@@ -1,4 +1,4 @@
-"""What presses on the arm, told from its own sensors and model: the generalised-momentum observer.
+"""External forces on the arm, estimated from its own sensors and model: the generalised-momentum observer.
 
 The residual r of De Luca and Mattone (2003), dr/dt = K (tau_ext - r), needs no acceleration sensor. In discrete time
 it is a first-order low pass on what Newton and Euler cannot explain: M (dq - dq_before)/h + C dq + g - tau.
@@ -17,7 +17,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Measurement
 
-BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms; a choice
+BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms
 _CYCLE = scalar(CYCLE_TIME)  # [s]
 _SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of what is new, in one cycle
 _GAIN = scalar(_SHARE)
@@ -85,4 +85,4 @@ class MomentumObserver:
 
 def _is_tiny(vector: Array, bound: float) -> bool:
     values = vector.tolist()
-    return -bound < values[0] < bound and -bound < min(values) and max(values) < bound  # The first mostly tells.
+    return -bound < values[0] < bound and -bound < min(values) and max(values) < bound  # The first decides most cases.

@@ -13,7 +13,7 @@ the one behind the gear; in POSITION the rotors are accelerated along with the l
 
 What a drive adds to the compensation is limited. The manual's torque figure is that of a torque command, and a drive
 must be able to do more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's
-accelerations need up to 3.9 times of it. The arm does not touch itself: the controller judges positions.
+accelerations need up to 3.9 times of it. The arm does not touch itself: the controller checks positions.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from rcilab.sim.mujoco_obstacles import Obstacles
 from rcilab.sim.plant import Drive, Measurement, Setpoint
 from rcilab.sim.push import Push
 
-BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped; a choice, about 13 Hz
+BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped, about 13 Hz; a tuning value
 KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
 FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no drive knows it exactly.
-PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; a choice, see above
-END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range; a choice: room to come to rest
-BRAKE_TIME = 0.02  # [s] time constant of the brakes; a choice
+PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; see above
+END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range: room to stop in
+BRAKE_TIME = 0.02  # [s] time constant of the brakes; a tuning value
 
 _KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
 _BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
@@ -50,7 +50,7 @@ _STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
 _STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
 _STILL_CYCLES = 100  # Cycles of stillness after which an arm that something keeps off its setpoint rests where it is.
 
-_log = logging.getLogger("rcilab.makers.rokae.controller")
+_log = logging.getLogger("rcilab.sim")
 
 
 class MuJoCoPlant:
@@ -93,7 +93,7 @@ class MuJoCoPlant:
         return self._come_to_rest(np.asarray(q).tolist())
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
-        """Lets something outside press on the arm until told otherwise; see `Plant.push`."""
+        """Applies an external force until the next call; see `Plant.push`."""
         self._push = Push(self._robot, wrench, link, point)
         self._rests = False
 
@@ -118,7 +118,7 @@ class MuJoCoPlant:
         self._rests = False
 
     def step(self, setpoint: Setpoint) -> Measurement:
-        """Lives through one millisecond with torques that try to be at the setpoint at its end."""
+        """Advances by one cycle with torques that aim to reach the setpoint at its end."""
         if self._rests and self._keeps_resting(setpoint):
             return self._measurement
         self._rests = False
@@ -160,7 +160,7 @@ class MuJoCoPlant:
         return self._push.torque(self._q) if self._push.is_active else 0.0
 
     def _settle(self, setpoint: Setpoint) -> None:
-        """Lets an arm that has come to rest be at rest: its last 1e-7 rad/s would otherwise never end."""
+        """Puts an arm that has stopped at exact standstill: its last 1e-7 rad/s would otherwise never end."""
         speeds: list[float] = self._dq.tolist()
         speed = max(map(abs, speeds))
         if setpoint.drive is Drive.BRAKED:

@@ -15,9 +15,9 @@ from rcilab.sim.api import NetworkFaults
 
 __all__ = ["HOLD_TIME", "PIECE_GAP", "DelayedDatagrams", "Impairment", "NetworkFaults", "SlowStream"]
 
-HOLD_TIME = 0.0025  # [s] By which a reordered datagram is late: two others of a 1 kHz stream overtake it. A choice.
-PIECE_GAP = 0.002  # [s] Between the pieces of a split answer, so that they arrive as pieces. A choice.
-MOST_HELD = 4096  # Datagrams under way at once, four times what a delay of 1 s needs; more are lost, as in a router.
+HOLD_TIME = 0.0025  # [s] By which a reordered datagram is late: two others of a 1 kHz stream overtake it.
+PIECE_GAP = 0.002  # [s] Between the pieces of a split answer, so that they arrive as pieces.
+MOST_HELD = 4096  # Datagrams on their way at once, four times what a delay of 1 s needs; more are lost, as in a router.
 
 
 class Impairment:
@@ -59,7 +59,7 @@ class Impairment:
 
 
 class DelayedDatagrams:
-    """One direction of a bad network with the datagrams that are under way in it.
+    """One direction of a bad network with the datagrams that are on their way in it.
 
     Args:
         faults: What is wrong with it.
@@ -74,12 +74,12 @@ class DelayedDatagrams:
 
     @property
     def next_due(self) -> float:
-        """When the next datagram arrives, [s]; infinity: none is under way."""
+        """When the next datagram arrives, [s]; infinity: none is on its way."""
         return self._waiting[0][0] if self._waiting else float("inf")
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing is wrong and nothing under way, so that datagrams may take the direct way."""
+        """Whether there is no fault and no datagram on its way, so that datagrams may pass directly."""
         return self._spares and not self._waiting
 
     def put(self, datagram: bytes, now: float) -> bool:
@@ -99,7 +99,7 @@ class DelayedDatagrams:
         return arrived
 
     def replace(self, faults: NetworkFaults) -> None:
-        """Changes what is wrong; what is under way already arrives as it would have."""
+        """Changes the faults; datagrams already on their way arrive as they would have."""
         self.faults = faults
         self._spares = faults.spares_datagrams
         self._impairment = Impairment(faults, self._stream)

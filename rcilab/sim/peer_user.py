@@ -1,4 +1,4 @@
-"""Which user is at the other end of a connection inside this machine, as the kernel's socket diagnosis tells it.
+"""Which user is at the other end of a connection inside this machine, from the kernel's socket diagnosis.
 
 sock_diag(7), struct inet_diag_req_v2 and struct inet_diag_msg; one question takes some 30 us.
 """
@@ -23,8 +23,8 @@ _ANY_STATE = 0xFFFFFFFF
 def is_ours(connection: socket.socket) -> bool:
     """Returns whether the user of this process is at the other end of a TCP connection, or root, or who called sudo.
 
-    Nobody is who has gone already: the kernel calls the user of a closed socket 0, which is root. Where it answers no
-    such questions at all, anybody on this machine may be.
+    A peer that has gone already has no user: the kernel calls the user of a closed socket 0, which is root. Where the
+    kernel does not answer such questions at all, every user of this machine is accepted.
     """
     try:
         (host, port), (own_host, own_port) = connection.getpeername(), connection.getsockname()

@@ -1,7 +1,7 @@
 """The arm behind the controller: a small protocol, and the arm that follows every setpoint exactly.
 
 Once a millisecond the controller hands its plant a `Setpoint` and gets a `Measurement` back. A plant knows neither
-sockets nor modes nor faults; it decides only how an arm answers a setpoint. Commands were judged before they come
+sockets nor modes nor faults; it decides only how an arm answers a setpoint. Commands were checked before they come
 here, so a plant may trust them.
 """
 
@@ -25,7 +25,7 @@ class Drive(Enum):
     """What the joints are driven with during one cycle."""
 
     BRAKED = "braked"
-    """Motors off, brakes closed. The arm comes to rest by itself and stays; setpoints are ignored."""
+    """Motors off, brakes closed. The arm stops by itself and stays; setpoints are ignored."""
     POSITION = "position"
     """The servo follows `q` (with `dq` and `ddq` as feed-forward). Also how an arm stands still under power."""
     TORQUE = "torque"
@@ -45,7 +45,7 @@ class Setpoint(NamedTuple):
     tau: Sequence[float] | Array | None = None
     """Commanded joint torques without gravity and friction, [N m], for TORQUE."""
     arrays: tuple[JointVector, JointVector, JointVector] | None = None
-    """q, dq and ddq once more, from whoever has them as arrays already."""
+    """q, dq and ddq as arrays, if they are known already."""
 
     def as_arrays(self) -> tuple[JointVector, JointVector, JointVector]:
         """Returns q, dq and ddq as read-only arrays."""
@@ -83,16 +83,16 @@ class Plant(Protocol):
         ...
 
     def step(self, setpoint: Setpoint) -> Measurement:
-        """Lives through one millisecond with `setpoint` and measures at its end.
+        """Advances by one cycle with `setpoint` and measures at its end.
 
-        An arm at rest that is told to stay (BRAKED, or POSITION with an unchanged `q` and no velocity) must come to
-        answer with equal numbers, so that a resting robot reports a resting state. Returning the same object then is
-        welcome: the cycle recomputes poses and torques only when it gets another one.
+        For a stationary arm with a stationary setpoint (BRAKED, or POSITION with an unchanged `q` and no velocity) the
+        measurements must settle to equal numbers, so that a resting robot reports a resting state. It may then return
+        the same object: poses and torques are recomputed only for another one.
         """
         ...
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
-        """Lets something outside press on the arm until told otherwise; a new push replaces the last.
+        """Applies an external force until the next call; a new push replaces the last.
 
         Args:
             wrench: Force and moment on the arm, base axes, shape (6,), [N, N m]; zeros let go.
@@ -131,7 +131,7 @@ class Plant(Protocol):
         """Takes a box away.
 
         Raises:
-            InvalidValueError: There is none of this name; the message lists those there are.
+            InvalidValueError: There is no box of this name; the message lists those that exist.
         """
         ...
 

@@ -1,7 +1,7 @@
 """The world port: a second listener, on loopback, through which things happen to the virtual robot from outside.
 
 For the user who started the controller; other accounts of the machine are refused. A guest that says nothing may stay
-until somebody else wants its place. Lines of JSON, see `rcilab.sim.api`. Whoever sends a line that is no
+until another one needs its place. Lines of JSON, see `rcilab.sim.api`. A client that sends a line that is no
 request gets one line that says why and is cut off, so that a web page's POST gets nowhere: its first line already is
 none, and what follows is not looked at.
 """
@@ -18,8 +18,8 @@ from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.api import LineReader, Refused, WorldAnswer, WorldRequest, decode_world_request, encode_world_answer
 from rcilab.sim.peer_user import is_ours
 
-MOST_GUESTS = 8  # At once; a choice. One script and one page need two.
-IDLE = 60.0  # [s] A choice: a guest that has been silent for so long gives its place to the next one.
+MOST_GUESTS = 8  # At once. One script and one page need two.
+IDLE = 60.0  # [s] A connection that has been silent for so long gives its place to the next one.
 _FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
 _BYTES_AT_ONCE = 4096
 
@@ -79,7 +79,7 @@ class SimulationPort:
             return
         guest.setblocking(False)
         guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if not is_ours(guest):  # Before anything else: whoever may not enter takes no place from anybody.
+        if not is_ours(guest):  # Before anything else: a user without access takes no place.
             _turn_away(guest, Refused("this world port is for the user who started the controller"))
             return
         if len(self._guests) >= MOST_GUESTS:

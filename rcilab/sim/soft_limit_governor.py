@@ -17,7 +17,7 @@ from typing import NamedTuple
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits
 
-MARGIN = 1e-3  # [rad] Before the soft limit, where a joint is led to rest; a choice.
+MARGIN = 1e-3  # [rad] Before the soft limit, where a joint is stopped; a tuning value.
 SHARE = 0.9  # Of velocity, acceleration and jerk, what fence and chase use: strict bounds need room for rounding.
 _PULL = 8.0  # [1/s] How fast a chase closes the gap; critically damped with the one below.
 _GRIP = 4.0 * _PULL  # [1/s]
@@ -146,7 +146,7 @@ class _Joint:
         self._a, self._x, self._v = (v - self._v) / CYCLE_TIME, x, v
 
     def _may_go(self, x: float) -> bool:
-        """Whether the joint, once at x, could still come to rest inside."""
+        """Whether the joint, once at x, could still stop inside."""
         h = CYCLE_TIME
         v = (x - self._x) / h
         a = (v - self._v) / h

@@ -47,7 +47,7 @@ class ToolKinematics:
 
     @property
     def pose(self) -> Pose:
-        """Pose of the tool in base; made when somebody asks for it."""
+        """Pose of the tool in base; computed on demand."""
         return self._terms.pose
 
     @property
@@ -80,12 +80,12 @@ class ToolKinematics:
         self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
 
     def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
-        """Takes what `coincide` would, from joints that were measured: nobody asks for the differences of those."""
+        """Takes what `coincide` would, from measured joints, without differences."""
         self._terms, self.matrix, self.twist = motion, motion.matrix, motion.twist
         self.psi = self._arm_angle(q)
 
     def coincide(self, other: ToolKinematics) -> None:
-        """Takes over where another one is: the arm is exactly where it was told to be."""
+        """Copies another one: the joints are exactly at their reference."""
         self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
 
     def _arm_angle(self, q: Sequence[float]) -> float:

@@ -11,7 +11,7 @@ from rcilab.i18n.translator import Remark
 
 
 class ArmCondition(Enum):
-    """What every virtual arm checks, whoever made it. The maker's controller maps each to a fault of its own."""
+    """What the virtual arm of every maker checks. The maker's controller maps each to a fault of its own."""
 
     FINITE_ANGLES = "commanded joint angles are finite numbers"
     FINITE_TORQUES = "commanded joint torques are finite numbers"

@@ -59,7 +59,7 @@ class WorldStatus:
     misfits: int = 0
     """Datagrams that had not the size of a command."""
     strangers: int = 0
-    """Datagrams that somebody else than the client sent."""
+    """Datagrams that did not come from the client."""
     ignored: int = 0
     """Commands that came while none was wanted."""
     pushed: bool = False
@@ -93,26 +93,26 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
         InvalidValueError: A value is of the wrong kind.
         TypeError: A name is unknown or missing.
     """
-    judged = dict(content)
+    checked = dict(content)
     for name in _COUNTS:
-        if name in judged:
-            judged[name] = as_integer(judged[name], name, 0, _LARGEST_COUNT)
-    judged["reason"] = _reason(judged.get("reason", ""), judged.pop("remark", None))
+        if name in checked:
+            checked[name] = as_integer(checked[name], name, 0, _LARGEST_COUNT)
+    checked["reason"] = _reason(checked.get("reason", ""), checked.pop("remark", None))
     for name in ("model", "plant", "phase", "button"):
-        if name in judged:
-            judged[name] = _text(judged[name])
-    if "faults" in judged:
-        judged["faults"] = tuple(_text(name) for name in _items(judged["faults"]))
-    if "q" in judged:
-        judged["q"] = as_floats(judged["q"], len(_items(judged["q"])), "q", "rad")
-    if "success_rate" in judged:
-        judged["success_rate"] = as_float(judged["success_rate"], "success_rate", "", 0.0, 1.0)
-    if "pushed" in judged:
-        judged["pushed"] = as_flag(judged["pushed"], "pushed")
+        if name in checked:
+            checked[name] = _text(checked[name])
+    if "faults" in checked:
+        checked["faults"] = tuple(_text(name) for name in _items(checked["faults"]))
+    if "q" in checked:
+        checked["q"] = as_floats(checked["q"], len(_items(checked["q"])), "q", "rad")
+    if "success_rate" in checked:
+        checked["success_rate"] = as_float(checked["success_rate"], "success_rate", "", 0.0, 1.0)
+    if "pushed" in checked:
+        checked["pushed"] = as_flag(checked["pushed"], "pushed")
     for name in ("commands", "states"):
-        if name in judged:
-            judged[name] = NetworkFaults(**judged[name])
-    return WorldStatus(**judged)
+        if name in checked:
+            checked[name] = NetworkFaults(**checked[name])
+    return WorldStatus(**checked)
 
 
 def _reason(said: object, coded: object) -> str:

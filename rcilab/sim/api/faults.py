@@ -11,10 +11,10 @@ Direction: TypeAlias = Literal["both", "commands", "states"]
 """Which UDP datagrams are meant: commands (to the controller), states (from it), or both."""
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
-LONGEST_DELAY = 1.0  # [s] A thousand datagrams under way; a choice.
-LONGEST_TCP_DELAY = 10.0  # [s] Longer than any client waits; a choice.
-LONGEST_STALL = 5.0  # [s] A choice.
-LONGEST_TIME = 86400.0  # [s] For what is to happen later; a choice.
+LONGEST_DELAY = 1.0  # [s] A thousand datagrams on their way: more is no network.
+LONGEST_TCP_DELAY = 10.0  # [s] Longer than any client waits.
+LONGEST_STALL = 5.0  # [s] Longer than any client waits for a state.
+LONGEST_TIME = 86400.0  # [s] For what is to happen later: a day.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +84,7 @@ class Stall:
     duration: float
     """How long it stands still, [s]."""
     after: float = 0.0
-    """When it does so first: this long after it was told, or after its start, [s]."""
+    """When it does so first: this long after the request, or after the start of the controller, [s]."""
     period: float | None = None
     """And again this long after the beginning of the last time, [s]; None: once."""
 

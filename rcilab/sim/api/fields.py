@@ -1,4 +1,4 @@
-"""Judging the fields of a world request: every value that is not as it should be is one kind error."""
+"""Checks of the fields of a world request: every invalid value raises one error that names it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def as_float(value: object, name: str, unit: str, low: float = -inf, high: float
     """Returns a finite number in a range.
 
     Args:
-        value: A number; text and truth values are none.
+        value: A number; text and booleans are refused.
         name: What to call it in an error.
         unit: Its unit, such as "s".
         low: Smallest value.
@@ -73,7 +73,7 @@ def as_word(value: object, name: str, known: tuple[_T, ...]) -> _T:
     """Returns one of the known words.
 
     Raises:
-        InvalidValueError: It is none of them; the message lists them.
+        InvalidValueError: It is not one of them; the message lists them.
     """
     for word in known:
         if isinstance(value, str) and value == word:

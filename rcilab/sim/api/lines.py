@@ -56,7 +56,7 @@ def encode_world_request(request: WorldRequest, request_id: int) -> bytes:
 
 
 def decode_world_request(line: bytes) -> tuple[int, WorldRequest | Refused]:
-    """Returns the id and the request in a line; why it is none, where the line can be read so far.
+    """Returns the id and the request in a line; why it is not a request, if the line can be read so far.
 
     Raises:
         DecodeError: It is no JSON object, or its id is no number; the message says why.

@@ -15,7 +15,7 @@ LimitTable: TypeAlias = Literal["manual", "sdk"]
 
 _BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
 LIMIT_TABLES: tuple[LimitTable, ...] = get_args(LimitTable)
-_LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here stands; a choice that catches wrong units.
+_LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here withstands: it catches wrong units.
 _FARTHEST = 100.0  # [m] Likewise.
 _SIGNALS = 6  # DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13).
 
@@ -108,7 +108,7 @@ class AutoLimit:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Chooses the Cartesian limits that commands are judged by: the manual's, or those of the vendor's SDK."""
+    """Chooses the Cartesian limits that commands are checked against: the manual's, or those of the vendor's SDK."""
 
     name: ClassVar[str] = "limits"
     table: LimitTable

@@ -1,7 +1,7 @@
 """Tool poses commanded one by one: Cartesian position and Cartesian impedance.
 
-A commanded pose passes the low pass of setFilters and the conditions of the manual's section 4.2, then the inverse on
-the branch that the arm is on, then the fence of auto_limit if it is up, and then the conditions on joint angles too.
+A commanded pose passes the pose filter and the conditions on the tool, then the inverse kinematics on the branch that
+the arm is on, then the soft-limit governor if it is enabled, and then the conditions on joint angles too.
 
 The arm angle of a 7-axis arm is the commanded one when it is valid. Otherwise it stays what it was: as it was at the
 start of the motion, or as commanded last. The vendor's client cannot command an arm angle of exactly zero (it goes out

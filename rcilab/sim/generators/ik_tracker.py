@@ -12,8 +12,7 @@ from rcilab.model.robot_model import RobotModel
 class IkTracker:
     """The inverse of one arm with its tool, for poses that follow each other. Owned by a motion generator.
 
-    Joint limits are not its business: it stays on the branch that is nearest to the last angles, and whoever judges
-    joint angles says where that leaves the range.
+    It stays on the branch that is nearest to the last angles, whatever the joint limits are: those are checked later.
 
     Args:
         model: The arm with its tool.

@@ -1,8 +1,8 @@
 """Joint angles commanded one by one: joint position and joint impedance.
 
-The commanded angles pass the low pass of setFilters, then the fence of auto_limit if it is up, and then the conditions
-of the manual's section 4.1. A lost cycle goes on with the acceleration of the last commands; when a later command is
-known already, on the cubic that leads there. The conditions judge the commands that came, over the cycles between.
+The commanded angles pass the joint filter, then the soft-limit governor if it is enabled, and then the conditions on
+joint angles. A lost cycle goes on with the acceleration of the last commands; when a later command is known already, on
+the cubic that leads there. The conditions apply to the commands that came, over the cycles between.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Joint torques commanded one by one, on top of gravity and friction, which the controller compensates.
 
-The commanded torques pass the low pass of setFilters, then the conditions of the manual's section 4.3. Nothing is
-commanded before the first one, so it may be one cycle's torque rate away from zero at most. A lost cycle keeps the last
-torque; when a later command is known already, it goes there on a straight line. The conditions judge the commands that
-came, over the cycles between.
+The commanded torques pass the torque filter, then the conditions on torques. Nothing is commanded before the first one,
+so it may be one cycle's torque rate away from zero at most. A lost cycle keeps the last torque; when a later command is
+known already, it goes there on a straight line. The conditions apply to the commands that came, over the cycles between.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class ControllerConfig:
     udp_port: int | None = None
     """UDP port for commands; None: the same number as the TCP port, as the vendor's client expects it; 0: any."""
     client_host: str | None = None
-    """Where states go from power-up on; None: to whoever connects, from then on."""
+    """Where states go from power-up on; None: to the client that connects, from then on."""
     client_port: int | None = None
     """UDP port where states go; None: the number of our TCP port, as the vendor's client expects it."""
     plant: PlantKind = "ideal"
@@ -60,7 +60,7 @@ class ControllerConfig:
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
     limit_table: LimitTable = "manual"
-    """Whose Cartesian limits commands are judged by: the manual's, or those of the vendor's SDK."""
+    """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
     """What is wrong with the network, from power-up on."""
     states_network: NetworkFaults | None = None

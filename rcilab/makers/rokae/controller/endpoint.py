@@ -62,7 +62,7 @@ class Endpoint:
 
     @property
     def fixed_host(self) -> str | None:
-        """Where states go whoever connects; None: to whoever connects."""
+        """Where states go, whichever client connects; None: to the client that connects."""
         return None if self._fixed_target is None else self._fixed_target[0]
 
     @property

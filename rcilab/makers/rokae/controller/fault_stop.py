@@ -4,10 +4,10 @@
 
 Where one command or one measurement breaks several conditions, all their bits are set in that cycle. A state, a report
 and an error list them in the order of the error bytes on the wire, that of this table, which says nothing about what
-came first. Commands are judged before the measurement: after a broken command no measurement is judged in that cycle.
+came first. Commands are checked before the measurement: after a bad command no measurement is checked in that cycle.
 
 What is the same for all: the bit is set in the state of the cycle in which the condition is violated and stays set
-until the error recovery; queued commands are forgotten; the arm comes to rest inside its acceleration and jerk limits
+until the error recovery; queued commands are forgotten; the arm stops inside its acceleration and jerk limits
 under the position servo, then the brakes close; StopMove is answered with success. What differs is whose value broke
 the condition, and where the stop begins. A joint limit without auto_limit also switches the motors off (manual 3.1.15).
 """
@@ -36,7 +36,7 @@ class FaultStop(NamedTuple):
 
     offender: FaultSource
     modes: str
-    """In which controller modes it is judged."""
+    """In which controller modes it is checked."""
     recovery: str
     """What the error recovery asks for."""
 
@@ -86,7 +86,7 @@ FAULT_STOP: Final = {
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
     Fault.INSTABILITY_DETECTION: FaultStop(FaultSource.ABSENCE, _ALL, "none; after an emergency stop, its release"),
 }
-"""Every fault. While a person guides the arm by hand nothing is judged."""
+"""Every fault. While a person guides the arm by hand nothing is checked."""
 
 ARM_FAULTS: Final = {
     ArmCondition.FINITE_ANGLES: Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,
@@ -121,7 +121,7 @@ def is_beyond_range(violation: Violation) -> bool:
 def as_text() -> str:
     """Returns the table as text, three lines a fault."""
     return "\n".join(
-        f"{fault.value:2} {fault.manual_name}: {fault.cause}; judged in: {row.modes}\n"
+        f"{fault.value:2} {fault.manual_name}: {fault.cause}; checked in: {row.modes}\n"
         f"   {row.offender.value}\n   recovery: {row.recovery}"
         for fault, row in FAULT_STOP.items()
     )

@@ -1,11 +1,11 @@
-"""One millisecond of the controller: requests and commands in, one state out. No sockets, no clock.
+"""The RCI controller around a virtual arm: requests and commands in, one state a cycle out. No sockets, no clock.
 
-Each `step` plays one command (or goes on coming to rest), judges it, moves the plant, looks at its sensors and reports.
+Each `step` advances the arm by one cycle, turns its violations into faults, and reports the state.
 
 What a position controller does on a fault, and every other one here: the offending command is never given to the arm;
-the fault's bit is in the state of that very cycle, and stays; queued commands are forgotten; the arm comes to rest on
-one path, `CommandedMotion.come_to_rest`, inside its acceleration and jerk limits, under the position servo; then the
-brakes close. Where the arm followed its angles the stop begins from the last good command; where it yielded
+the fault's bit is in the state of that very cycle, and stays; queued commands are forgotten; the arm stops on
+one path, `ReferenceTrajectory.stop`, inside its acceleration and jerk limits, under the position servo; then the
+brakes close. Where the arm followed its angles the stop begins from the last good command; where it was compliant
 (impedance, torque, hand guiding), from where it is and how it moves. `fault_stop` lists it fault by fault.
 """
 
@@ -45,7 +45,7 @@ from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
 MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
-RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least; a choice.
+RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least, so that a client sees it.
 _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
@@ -83,7 +83,7 @@ class RciController:
         state: The last reported state.
         ignored: Commands that came while none was wanted.
         safety_stop: Which emergency stop is pressed.
-        limit_table: Whose bounds of the tool's motion commands are judged by; counts from the next motion on.
+        limit_table: Whose limits of the tool's motion apply, from the next motion on.
 
     Args:
         model: The arm.
@@ -185,7 +185,7 @@ class RciController:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the arm rests and no phase is under way that ends by itself: deferred replies are due."""
+        """Whether the arm stands still in no phase that ends by itself: deferred replies are due."""
         return self._arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
@@ -195,7 +195,7 @@ class RciController:
 
     @property
     def wants_commands(self) -> bool:
-        """Whether a client's motion is under way."""
+        """Whether a client's motion is in progress."""
         return self.phase is Phase.MOVING and not self.playout.is_finished
 
     @property
@@ -235,7 +235,7 @@ class RciController:
         self._arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
-        """Takes a command that came from the network; it is kept while a motion is under way."""
+        """Takes a command that came from the network; it is kept while a motion is in progress."""
         self.ignored += not self._arm.receive(ArmCommand(*packet))
 
     def handle(self, request: rci.Request) -> Reply:
@@ -282,10 +282,10 @@ class RciController:
             self.on_event(event, Fault.INSTABILITY_DETECTION)
 
     def step(self, *, is_seen: bool = True) -> RobotState:
-        """Lives through one millisecond and returns the state at its end.
+        """Advances by one cycle and returns the state at its end.
 
         Args:
-            is_seen: Whether anybody will see that state. One that nobody sees has no number of its own: for the client,
+            is_seen: Whether that state is sent. One that is not has no number of its own: for the client,
                 which takes numbers for cycles, nothing is missing.
         """
         self._message_id += is_seen
@@ -308,7 +308,7 @@ class RciController:
             self.on_event(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
-        """Returns whether the next cycle will be like this one, unless somebody asks for something or moves the arm."""
+        """Returns whether the next cycle will be like this one, unless a request comes or the arm is moved."""
         return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled
 
     def _repeat(self) -> RobotState:

@@ -1,4 +1,4 @@
-"""The state as the controller reports it: everything that follows from where the arm is told to be and where it is.
+"""The state as the controller reports it: everything that follows from the reference and the measurement.
 
 What this virtual arm knows and how (each documented here because a state must not lie):
 

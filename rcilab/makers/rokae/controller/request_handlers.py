@@ -123,7 +123,7 @@ def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.Rec
 def describe_refusal(
     request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: VirtualArm
 ) -> str:
-    """Returns why a request was refused, for whoever looks at the controller and not at its answers."""
+    """Returns why a request was refused, for the log of the controller."""
     name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
     why: object = f"the robot is {mode}"
     if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:

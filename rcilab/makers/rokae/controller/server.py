@@ -1,14 +1,14 @@
 """The running controller: the cycle at 1 kHz or in lock-step, and its sockets. One thread; everything happens in it.
 
-Free-running, a state is due every millisecond on a fixed grid; its cycle is lived through a little before, so that it
-leaves in time however long that took. A cycle that this process itself missed is left out
-and counted: the simulated time slips, rather than the client being blamed for commands it had no state to answer (see
-`pace`).
-A client that went on meanwhile, as the vendor's does on its old state, has then sent more commands than cycles; such
-cycles are made up for, one in each millisecond and unseen, or its commands would be played later and later.
-In lock-step a motion's next cycle is due when its command has come, however long or short that takes. When several
-commands wait, as after the vendor client's sleep, they are lived through without a word, and the state after the last
-one is the one to answer.
+Free-running, a state is due every millisecond on a fixed grid; its cycle is computed a little before, so that it leaves
+in time. A cycle that this process itself missed is left out and counted: the simulated time slips, and the client does
+not lose commands for which it had no state to answer (see `CycleTimer`). A client that went on meanwhile, as the
+vendor's does on its old state, has then sent more commands than cycles. Such cycles are made up for, one in each
+millisecond and without sending a state, or its commands would be played later and later.
+
+In lock-step a motion's next cycle is due when its command has come, however long that takes. When several commands
+wait, as after the vendor client's sleep, their cycles are computed without sending a state, and the state after the
+last one is the one to answer.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ from rcilab.sim.plants import build_plant
 from rcilab.sim.simulation_port import SimulationPort
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
-LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take; a choice.
+LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take.
 RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
 CORRUPTED_TIMEOUT = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
-SHUTDOWN_NOTICE = 20  # [cycles] In which a client learns of the end from the error bit of its states.
+SHUTDOWN_NOTICE = 20  # [cycles] For which the states of an ended motion are still sent, with the error bit.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
-GRACE = 2.0  # [s] For the arm to come to rest when the controller shall end.
-_parts_log = logging.getLogger("rcilab.makers.rokae.controller")
+GRACE = 2.0  # [s] For the arm to stop when the controller shall end.
+_parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
 _QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
@@ -152,7 +152,7 @@ class ControllerServer:
 
     @property
     def world_address(self) -> str | None:
-        """Where the world port is, as ADDR:PORT; None: there is none."""
+        """Where the world port is, as ADDR:PORT; None: there is no such port."""
         return None if self._simulation_port is None else "{}:{}".format(*self._simulation_port.address)
 
     def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
@@ -230,7 +230,7 @@ class ControllerServer:
                 on_ready()
 
     def _begin_shutdown(self) -> int:
-        """Ends what is under way; returns for how many cycles states shall still tell a client that moved of it."""
+        """Ends a motion in progress; returns for how many cycles its client is still sent states with the error bit."""
         if self.cycle.phase is not Phase.MOVING:
             self.cycle.on_event(Event.CLIENT_LOST)
             return 0
@@ -258,8 +258,8 @@ class ControllerServer:
     def _await_command(self) -> None:
         """Serves the sockets until a command is there or lost on its way, the motion is over or patience is.
 
-        One that comes too late for its own cycle is not waited for any more, but tells that the client is back: whoever
-        is patient with it again lets it catch up.
+        One that comes too late for its own cycle is not waited for any more, but shows that the client is back: it may
+        then catch up.
         """
         cycle = self.cycle
         is_first = not cycle.playout.is_playing
@@ -294,7 +294,7 @@ class ControllerServer:
 
     @property
     def _is_idle(self) -> bool:
-        """Whether a cycle may be lived through early and sockets be served until its state is due: one wait, not two.
+        """Whether a cycle may be computed early and sockets be served until its state is due: one wait, not two.
 
         A request may then show one state later, which matters to no arm at rest.
         """
@@ -303,7 +303,7 @@ class ControllerServer:
         return is_quiet and not (cycle.is_moving or self.config.lockstep)
 
     def _step(self, due: float) -> bool:
-        """Lives through a cycle and sends its state when it is due, or at once when that is over.
+        """Advances by a cycle and sends its state when it is due, or at once when that time is over.
 
         Returns whether the sockets were served until then.
         """
@@ -329,7 +329,7 @@ class ControllerServer:
                 self.request_stop()
 
     def _catch_up(self) -> None:
-        """Lives through cycles that nobody sees, when more commands wait than should."""
+        """Advances by cycles without sending their states, when more commands wait than should."""
         if not self.cycle.wants_commands:
             return
         playout = self.cycle.playout
@@ -346,7 +346,7 @@ class ControllerServer:
         self._missed_before = self.missed
 
     def _advance(self, *, is_seen: bool = True) -> None:
-        """Lives through one millisecond."""
+        """Advances by one cycle."""
         if self.config.realtime and not self.config.lockstep:
             self._cores.switch(self.cycle.is_moving)
         state = self.cycle.step(is_seen=is_seen)
@@ -355,10 +355,10 @@ class ControllerServer:
             self._log_faults(state.faults)
 
     def _log_faults(self, faults: tuple[FaultCode, ...]) -> None:
-        """Says why error bits were set, whoever set them: a condition, somebody at the world port, a request."""
+        """Logs why error bits were set: by a condition, at the simulation port, by a request."""
         self._logged_faults = faults
         if faults:
-            self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm comes to rest")
+            self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm stops")
             if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
@@ -407,6 +407,6 @@ class ControllerServer:
         self._requests.clear()
         self.cycle.on_event(Event.CLIENT_LOST)
         if was_moving:
-            self._log(f"the client {reason} in mid-motion: the arm comes to rest")
+            self._log(f"the client {reason} in mid-motion: the arm stops")
         elif reason != "closed the connection":
             self._rare_lines.write("left", f"the client {reason}", "clients were lost")

@@ -1,7 +1,7 @@
-"""Everything a client can set over TCP, judged again on our side.
+"""Everything a client can set over TCP, checked again by the controller.
 
 The vendor's client checks some values before it sends them and lets NaN through nearly every check, so here every
-value is judged: finite, inside its range, a proper pose where one is due. What fails is answered with "invalid
+value is checked: finite, inside its range, a proper pose where one is due. What fails is answered with "invalid
 argument" and changes nothing. On 6-axis arms the seventh elements are not even looked at.
 """
 

@@ -5,7 +5,7 @@
                                 MOVING, STOPPING -> CUT_OFF -> OFF
                                 any of them <-> USER_STOPPED
 
-In every phase but MOVING and GUIDING the arm is brought to rest if it still moves, and then stays; that is the one
+In every phase but MOVING and GUIDING the arm stops if it still moves, and then stays; that is the one
 stop path, and no event needs to ask for it. A reply that waits for `AT_REST` is sent when the arm stands still.
 `print(state_machine.as_text())` shows the table.
 """
@@ -39,7 +39,7 @@ class Phase(Enum):
     MOVING = (RobotMode.MOVE, 0)
     """Commands are followed."""
     STOPPING = (RobotMode.MOVE, 1)
-    """The motion was ended; what is queued is played, then the arm comes to rest."""
+    """The motion was ended; what is queued is played, then the arm stops."""
     GUIDING = (RobotMode.GUIDING, 0)
     """A person moves the arm by hand."""
     REFLEX = (RobotMode.REFLEX, 0)
@@ -62,7 +62,7 @@ class Event(Enum):
     MODES_SHOWN = "the delay after StartMove is over"
     FAULT = "a condition was broken"
     JOINT_LIMIT = "a joint passed its range, and auto_limit is off"
-    AT_REST = "the arm has come to rest"
+    AT_REST = "the arm has stopped"
     RECOVERED = "the recovery has taken its time and the arm rests"
     CLIENT_LOST = "the client's connection ended"
     SAFETY_STOP = "an emergency stop was pressed or the safety gate opened"
@@ -77,8 +77,8 @@ class Action(Enum):
     SHOW_MODES = "show the requested modes and listen for commands"
     REVEAL_MODES = "show the requested modes and follow nothing"
     HIDE_MODES = "show idle modes"
-    DRAIN = "play what is queued, then come to rest"
-    DISCARD = "forget commands that were not played and come to rest"
+    DRAIN = "play what is queued, then stop"
+    DISCARD = "forget commands that were not played and stop"
     SET_FAULTS = "set the error bits"
     CLEAR_FAULTS = "clear the error bits"
     GUIDE = "remember where the arm is guided from"
@@ -130,13 +130,13 @@ GROUNDED: Final = (
     C.SET_FC_COOR,
     C.ENABLE_VIRTUAL_GUIDE,
 )
-"""Setters for an arm at rest and in good health. The manual gives no list: a choice, on the safe side."""
+"""Setters for an arm at rest and in good health. The manual gives no list: this one is on the safe side."""
 
 REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
 """Those of them that also a stopped arm takes: the manual's way out of a collision without contact is to raise the
 thresholds (4.6), and an error recovery waits until nothing is above them."""
 
-_TELLING = (P.STARTING, P.MOVING, P.STOPPING)
+_IN_MOTION = (P.STARTING, P.MOVING, P.STOPPING)
 """Phases that a client takes for its motion: only an error bit stops it there.
 
 In STARTING the vendor's client looks at nothing but the modes, without end, so what stops it there shows them with the
@@ -187,7 +187,7 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
         rows[C.STOP_MOVE] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD), stopped, When.AT_REST)
     elif phase is P.MOVING:
         rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
-    else:  # An arm in somebody's hand need not come to rest at all.
+    else:  # A guided arm need not stop at all.
         when = When.NOW if phase is P.GUIDING else When.AT_REST
         rows[C.STOP_MOVE] = Transition(phase, (A.HIDE_MODES,), stopped, when)
     if phase is P.IDLE:
@@ -246,8 +246,8 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         actions = (A.SET_FAULTS, _modes_after(phase), A.DISCARD)
         rows[E.FAULT] = Transition(phase if phase is P.CUT_OFF else P.REFLEX, actions)
         rows[E.JOINT_LIMIT] = Transition(P.CUT_OFF, actions)
-    tells = (A.SET_FAULTS,) if phase in _TELLING else ()
-    rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*tells, _modes_after(phase), A.DISCARD))
+    faults = (A.SET_FAULTS,) if phase in _IN_MOTION else ()
+    rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*faults, _modes_after(phase), A.DISCARD))
     if phase in (P.STARTING, P.GUIDING):
         rows[E.CLIENT_LOST] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD))
     elif phase in (P.MOVING, P.STOPPING):
@@ -265,13 +265,13 @@ TABLE: Final = {(phase, trigger): cell for phase in Phase for trigger, cell in _
 
 def _power_off(phase: Phase) -> Transition:
     after = phase if phase is P.USER_STOPPED else P.OFF
-    tells = A.SET_FAULTS if phase in _TELLING else A.CLEAR_FAULTS
-    actions = () if phase in (P.OFF, P.USER_STOPPED) else (_modes_after(phase), A.DISCARD, tells)
+    faults = A.SET_FAULTS if phase in _IN_MOTION else A.CLEAR_FAULTS
+    actions = () if phase in (P.OFF, P.USER_STOPPED) else (_modes_after(phase), A.DISCARD, faults)
     return Transition(after, actions, SettingStatus.SUCCESS, When.AT_REST)
 
 
 POWER_OFF: Final = {phase: _power_off(phase) for phase in Phase}
-"""SetMotorPower(0): obeyed in every phase; a moving arm is brought to rest first, then the brakes close."""
+"""SetMotorPower(0): obeyed in every phase; a moving arm stops first, then the brakes engage."""
 
 
 def transition(phase: Phase, trigger: Trigger) -> Transition:

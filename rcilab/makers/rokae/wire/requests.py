@@ -2,7 +2,7 @@
 
 Arrays are 7 long on the wire for every arm; a 6-element value is filled up with a zero, and on 6-axis arms whatever
 arrives in the seventh place means nothing. Modes, signals and types are plain integers here, because a client may
-send any byte; the enumerations in `statuses` name the known ones, and it is the controller that judges.
+send any byte; the enumerations in `statuses` name the known ones, and it is the controller that checks them.
 """
 
 from __future__ import annotations

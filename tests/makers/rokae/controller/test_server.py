@@ -509,9 +509,7 @@ def test_a_command_that_jumps_is_a_fault_in_the_state_that_answers_it(lockstep: 
         assert Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY in answer.faults
         assert answer.controller_mode is ControllerMode.OTHER
         assert answer.motion_generator_mode is MotionGeneratorMode.IDLE
-        assert "joint 1: commanded velocity 10 rad/s passes 2.175 rad/s" in lockstep.wait_for_line(
-            "the arm comes to rest"
-        )
+        assert "joint 1: commanded velocity 10 rad/s passes 2.175 rad/s" in lockstep.wait_for_line("the arm stops")
 
 
 def test_in_lock_step_two_runs_are_the_same_to_the_last_bit() -> None:
@@ -588,7 +586,7 @@ def test_a_udp_port_in_use_says_what_to_change(lockstep: Running) -> None:
 
 
 def test_an_address_of_another_machine_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"192\.0\.2\.1 is no address of this machine"):
+    with pytest.raises(UsageError, match=r"192\.0\.2\.1 is not an address of this machine"):
         ControllerServer(ControllerConfig(model="xMate3", port=0, host="192.0.2.1"))
 
 

@@ -125,7 +125,7 @@ def test_a_controller_whose_stderr_is_never_read_goes_on_and_ends_when_it_is_tol
 def test_what_the_simulation_finds_odd_goes_the_way_of_all_lines(capfd: pytest.CaptureFixture[str]) -> None:
     """A warning of MuJoCo comes in the middle of a cycle."""
     lines: list[str] = []
-    handler, log = LineHandler(lines.append), logging.getLogger("rcilab.makers.rokae.controller")
+    handler, log = LineHandler(lines.append), logging.getLogger("rcilab.sim")
     log.addHandler(handler)
     try:
         log.warning("MuJoCo: %s", "odd")
