@@ -14,7 +14,7 @@ LONGEST_PATIENCE = 250  # [cycles] However long the pause was: no client streams
 
 
 class CycleTimer:
-    """The grid of milliseconds that cycles are due on. Owned by the controller's loop.
+    """The grid that cycles are due on. Owned by the controller's loop.
 
     Attributes:
         deadline: When the current cycle is due, [s].
@@ -22,9 +22,11 @@ class CycleTimer:
 
     Args:
         now: The time, [s].
+        period: From one cycle to the next, [s].
     """
 
-    def __init__(self, now: float) -> None:
+    def __init__(self, now: float, period: float = CYCLE_TIME) -> None:
+        self._period = period
         self.deadline = now
         self.missed = 0
         self._patience = 0
@@ -35,12 +37,12 @@ class CycleTimer:
 
     def next(self, now: float) -> float:
         """Returns when the next cycle is due, [s], at most a cycle ago; those before it are left out."""
-        self.deadline += CYCLE_TIME
+        self.deadline += self._period
         self._patience = max(0, self._patience - 1)
-        skipped = int((now - self.deadline) / CYCLE_TIME)
+        skipped = int((now - self.deadline) / self._period)
         if skipped > 0:
             self.missed += skipped
-            self.deadline += skipped * CYCLE_TIME
+            self.deadline += skipped * self._period
             self._patience = max(self._patience, min(skipped, LONGEST_PATIENCE))
         return self.deadline
 

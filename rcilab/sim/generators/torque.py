@@ -2,7 +2,8 @@
 
 The commanded torques pass the torque filter, then the conditions on torques. Nothing is commanded before the first one,
 so it may be one cycle's torque rate away from zero at most. A lost cycle keeps the last torque; when a later command is
-known already, it goes there on a straight line. The conditions apply to the commands that came, over the cycles between.
+known already, it goes there on a straight line. The conditions apply to the commands that came, over the cycles
+between.
 """
 
 from __future__ import annotations

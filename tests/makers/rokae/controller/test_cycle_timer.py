@@ -80,3 +80,10 @@ def test_patience_has_an_end_and_begins_with_a_pause() -> None:
         count += 1
         pace.next(pace.deadline)
     assert count == LONGEST_PATIENCE
+
+
+def test_the_grid_has_the_period_of_the_maker() -> None:
+    timer = CycleTimer(0.0, period=0.004)
+    assert timer.next(0.0) == pytest.approx(0.004)
+    assert timer.next(0.017) == pytest.approx(0.016)
+    assert timer.missed == 2
