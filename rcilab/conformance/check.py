@@ -27,8 +27,8 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.state import Mode, require_mode
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.motion.range import RECOVERY_RANGE, range_from
 
 
 def check(

@@ -30,7 +30,7 @@ from rcilab.core.safety_box import SafetyBox, active_box, box_from
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.core.state import Mode, require_mode
 from rcilab.model.robot_model import RobotModel, require_model
-from rcilab.motion.range import RECOVERY_RANGE, range_from
+from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 
 
 class Monitor:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.cartesian import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.joint import plan_joint
-from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, MotionSample, TimeLaw, motion_through, require_motion
 from rcilab.motion.online import Jog
 from rcilab.motion.piecewise import PiecewisePolynomial

@@ -14,6 +14,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.bounds import require_inside
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.path import (
@@ -29,7 +30,6 @@ from rcilab.motion.path import (
 from rcilab.motion.path_infeasibility import examine, refusal
 from rcilab.motion.path_timing import curve_through, plan_along, require_path
 from rcilab.motion.piecewise import join_pieces
-from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import plan_s_curve
 from rcilab.motion.time_parametrization import TimeParametrization
 from rcilab.motion.torque_rate import plan_within_torque_rate

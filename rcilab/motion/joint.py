@@ -13,10 +13,9 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import require_model
 from rcilab.motion import _ruckig
-from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.bounds import LIMIT_MARGIN, angle_text, require_inside
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
-from rcilab.motion.range import angle_text, require_inside
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
 from rcilab.motion.torque_rate import plan_within_torque_rate
 

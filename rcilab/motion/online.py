@@ -11,9 +11,9 @@ from rcilab.core.arrays import JointVector, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion import _ruckig
+from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.twist import Frame, TwistController
 
 POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. A choice.

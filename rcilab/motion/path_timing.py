@@ -16,18 +16,17 @@ from rcilab.core.arrays import Array, JointPath, JointVector, as_number, make_re
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.blocks import blocks
+from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.hermite import quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.margin import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
 from rcilab.motion.orientation_path import ViaOrientation, turns_between
 from rcilab.motion.path import Path
 from rcilab.motion.path_bounds import LEAST, ROUNDNESS, PathBounds, half_planes, path_bounds
 from rcilab.motion.path_infeasibility import examine, refusal
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.slowdown import spread
+from rcilab.motion.rows import blocks, spread
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _KNOTS = 500

@@ -12,10 +12,10 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.bounds import RECOVERY_RANGE, angle_text, range_from
 from rcilab.motion.cartesian import plan_line
 from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
-from rcilab.motion.range import RECOVERY_RANGE, angle_text, range_from
 
 RECOVERY_MARGIN = radians(1.0)
 """How far inside its range a joint is led, [rad]. A tuning value: far enough that the next motion starts inside where

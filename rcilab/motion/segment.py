@@ -13,13 +13,13 @@ from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import InvalidValueError, KinematicsError, PlanningError, RcilabError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.bounds import require_inside
 from rcilab.motion.cartesian import arm_angles
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
 from rcilab.motion.path_infeasibility import examine
 from rcilab.motion.path_timing import require_path
 from rcilab.motion.program import Program
-from rcilab.motion.range import require_inside
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.waypoint import Waypoint, label, named_value
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.limits import Limits
-from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.path_bounds import ROUNDNESS, PathBounds, half_planes, path_bounds
 from rcilab.motion.segment_spline import SegmentSpline, derivatives_at_knots
 

@@ -11,11 +11,10 @@ from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits, Limits
-from rcilab.motion.blocks import blocks
 from rcilab.motion.hermite import quintic
+from rcilab.motion.rows import blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
 from rcilab.motion.segment_spline_bounds import ColumnLimits, chain_bounds, column_limits
-from rcilab.motion.slowdown import spread
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _ROUNDS = 12

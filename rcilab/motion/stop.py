@@ -8,7 +8,7 @@ from rcilab.core.arrays import as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
-from rcilab.motion.margin import LIMIT_MARGIN
+from rcilab.motion.bounds import LIMIT_MARGIN
 from rcilab.motion.motion import Motion, standing
 
 

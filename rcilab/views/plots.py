@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rcilab.conformance.signals import HOLD_SAMPLES
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.motion.range import RECOVERY_RANGE, range_from
+from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 
 if TYPE_CHECKING:
     from rcilab.core.limits import JointLimits

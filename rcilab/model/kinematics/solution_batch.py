@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import tau
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import PERPENDICULAR_TOLERANCE, UNIT_TOLERANCE, Pose
+
+Columns: TypeAlias = tuple[Array, Array, Array]
+"""Three components of one vector a pose, each of shape (N,)."""
 
 
 class SolutionBatch:
@@ -82,13 +86,13 @@ def as_pose_batch(value: ArrayLike) -> Array:
     T = np.asarray(value, dtype=np.float64)
     if T.ndim != 3 or T.shape[1:] != (4, 4) or not len(T):
         raise InvalidValueError("T", f"an array of shape {T.shape}", "needs shape (N, 4, 4)")
-    x, y, z = (T[:, :3, i] for i in range(3))
+    x, y, z = ((T[:, 0, i], T[:, 1, i], T[:, 2, i]) for i in range(3))
     with np.errstate(invalid="ignore", over="ignore"):
-        good = _row_dot(np.cross(x, y), z) > 0.0
+        good = dot(cross(x, y), z) > 0.0
         for a, b in ((x, y), (y, z), (z, x)):
-            good &= abs(_row_dot(a, b)) <= PERPENDICULAR_TOLERANCE
-            good &= abs(_row_dot(a, a) - 1.0) <= 2.0 * UNIT_TOLERANCE
-        good &= np.isfinite(T[:, :3, 3].sum(axis=1))
+            good &= abs(dot(a, b)) <= PERPENDICULAR_TOLERANCE
+            good &= abs(dot(a, a) - 1.0) <= 2.0 * UNIT_TOLERANCE
+        good &= np.isfinite(T[:, 0, 3] + T[:, 1, 3] + T[:, 2, 3])
     for column, value in enumerate((0.0, 0.0, 0.0, 1.0)):
         good &= T[:, 3, column] == value
     if not good.all():
@@ -98,5 +102,11 @@ def as_pose_batch(value: ArrayLike) -> Array:
     return T
 
 
-def _row_dot(a: Array, b: Array) -> Array:
-    return np.einsum("ij,ij->i", a, b)
+def dot(a: Columns, b: Columns) -> Array:
+    """Returns the scalar products of N pairs of vectors, shape (N,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Columns, b: Columns) -> Columns:
+    """Returns the cross products of N pairs of vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

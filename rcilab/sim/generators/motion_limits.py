@@ -10,7 +10,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box, box_from
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.range import range_from
+from rcilab.motion.bounds import range_from
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.generators.start import StartTolerance

@@ -8,17 +8,14 @@ there too.
 from __future__ import annotations
 
 from math import pi, tau
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
+from rcilab.model.kinematics.solution_batch import Columns, cross, dot
 from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, inverse_seven, inverse_six
-
-Columns: TypeAlias = tuple[Array, Array, Array]
-"""Three components of one vector a pose, each of shape (N,)."""
 
 _BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache.
 _OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form decides what a singularity leaves open.
@@ -146,21 +143,13 @@ def _wrist_centre(arm: ArmGeometry, T: Array) -> tuple[Columns, Columns, Array, 
 
 def _wrist(x4: Columns, y4: Columns, z4: Columns, T: Array, ahead: Columns) -> tuple[Array, Array, Array, Array]:
     """Returns the angles of Rz Ry Rz from the axes in front of the wrist to the flange, and the middle one's sine."""
-    cosine, sine = _dot(x4, ahead), _dot(y4, ahead)
+    cosine, sine = dot(x4, ahead), dot(y4, ahead)
     side = np.sqrt(cosine * cosine + sine * sine)
     # The axis of the middle turn, z4 x z_flange, in the axes of the flange.
-    middle = _cross(z4, ahead)
+    middle = cross(z4, ahead)
     x7, y7 = ((T[:, 0, i], T[:, 1, i], T[:, 2, i]) for i in range(2))
-    third = np.arctan2(_dot(middle, x7), _dot(middle, y7))
-    return np.arctan2(sine, cosine), np.arctan2(side, _dot(z4, ahead)), third, side
-
-
-def _dot(a: Columns, b: Columns) -> Array:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Columns, b: Columns) -> Columns:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    third = np.arctan2(dot(middle, x7), dot(middle, y7))
+    return np.arctan2(sine, cosine), np.arctan2(side, dot(z4, ahead)), third, side
 
 
 def _half_turn(q: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.motion.slowdown import largest_around, spread
+from rcilab.motion.rows import largest_around, spread
 
 
 @given(st.lists(st.floats(1.0, 9.0), min_size=1, max_size=60), st.integers(0, 40))

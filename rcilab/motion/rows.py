@@ -1,10 +1,22 @@
-"""Where a law passes a limit: by how much to pass the knots around there slower."""
+"""Rows of long motions: in blocks that stay in the cache, and how much slower to pass where a limit is exceeded."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from rcilab.core.arrays import Array
+
+_BLOCK = 4096
+"""Rows that are computed together. Tuning value: a table of them, of 7 joints, has 230 kB and is neither given back to
+the system nor fetched from memory again and again, which would make motions of 100 s half as slow again."""
+
+
+def blocks(count: int) -> Iterator[slice]:
+    """Yields the rows 0 to `count` in slices, one after the other."""
+    for first in range(0, count, _BLOCK):
+        yield slice(first, min(first + _BLOCK, count))
 
 
 def spread(factor: Array, s: Array, knots: Array, reach: int) -> Array:
