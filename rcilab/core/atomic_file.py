@@ -6,7 +6,7 @@ import errno
 import os
 import stat
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -16,7 +16,7 @@ from rcilab.core.error_base import InvalidValueError
 
 
 @contextmanager
-def replacing(file: str | PathLike[str], *, survives_power_loss: bool = False) -> Iterator[IO[bytes]]:
+def replacing(file: str | PathLike[str], *, survives_power_loss: bool = False) -> Generator[IO[bytes]]:
     """Gives a stream whose content takes the place of a file once all of it is written; a failure leaves the file.
 
     A symbolic link stays one, and what is not a regular file (/dev/stdout, a pipe) is written to directly.

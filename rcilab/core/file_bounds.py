@@ -13,7 +13,7 @@ ROW_BYTES = 1024
 """What a row may take in a file, unpacked. A choice: a cycle of a run takes 816 bytes."""
 
 
-def require_max_rows(max_rows: int) -> int:
+def require_max_rows(max_rows: object) -> int:
     """Returns a bound that can be one.
 
     Raises:

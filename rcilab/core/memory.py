@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 from rcilab.core.errors import UsageError
@@ -23,7 +23,7 @@ def is_starved(error: BaseException) -> bool:
 
 
 @contextmanager
-def memory_needed() -> Iterator[None]:
+def memory_needed() -> Generator[None]:
     """Makes an error of ours out of any that says that memory is short.
 
     Raises:

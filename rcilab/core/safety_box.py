@@ -78,7 +78,7 @@ class SafetyBox:
         """
         local = (positions - self.T_base_box.position) @ self.T_base_box.rotation
         beyond = np.abs(local) - 0.5 * np.array(self.size)
-        outside = np.sqrt(np.square(np.maximum(beyond, 0.0)).sum(axis=1))
+        outside: Array = np.sqrt(np.square(np.maximum(beyond, 0.0)).sum(axis=1))
         return np.where(outside > 0.0, outside, beyond.max(axis=1))
 
     def corners(self) -> Array:
