@@ -191,7 +191,7 @@ def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[fl
     Args:
         columns: All of the same length.
         stream: Where to; opened with newline="".
-        progress: Told the share that is done, now and then.
+        progress: Called with the share that is done, now and then.
     """
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([column.title for column in columns])

@@ -9,7 +9,7 @@ from typing import Self
 
 _UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What would act on a terminal, break a line, turn the direction of writing, or is half a character."""
-_LONGEST = 2000  # Characters of what an error says of a value; a choice: the longest of ours have some 600.
+_LONGEST = 2000  # Characters of what an error says of a value; tuning value: the longest of ours have some 600.
 
 
 def plain_text(text: str, most: int = _LONGEST) -> str:

@@ -8,9 +8,9 @@ from __future__ import annotations
 from rcilab.core.errors import InvalidValueError
 
 MOST_ROWS = 1_000_000
-"""Cycles of 1 ms in a motion or a run: 17 minutes. A choice: to judge a row takes 1.1 KB, so all of them 1.1 GB."""
+"""Cycles of 1 ms in a motion or a run: 17 minutes. Tuning value: to judge a row takes 1.1 KB, so all of them 1.1 GB."""
 ROW_BYTES = 1024
-"""What a row may take in a file, unpacked. A choice: a cycle of a run takes 816 bytes."""
+"""What a row may take in a file, unpacked. Tuning value: a cycle of a run takes 816 bytes."""
 
 
 def require_max_rows(max_rows: object) -> int:

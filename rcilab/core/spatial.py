@@ -25,7 +25,7 @@ UNIT_TOLERANCE = 1e-5
 """How far rows and columns of a rotation may be from unit length; the vendor's client uses the same."""
 
 PERPENDICULAR_TOLERANCE = 1e-4
-"""How large the cosine of the angle between two rows may be. The vendor's client does not look at it; a choice: a
+"""How large the cosine of the angle between two rows may be. The vendor's client does not look at it; tuning value: a
 rotation that was written down with five decimals passes."""
 
 _NUMBERS = Struct("<16d")

@@ -72,7 +72,7 @@ def plan_profile(
 def plan_standstill(
     q: JointVector, dq: JointVector, ddq: JointVector, acceleration: JointVector, jerk: JointVector
 ) -> PiecewisePolynomial:
-    """Returns the curve on which every joint for itself comes to rest as fast as its bounds allow.
+    """Returns the curve on which every joint for itself stops as fast as its bounds allow.
 
     Args:
         q: Joint angles, shape (n,), [rad].

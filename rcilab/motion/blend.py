@@ -22,11 +22,11 @@ from rcilab.motion.path import Path
 from rcilab.motion.segment import Segment
 
 _LOOKS = 33
-"""Places at which a segment's half, or a blend, is looked at; a choice."""
+"""Places at which a segment's half, or a blend, is looked at; tuning value."""
 _STANDS = 1e-6
 """A tool that moves less than this turns on the spot, [m]."""
 _NUDGE = 3e-4
-"""Share of the way over which derivatives are formed. A choice: both their errors are below 1e-7."""
+"""Share of the way over which derivatives are formed. Tuning value: both their errors are below 1e-7."""
 _INSIDE = 0.999
 """Part of the radius to stay in, so that what happens between the looks is inside, too."""
 

@@ -47,9 +47,9 @@ S_PROFILE_PATH_ACCELERATION = 2.5
 
 _JUMP = 4.0
 """Times the velocity limit, and times the turn of the tool, within a cycle: beyond it a joint does not follow the tool
-but changes branches at a singularity. A choice; what is slower is a motion, and `check` judges it."""
+but changes branches at a singularity. Tuning value; what is slower is a motion, and `check` checks it."""
 _LEVER = 0.1
-"""Length that makes a turn of the tool's way, [m]; a choice."""
+"""Length that makes a turn of the tool's way, [m]; tuning value."""
 
 
 def plan_line(

@@ -17,9 +17,9 @@ from rcilab.core.arrays import Unquoted
 from rcilab.core.errors import InvalidValueError
 
 LONGEST = 8_000_000
-"""Largest text, [bytes]; a choice: a program of 10 000 waypoints has 4 million."""
+"""Largest text, [bytes]; tuning value: a program of 10 000 waypoints has 4 million."""
 DEEPEST = 8
-"""How deep lists and objects may be in each other; a choice: a program needs 4."""
+"""How deep lists and objects may be in each other; tuning value: a program needs 4."""
 
 _BLANK = re.compile(r"[ \t\r\n]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)

@@ -1,4 +1,4 @@
-"""A motion as a value: planners return it, the checker judges it, views draw it, the control process streams it."""
+"""A motion as a value: planners return it, the checker checks it, views draw it, the control process streams it."""
 
 from __future__ import annotations
 
@@ -285,10 +285,10 @@ class Motion:
         unit: Literal["rad", "deg"] = "rad",
         max_rows: int = MOST_ROWS,
     ) -> Motion:
-        """Returns the motion through joint samples from elsewhere, at any rate, even or not, to be judged.
+        """Returns the motion through joint samples from elsewhere, at any rate, even or not, to be checked.
 
         A cubic spline through every sample, which starts and ends at rest; on the 1 ms grid like every motion.
-        `check` judges it: nothing is slowed down or smoothed.
+        `check` checks it: nothing is slowed down or smoothed.
 
         A CSV file has a row a sample. With a header line, columns are found by name, and others passed over: `t`, with
         its unit if that is not seconds (`t [ms]`), and `q1`, `q2`, ... (also `q[1]`, `joint_1`), with theirs

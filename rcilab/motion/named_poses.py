@@ -17,7 +17,7 @@ from rcilab.model.robot_model import RobotModel, require_model
 
 FORMAT = "rcilab poses"
 VERSION = 1
-LONGEST_NAME = 40  # Characters; a choice: what a list shows whole.
+LONGEST_NAME = 40  # Characters; tuning value: what a list shows whole.
 
 
 def default_file() -> Path:

@@ -16,7 +16,7 @@ from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.twist import Frame, TwistController
 
-POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. A choice.
+POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. Tuning value.
 
 _LONGEST = 1000.0  # [s] Ruckig counts to 7600 s; a joint that would creep longer towards its limit stops first.
 _STILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Below these a joint is at rest: rounding of the curve.
@@ -27,7 +27,7 @@ class Jog:
 
     Owned by the thread that runs the cycle: one `step` a cycle of 1 ms gives the joint angles to command. Whatever is
     asked for, and whenever, velocity, acceleration and jerk of every joint stay `LIMIT_MARGIN` inside the limits, and
-    a joint that is led towards the end of its range comes to rest `POSITION_MARGIN` inside it. A command that asks for
+    a joint that is led towards the end of its range stops `POSITION_MARGIN` inside it. A command that asks for
     more is not refused: it is followed as far as the limits allow, and `part` and `is_damped` say how far.
 
         jog = Jog(model, robot.state.q_c)

@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.spatial import Rotation9, turn_between
 
 _LOOKS = 200
-"""Where on the way a turn through a middle orientation is looked at for its fastest rate, evenly. A choice."""
+"""Where on the way a turn through a middle orientation is looked at for its fastest rate, evenly. Tuning value."""
 _STEEPEST = 1.5
 """Slope at the middle, in mean slopes of the slower part, up to which a cubic that is straight there does not overshoot
 its other end."""

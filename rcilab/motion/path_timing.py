@@ -30,23 +30,23 @@ from rcilab.motion.rows import blocks, spread
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _KNOTS = 500
-"""Steps of the path between which bounds are interpolated. A choice: two millimetres of a line of a metre."""
+"""Steps of the path between which bounds are interpolated. Tuning value: two millimetres of a line of a metre."""
 _FINE_KNOTS = 4000
-"""The same close to a singularity, where joints turn fast on a short way. A choice: the law then takes 50 ms."""
+"""The same close to a singularity, where joints turn fast on a short way. Tuning value: the law then takes 50 ms."""
 _STEP = 0.1
 """Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
 choice: 50 rad on the whole way; no arm has that."""
 _ROUNDS = 8
 """How often to slow down a law in places where it passes a limit, and then as a whole. Seen: 1 to 5 in places."""
 _SLOWEST = 4.0
-"""Beyond this a limit is not passed by what happens between the knots, but by a jump. A choice."""
+"""Beyond this a limit is not passed by what happens between the knots, but by a jump. Tuning value."""
 _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
 _HASTE = 1.002
 """To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
-few rounds do: 1 or 2 on nine of ten paths. A choice; it makes motions 0.06 % longer."""
+few rounds do: 1 or 2 on nine of ten paths. Tuning value; it makes motions 0.06 % longer."""
 _NUDGE = 1e-4
-"""Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+"""Share of the way over which derivatives by the way are formed. Tuning value: both their errors are below 1e-7."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -32,7 +32,7 @@ class Program:
     name: str = ""
     """What people call it."""
     tool: Floats | None = None
-    """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of whoever plans."""
+    """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of the planner."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():

@@ -24,13 +24,13 @@ from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.waypoint import Waypoint, label, named_value
 
 _KNOTS = 100
-"""Steps in which a path is first looked at. A choice."""
+"""Steps in which a path is first looked at. Tuning value."""
 _STEP = 0.1
-"""Turn of a joint from knot to knot beyond which it is looked at more closely, [rad]. A choice."""
+"""Turn of a joint from knot to knot beyond which it is looked at more closely, [rad]. Tuning value."""
 _OTHER_BRANCH = 1e-6
 """How far a line may end from the q it was to go to, [rad]; beyond it is another branch."""
 _NUDGE = 3e-4
-"""Share of the way over which derivatives by the way are formed. A choice: both their errors are below 1e-7."""
+"""Share of the way over which derivatives by the way are formed. Tuning value: both their errors are below 1e-7."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -23,15 +23,15 @@ from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.segment import Segment
 
 _BODY_KNOTS = 24
-"""Fewest knots on a segment. A choice: the fastest law switches at knots."""
+"""Fewest knots on a segment. Tuning value: the fastest law switches at knots."""
 _BLEND_KNOTS = 16
 _MOST_KNOTS = 4000
 _TURN = 0.03
-"""Turn of a joint from knot to knot to aim at, [rad]. A choice: the tool is then within a nanometre of its path."""
+"""Turn of a joint from knot to knot to aim at, [rad]. Tuning value: the tool is then within a nanometre of its path."""
 _JUMP = 0.3
 """The same beyond which a singularity is in the way, [rad]."""
 _NUDGE = 3e-4
-"""Part of a segment or blend over which derivatives are formed. A choice: both their errors are below 1e-7."""
+"""Part of a segment or blend over which derivatives are formed. Tuning value: both their errors are below 1e-7."""
 
 
 Rows: TypeAlias = NDArray[np.intp]

@@ -20,16 +20,16 @@ from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
 _USUAL_ROUNDS = 4.0
-"""By which half of the work is taken for done. A choice."""
+"""By which half of the work is taken for done. Tuning value."""
 _SLOWEST = 50.0
-"""Beyond this a limit is passed by a jump. A choice."""
+"""Beyond this a limit is passed by a jump. Tuning value."""
 _INSTANTS = (0.25, 0.5, 0.75)
 """Where in a cycle the curve is looked at, besides its start, in cycles."""
 _CHANGE = 1e-9
 """By what part of itself a square of s' has changed that is not rounding."""
 _HASTE = 1.002
 """To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
-few rounds do, and places that were good stay so when the cycles fall elsewhere. A choice."""
+few rounds do, and places that were good stay so when the cycles fall elsewhere. Tuning value."""
 
 
 def plan_chain(chain: SegmentSpline, limits: Limits, tell: Callable[[float], None]) -> tuple[Array, list[float]]:

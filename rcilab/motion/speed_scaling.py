@@ -26,7 +26,7 @@ from rcilab.motion.motion import Motion, standing
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 SLOWEST_PACE = 0.1
-"""A choice: what is slower is better planned anew."""
+"""Tuning value: what is slower is better planned anew."""
 
 _RAMPS = (0.08, 0.12, 0.18, 0.26, 0.38, 0.55, 0.8, 1.2, 1.8, 2.7, 4.0)  # [s]
 _DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.5, 4.0)  # [s]
@@ -146,7 +146,7 @@ def require_pace(pace: object) -> float:
 def changed_pace(paced: SpeedScaledMotion, cycle: int, pace: float, limits: JointLimits) -> Iterator[SpeedScaledMotion]:
     """Yields motions that go on with another pace from a cycle on, those that have it soonest first.
 
-    Each keeps the joints' limits; what else is to be judged is up to the caller, who takes the first that will do.
+    Each keeps the joints' limits; what else is to be checked is up to the caller, who takes the first that will do.
 
     Args:
         paced: How it is run through so far.

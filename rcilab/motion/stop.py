@@ -13,10 +13,10 @@ from rcilab.motion.motion import Motion, standing
 
 
 def plan_stop(limits: JointLimits, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Motion:
-    """Returns the motion on which every joint for itself comes to rest as fast as its limits allow.
+    """Returns the motion on which every joint for itself stops as fast as its limits allow.
 
     It answers from any finite state, also from one outside the limits: an acceleration that is too high is first led
-    back inside, a velocity that is too high falls at once. Where the joints come to rest is the result, not a choice:
+    back inside, a velocity that is too high falls at once. Where the joints stop is the result, not a choice:
     a joint that runs towards its position limit at full speed passes it (`motion.goal` tells). About 0.13 ms;
     `motion.q`, the rows to play one a cycle, takes another 0.04 ms once.
 

@@ -15,7 +15,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import require_rows
 
-_LONGEST_LINE = 65_536  # Characters. A choice: a line of ours has some hundreds.
+_LONGEST_LINE = 65_536  # Characters. Tuning value: a line of ours has some hundreds.
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,9 +23,9 @@ WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 FARTHEST = 10.0
 """Beyond this a coordinate is no place that an arm reaches, [m]; a choice: whoever writes more, writes millimetres."""
 LARGEST_BLEND = 1.0
-"""Largest blend radius, [m]; a choice: an arm's reach."""
+"""Largest blend radius, [m]; tuning value: an arm's reach."""
 LONGEST_DWELL = 3600.0
-"""Longest stay at a waypoint, [s]; a choice."""
+"""Longest stay at a waypoint, [s]; tuning value."""
 _UNIT = 1e-3
 """How far the length of a quaternion may be from 1; it is normalised."""
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 Progress: TypeAlias = Callable[[float], None]
-"""Told the share that is done, 0 to 1."""
+"""Called with the share that is done, 0 to 1."""
 
 _Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, Text], None]"
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
 
-_PATH_POINTS = 1200  # Of the drawn tool path; a choice.
+_PATH_POINTS = 1200  # Of the drawn tool path; tuning value.
 _PLOTS = ("q", "dq", "tau", *ERRORS)
 
 

@@ -222,7 +222,7 @@ class Run:
 
     @property
     def report(self) -> Report | None:
-        """The verdict on the plan; None without a plan or an arm. Judged anew each time, by the table of today."""
+        """The verdict on the plan; None without a plan or an arm. Checked again each time, by the table of today."""
         if self.plan is None or self.model is None:
             return None
         return check(self.plan, self.model)
@@ -320,7 +320,7 @@ class Run:
 
         Args:
             file: Its name; an existing file is replaced.
-            progress: Told the share that is done, 0 to 1.
+            progress: Called with the share that is done, 0 to 1.
             language: Of the HTML page, "en" or "zh".
             units: Of the HTML page; numbers for programs are SI.
 

@@ -55,11 +55,11 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 ENDING = ".rcirun"
-BLOCK_CYCLES = 256  # A choice: what a crash may cost at most, about a quarter of a second.
+BLOCK_CYCLES = 256  # Tuning value: what a crash may cost at most, about a quarter of a second.
 
 _LATER = {"braking", *STATE_FIELDS}  # What the first versions did not record.
 _ROWS = struct.Struct("<I")
-_LARGEST_ROW = 4096  # [bytes] A choice: a cycle with all that the state has takes a third of it.
+_LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with all that the state has takes a third of it.
 
 
 class RunWriter:

@@ -9,9 +9,9 @@ import numpy as np
 from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
-_HEAVIEST = 100.0  # [kg] A choice: more than ten times what an xMate can carry. Grams are above it.
-_FARTHEST = 5.0  # [m] A choice: from the flange; millimetres are above it.
-_LARGEST = 100.0  # [kg m^2] A choice: a hundred times that of anything an xMate can carry.
+_HEAVIEST = 100.0  # [kg] Tuning value: more than ten times what an xMate can carry. Grams are above it.
+_FARTHEST = 5.0  # [m] Tuning value: from the flange; millimetres are above it.
+_LARGEST = 100.0  # [kg m^2] Tuning value: a hundred times that of anything an xMate can carry.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

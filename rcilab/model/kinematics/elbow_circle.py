@@ -13,7 +13,7 @@ from rcilab.core.errors import SingularError
 from rcilab.model.kinematics.arm_angle import reference_frame
 
 _LOOKS = 720  # Arm angles at which a ray is compared with the circle: half a degree; a parabola does the rest.
-_PULL = 1e-3  # [m] per rad: what decides between the near and the far side where a ray passes both. A choice.
+_PULL = 1e-3  # [m] per rad: what decides between the near and the far side where a ray passes both. Tuning value.
 _LEAST = 1e-6  # [m] Below it the arm is as good as stretched, and its elbow has no circle.
 
 

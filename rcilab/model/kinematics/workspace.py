@@ -12,7 +12,7 @@ from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.model.kinematics.manipulability import ManipulabilityPath, dexterity_path
 from rcilab.model.kinematics.moving_arm import MovingArm
 
-_MOST = 1_000_000  # Samples; a choice: some 200 MB while they are made.
+_MOST = 1_000_000  # Samples; tuning value: some 200 MB while they are made.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

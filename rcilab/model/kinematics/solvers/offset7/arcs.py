@@ -19,7 +19,7 @@ from rcilab.model.kinematics.solvers.newton import settle
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
 
-_CUTS = 8  # Into how many a piece is cut at once; a choice.
+_CUTS = 8  # Into how many a piece is cut at once; tuning value.
 _ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
 _LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
 _SLIVER = 1e-4  # [rad] What is not worth an arc of its own.

@@ -30,9 +30,9 @@ _QUARTER = pi / 2
 _TURNS = (-_QUARTER, _QUARTER, _QUARTER, -_QUARTER, _QUARTER, _QUARTER, 0.0)
 _EXACT = 1e-12  # [rad] and [m] In which the table must have the shape.
 _TRACE = 360
-"""Angles of joint 7 at which the self-motion is looked at. A choice: a degree; smaller loops may be overlooked."""
+"""Angles of joint 7 at which the self-motion is looked at. Tuning value: a degree; smaller loops may be overlooked."""
 _PARTS, _HUNTS = 16, 4  # An end of a branch is looked for in 16 parts of a piece, four times over.
-_DENSE = 6  # Angles put next to it; a choice.
+_DENSE = 6  # Angles put next to it; tuning value.
 _REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as on its end.
 
 

@@ -30,11 +30,11 @@ from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, S
 DEGREE = 8
 """Of the polynomial: 16 roots on the circle at most."""
 _NODES = 20
-"""Angles of joint 7 at which it is evaluated. A choice: 17 determine it, some more even out the rounding."""
+"""Angles of joint 7 at which it is evaluated. Tuning value: 17 determine it, some more even out the rounding."""
 _GRID = 256
 """Angles at which its sign is looked at. A choice: no two of its extrema lie within a step, but where it is flat."""
 _FLAT, _FINER = 1e-6, 16
-"""Below what part of its size it is flat, and into how many parts a step is cut there; a choice."""
+"""Below what part of its size it is flat, and into how many parts a step is cut there; tuning value."""
 _CELL = tau / _GRID
 _NEWTON = 6  # Steps, each of which halves the range of a root if Newton's method leaves it.
 _ROUNDING = 1e-13  # How far a polynomial may miss zero, by the sum of its coefficients, where two roots meet.
@@ -42,9 +42,9 @@ _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
 _NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
 _SAME = 1e-6  # [rad] Solutions that differ by less are one.
-_SPREAD = 64  # Solutions to take where there are endlessly many; a choice.
+_SPREAD = 64  # Solutions to take where there are endlessly many; tuning value.
 _COLUMNS = 8  # At least, as many as the other arms have branches.
-_BLOCK = 512  # Poses worked on together, so that intermediate arrays stay in the cache; a choice.
+_BLOCK = 512  # Poses worked on together, so that intermediate arrays stay in the cache; tuning value.
 
 _HARMONICS = np.arange(DEGREE + 1)
 _ANGLES: Array = np.arange(_NODES, dtype=np.float64) * (tau / _NODES)

@@ -19,7 +19,7 @@ from rcilab.model.kinematics.jacobian import tool_jacobian
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry
 
 HELD_SINGULAR = 3e-4  # [m^3]
-"""Determinant of the six joints' Jacobian below which the arm counts as singular. A choice: four thousandths of
+"""Determinant of the six joints' Jacobian below which the arm counts as singular. Tuning value: four thousandths of
 the largest, 1 of 36 random configurations; beyond it commands of 1 ms and the joints that follow agree to rounding."""
 
 _FREE = [joint for joint in range(7) if joint != ELBOW]
