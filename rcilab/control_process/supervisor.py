@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
-from rcilab.control_process.jog_command import JogKind, build_jog, hold_jog, release_jog
+from rcilab.control_process.jog_record import hold_jog, release_jog
 from rcilab.control_process.launch import require_plant
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Counter
 from rcilab.control_process.messages import (
@@ -30,16 +30,15 @@ from rcilab.control_process.messages import (
     StartGuiding,
     Stop,
     StopGuiding,
-    SwitchRows,
 )
 from rcilab.control_process.motion_preconditions import require_admissible, require_ready
+from rcilab.control_process.motion_rows import SharedRows
 from rcilab.control_process.pending_request import PendingRequest
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
 from rcilab.control_process.request_client import RequestClient
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.round_trip import RoundTrip
 from rcilab.control_process.snapshot import Snapshot
-from rcilab.control_process.speed_override import LEADS, SpeedOverride
 from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.control_process.status_reader import StatusReader
 from rcilab.core.clock import CYCLE_TIME
@@ -48,6 +47,8 @@ from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, Rc
 from rcilab.core.memory import memory_needed
 from rcilab.core.state import Mode
 from rcilab.execution.guiding import require_guidable
+from rcilab.execution.jog import JogKind, build_jog
+from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration, require_setup
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
@@ -305,7 +306,8 @@ class Supervisor(Closeable):
         with self._lock:
             self._require_unstopped(stops)
             self._setup.require_given()
-            self._pace.begin(paced, self.model, mode)
+            self._rows.begin(paced)
+            self._override.begin(paced, self.model, mode)
             duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
             return self._ask("execute", Execute(rows=len(paced.q), duration=duration, mode=mode))
 
@@ -318,7 +320,7 @@ class Supervisor(Closeable):
             UsageError: No motion of `execute` is under way.
             PlanningError: It arrives before it could be held.
         """
-        return self._change_pace(0.0)
+        return self._override_of_motion().change(0.0)
 
     def resume(self, pace: float = 1.0) -> PendingRequest:
         """Goes on with a motion that is held; see `set_pace`."""
@@ -338,31 +340,19 @@ class Supervisor(Closeable):
             UsageError: No motion of `execute` is under way, or this machine is too busy.
             PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
         """
-        return self._change_pace(require_pace(pace))
+        return self._override_of_motion().change(require_pace(pace))
 
     @property
     def paced(self) -> SpeedScaledMotion | None:
         """The motion of the last `execute` as it was really commanded, with every change of pace; None before."""
         with self._lock:
             self._require_block()
-            return self._pace.paced
+            return self._override.motion
 
-    def _change_pace(self, pace: float) -> PendingRequest:
-        for lead in LEADS:
-            changed = self._pace.plan(pace, lead, self._require_cycle())
-            with self._lock:
-                handed = self._pace.hand_over(changed, self._require_cycle())
-                if handed is not None:
-                    request = SwitchRows(
-                        first=handed.first, start=handed.place, rows=handed.count, holds=changed.holds,
-                        duration=changed.duration,
-                    )  # fmt: skip
-                    pending = self._ask("change of speed", request)
-                    self._pace.follow(pending, changed, handed)
-                    return pending
-        raise UsageError(
-            "this machine is too busy to change the pace of the motion in time; it goes on as it is"
-        ).coded("too_busy")
+    def _override_of_motion(self) -> SpeedOverride[PendingRequest]:
+        with self._lock:
+            self._require_block()
+            return self._override
 
     def _require_cycle(self) -> int:
         cycle = self._motion_cycle()
@@ -528,7 +518,10 @@ class Supervisor(Closeable):
                 block, self.model.name, self._plant, address, auto_restart=self._auto_restart
             )
             self._client = RequestClient(block)
-            self._pace, self._round_trip = SpeedOverride(block), RoundTrip(block)
+            self._rows = SharedRows(
+                block, self._lock, self._require_cycle, lambda request: self._ask("change of speed", request)
+            )
+            self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
             self._reader, self._ring = StatusReader(block), RingReader(block)
         except BaseException:
             block.close()
@@ -618,11 +611,11 @@ class Supervisor(Closeable):
             return self._reader.read_cycle()
 
     def _read_pace(self, shown: Snapshot) -> dict[str, Any]:
-        paced = self._pace.paced
+        paced = self._override.motion
         if paced is None or shown.motion_time is None:
             return {}
         place = paced.place_at(round(shown.motion_time / CYCLE_TIME))
-        return {"motion_place": place, "pace": paced.pace, "mode": self._pace.mode}
+        return {"motion_place": place, "pace": paced.pace, "mode": self._override.mode}
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:

@@ -36,7 +36,7 @@ from rcilab.control_process.messages import (
     StopGuiding,
     SwitchRows,
 )
-from rcilab.control_process.motion_executor import MotionExecutor, StoppedError
+from rcilab.control_process.motion_service import MotionService, StoppedError
 from rcilab.control_process.request_channel import RequestChannel
 from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
@@ -75,7 +75,7 @@ class ControlProcess:
         self._oversight = StopConditions(block.counters, parent)
         self._publisher = StatusWriter(block)
         self._log = CycleLog(self._publisher.recorder, self._publisher.on_row)
-        self._mover = MotionExecutor(
+        self._motions = MotionService(
             block, self._settings.limits, self._publisher, self._log, self._requests, self._oversight
         )
         self._driver: StreamingDriver | None = None
@@ -209,11 +209,11 @@ class ControlProcess:
             case Execute():
                 driver = self._require_driver()
                 self._record(driver.poll(_LOOK))
-                self._mover.execute(driver, self._model, request)
+                self._motions.execute(driver, self._model, request)
             case Jog():
                 driver = self._require_driver()
                 self._record(driver.poll(_LOOK))
-                self._mover.jog(driver, self._model)
+                self._motions.jog(driver, self._model)
             case SwitchRows():
                 raise UsageError("no motion runs whose pace could change").coded("no_pace")
             case End():

@@ -8,12 +8,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.state import ControllerMode, Mode
-from rcilab.execution.control_loop import Callback, ControlLoop
+from rcilab.core.state import Mode
+from rcilab.execution.control_loop import Callback
 from rcilab.execution.filters import CommandFilter
+from rcilab.execution.motion_executor import MotionExecutor
 from rcilab.execution.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.execution.session_lock import SessionLock
-from rcilab.execution.speed_scaled_stream import SpeedScaledStream
+from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.driver import ConfiguredArm, StreamingDriver
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.punctual import punctual
@@ -82,16 +83,18 @@ class MotionRunner:
         self,
         callback: Callback,
         mode: Mode,
-        plan: Motion | SpeedScaledStream | None = None,
+        plan: Motion | None = None,
         filters: Sequence[CommandFilter] = (),
+        override: SpeedOverride[bool] | None = None,
     ) -> Run:
         """Runs a motion and returns what became of it.
 
         Args:
             callback: Gives the command for each state.
             mode: How the arm is commanded.
-            plan: What is to be commanded, and may change in between; None where only the callback knows.
+            plan: What is to be commanded; None where only the callback knows.
             filters: What every command passes before it is sent.
+            override: Changes the plan while it runs.
 
         Raises:
             ControlError: The controller stopped it.
@@ -102,25 +105,17 @@ class MotionRunner:
         time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held.
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
-        loop = ControlLoop(
-            self._driver,
-            model.limits,
-            ControllerMode[mode.upper()],
-            CycleLog(recorder),
-            watch=self._lock.reason_to_stop,
-            silence=self._silence,
-            model=model,
-            filters=filters,
-            box=self._arm.safety_box,
-            collision_thresholds=self._arm.collision_thresholds,
+        executor = MotionExecutor(
+            self._driver, CycleLog(recorder), self._lock.reason_to_stop, model.limits, silence=self._silence
         )
         setup = Setup(target=self._driver.name, mode=mode, started_ns=time.time_ns())
 
         def report(stopped: str | None, error: BaseException | None = None) -> Run:
+            scaled = None if override is None else override.motion
             run = build_run(
                 recorder.rows(),
-                plan=plan.as_motion() if isinstance(plan, SpeedScaledStream) else plan,
-                paced=isinstance(plan, SpeedScaledStream) and plan.is_paced,
+                plan=plan if scaled is None else scaled.as_motion(),
+                paced=scaled is not None and scaled.changed > 0,
                 stopped=stopped,
                 truncated=recorder.truncated,
                 realtime=self._realtime,
@@ -133,7 +128,14 @@ class MotionRunner:
 
         try:
             with self._lock.move(), punctual(self._realtime), one_core(self.partner):
-                stopped = loop.run(callback)
+                stopped = executor.run(
+                    callback,
+                    mode,
+                    model,
+                    filters,
+                    box=self._arm.safety_box,
+                    collision_thresholds=self._arm.collision_thresholds,
+                )
         except BaseException as error:
             if self._listeners:
                 report(str(error) or type(error).__name__, error)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_number, described
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox, require_box
@@ -23,8 +24,9 @@ from rcilab.execution.motion_progress import MotionProgress
 from rcilab.execution.motion_runner import MotionRunner, RunListener
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
-from rcilab.execution.speed_scaled_stream import SpeedScaledStream
+from rcilab.execution.speed_override import SpeedOverride, StreamRows
 from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
+from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
 from rcilab.motion.speed_scaling import require_pace
@@ -159,7 +161,7 @@ class RobotSession(Closeable):
         self._runner = runner
         self._simulation = simulation
         self._commands = driver.open_commands(arm, lock)
-        self._streamed: SpeedScaledStream | None = None
+        self._streamed: tuple[MotionStream, SpeedOverride[bool]] | None = None
         """What `execute` streams just now."""
         with _sessions_lock:
             _sessions.add(self)
@@ -178,6 +180,11 @@ class RobotSession(Closeable):
     def model(self) -> RobotModel:
         """The arm, with the tool, the load and the soft limits that this session has set."""
         return self._arm.model
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self._driver.n
 
     @property
     def safety_box(self) -> SafetyBox | None:
@@ -365,20 +372,33 @@ class RobotSession(Closeable):
                 self._require_allowed(motion, state, mode)
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
-            paced = plan_start(motion, pace, self.model, mode)
-            streamed = SpeedScaledStream(paced, mode, self.model, report_progress(paced.as_motion(), progress))
-            self._streamed = streamed
+            scaled = plan_start(motion, pace, self.model, mode)
+            planned = scaled.as_motion()
+            stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))
+            override = SpeedOverride(StreamRows(stream))
+            override.begin(scaled, self.model, mode)
+            self._streamed = stream, override
             try:
-                filters = [RateLimiter(self.model.limits)] if mode == "torque" else []
-                return self._runner.run(streamed.stream, mode, streamed, filters)
+                return self._runner.run(stream, mode, planned, override=override)
             finally:
                 self._streamed = None
 
     @property
     def progress(self) -> MotionProgress | None:
         """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
-        streamed = self._streamed
-        return None if streamed is None else streamed.progress
+        if (streamed := self._streamed) is None:
+            return None
+        stream, override = streamed
+        scaled, cycle = override.motion, stream.cycle
+        assert scaled is not None  # It has begun.
+        return MotionProgress(
+            time=cycle * CYCLE_TIME,
+            duration=scaled.duration,
+            place=scaled.place_at(cycle),
+            planned=scaled.motion.duration,
+            pace=scaled.pace,
+            mode=override.mode,
+        )
 
     def pause(self) -> None:
         """Holds the motion that `execute` runs in another thread, along its way and within all limits.
@@ -407,10 +427,9 @@ class RobotSession(Closeable):
         self._change_pace(require_pace(pace))
 
     def _change_pace(self, pace: float) -> None:
-        streamed = self._streamed
-        if streamed is None:
+        if (streamed := self._streamed) is None:
             raise UsageError("no motion of execute() runs whose pace could change").coded("no_pace")
-        streamed.change_pace(pace)
+        streamed[1].change(pace)
 
     def control(
         self,

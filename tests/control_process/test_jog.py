@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from rcilab.control_process import Supervisor
-from rcilab.control_process.jog_command import HOLD_TIMEOUT, JogCommand, read_jog, write_jog
+from rcilab.control_process.jog_record import HOLD_TIMEOUT, read_jog, write_jog
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.spatial import Pose
+from rcilab.execution.jog import JogCommand
 from rcilab.model.robot_model import load_model
 from tests.waiting import SOON, wait_for
 

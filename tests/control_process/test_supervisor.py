@@ -180,7 +180,7 @@ def test_a_missing_or_stale_certificate_is_refused_at_once(supervisor):
         supervisor.execute(motion, check(other, MODEL).certificate)
     assert "motion" in caught.value.changed
     gentle = plan_joint(MODEL, q, GOAL, speed=0.1)
-    with pytest.raises(CertificateError, match="judged for the mode cartesian_position"):
+    with pytest.raises(CertificateError, match="checked for the mode cartesian_position"):
         supervisor.execute(gentle, check(gentle, MODEL, mode="cartesian_position").require().certificate)
     away = plan_joint(MODEL, GOAL, MODEL.home)
     with pytest.raises(CertificateError, match=r"stands at .* plan the motion from robot\.state\.q_c") as caught:

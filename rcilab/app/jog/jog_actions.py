@@ -30,7 +30,7 @@ from rcilab.app.jog.robot_jog import RobotJog
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
-from rcilab.control_process.jog_command import HOLD_TIMEOUT
+from rcilab.control_process.jog_record import HOLD_TIMEOUT
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion import Jog
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rcilab.app.planning import Plan
     from rcilab.app.store import Store, UiState
     from rcilab.control_process import SupervisorStatus
-    from rcilab.control_process.jog_command import JogKind
+    from rcilab.execution.jog import JogKind
     from rcilab.model.robot_model import RobotModel
 
 Frame = Literal["base", "tool"]

@@ -1,10 +1,10 @@
-"""What the control process does while the arm moves by its commands: rows that were planned, or a jog that is held."""
+"""The control process while the arm moves: planned rows or a jog, and the requests that arrive meanwhile."""
 
 from __future__ import annotations
 
 import gc
 
-from rcilab.control_process.jogging import HeldJog
+from rcilab.control_process.jog_record import HeldJog
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
 from rcilab.control_process.messages import End, Execute, NumberedRequest, Stop, SwitchRows
 from rcilab.control_process.request_channel import RequestChannel
@@ -13,9 +13,10 @@ from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import ControlError, UsageError
 from rcilab.core.limits import Limits
-from rcilab.core.state import ControllerMode, Mode
-from rcilab.execution.control_loop import Callback, ControlLoop
-from rcilab.execution.filters import RateLimiter
+from rcilab.core.state import Mode
+from rcilab.execution.control_loop import Callback
+from rcilab.execution.jog import JogCallback
+from rcilab.execution.motion_executor import HELD_TOO_LONG, LONGEST_PAUSE, MotionExecutor
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
@@ -23,15 +24,13 @@ from rcilab.makers.driver import StreamingDriver
 from rcilab.model.robot_model import RobotModel
 from rcilab.realtime.cpu_latency import awake_cores
 
-LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up; a choice: every cycle is recorded.
-
 
 class StoppedError(ControlError):
-    """A motion was brought to rest before its end, because somebody wanted it so."""
+    """A motion was stopped before its end, on request."""
 
 
-class MotionExecutor:
-    """One motion after the other. Owned by the control process's one thread.
+class MotionService:
+    """Runs one motion after the other. Owned by the control process's one thread.
 
     Args:
         block: The shared block, where rows and jogs are read from.
@@ -54,10 +53,9 @@ class MotionExecutor:
         self._block, self._limits = block, limits
         self._publisher, self._log = publisher, log
         self._requests, self._oversight = requests, oversight
-        self._jog: HeldJog | None = None
+        self._jog: JogCallback | None = None
+        self._is_stopping = False
         self._stream: MotionStream | None = None
-        self._mode: Mode = "joint_position"
-        self._softly: str | None = None  # Why a motion in torques is being brought to rest.
 
     def execute(self, driver: StreamingDriver, model: RobotModel, request: Execute) -> None:
         """Streams the rows that lie in the block; returns once the arm stands at their end.
@@ -76,7 +74,7 @@ class MotionExecutor:
             model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Builds it now.
         self._publisher.begin_motion(request.duration)
         self._publisher.say("moving", "moving")
-        self._stream, self._softly = MotionStream(rows, mode, model, self._publisher.on_cycle), None
+        self._stream = MotionStream(rows, mode, model, self._publisher.on_cycle)
         try:
             self._move(driver, model, self._stream, "idle.arrived", mode)
         finally:
@@ -90,7 +88,7 @@ class MotionExecutor:
             ControlError: The controller stopped the arm.
         """
         assert driver.latest is not None  # A connection begins with a state.
-        self._jog = HeldJog(self._block, model, driver.latest.q_c)
+        self._jog = JogCallback(HeldJog(self._block), model, driver.latest.q_c)
         self._publisher.begin_motion(None)
         self._publisher.say("moving", "moving.jog")
         try:
@@ -107,48 +105,36 @@ class MotionExecutor:
         mode: Mode = "joint_position",
     ) -> None:
         """Runs a motion; what it says at its end tells why it ended."""
-        self._mode = mode
-        loop = ControlLoop(
-            driver,
-            self._limits,
-            ControllerMode[mode.upper()],
-            self._log,
-            watch=self._watch,
-            model=model,
-            filters=[RateLimiter(self._limits)] if mode == "torque" else [],
-        )
+        self._is_stopping = False
+        executor = MotionExecutor(driver, self._log, self._stop_reason, self._limits, on_stopping=self._show_stopping)
         try:
             with awake_cores():
-                reason = loop.run(callback) or self._softly
+                reason = executor.run(callback, mode, model)
         finally:
-            self._publisher.end_motion()  # Before it is said to be over: whoever looks then sees where it ended.
+            self._publisher.end_motion()  # Before it is said to be over: a reader then sees where it ended.
             gc.collect()
         say = self._publisher.say
         if reason is None:
             say("idle", arrived)
-        elif reason == "idle.operator":
+            return
+        if reason == "idle.operator":
             say("idle", reason, seconds=OPERATOR_TIMEOUT)
-        elif reason == "idle.held":
-            say("idle", reason, seconds=LONGEST_PAUSE * CYCLE_TIME)
+        elif reason == HELD_TOO_LONG:
+            say("idle", "idle.held", seconds=LONGEST_PAUSE * CYCLE_TIME)
         else:
             say("idle", "idle.stopped")
-        if reason is not None:
-            raise StoppedError(self._publisher.snapshot.message)
+        raise StoppedError(self._publisher.snapshot.message)
 
-    def _watch(self, t: float) -> str | None:
-        """Looked at in every cycle of a motion: does anybody or anything want it to end?"""
+    def _stop_reason(self, t: float) -> str | None:
+        """Returns why the motion is to stop; called in every cycle."""
         reason = self._oversight.reason_to_stop()
         if reason is None and self._requests.has_new:
             reason = self._answer()
-        elif reason is None and self._stream is not None and self._stream.held > LONGEST_PAUSE:
-            reason = "idle.held"
-        if reason is not None and self._softly is None:
-            self._publisher.say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
-            if self._stream is not None and self._mode == "torque":
-                self._softly = reason
-                self._stream.stop()
-                self._log.braking = True
-        return None if self._softly else reason
+        return reason
+
+    def _show_stopping(self, reason: str) -> None:
+        self._is_stopping = True
+        self._publisher.say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
 
     def _answer(self) -> str | None:
         """Looks at a request that has come while the arm moves; returns why the motion is to end for it, or None."""
@@ -158,7 +144,7 @@ class MotionExecutor:
         if isinstance(request.body, Stop | End):
             self._requests.defer(request)
             return "idle.stopped"
-        if isinstance(request.body, SwitchRows) and self._stream is not None and self._softly is None:
+        if isinstance(request.body, SwitchRows) and self._stream is not None and not self._is_stopping:
             self._switch_rows(request, request.body, self._stream)
         elif self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
             self._requests.defer(request)

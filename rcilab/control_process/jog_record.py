@@ -1,49 +1,41 @@
-"""The jog that somebody holds: one small record in the shared block, renewed as long as it is held."""
+"""The jog that is held: one small record in the shared block, renewed as long as it is held."""
 
 from __future__ import annotations
 
 import struct
 import time
-from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import get_args
 
-from numpy.typing import ArrayLike
-
-from rcilab.control_process.layout import Counter
-from rcilab.core.arrays import as_vector
-from rcilab.core.errors import InvalidValueError
-
-JogKind: TypeAlias = Literal["joint", "base", "tool"]
-"""What the numbers are: joint velocities, or a twist of the tool in axes of the base or of the tool."""
+from rcilab.control_process.layout import ControlBlock, Counter
+from rcilab.execution.jog import JogCommand, JogKind
 
 HOLD_TIMEOUT = 0.3  # [s] A jog that is not renewed for that long was let go; a page renews it ten times a second.
 
 _KINDS: tuple[JogKind, ...] = get_args(JogKind)
-_RECORD = struct.Struct("<qq7d")  # place of the kind, count of the numbers, the numbers
-_ATTEMPTS = 3  # The writer needs a microsecond; who meets it in mid-sentence goes on with the last jog.
+_RECORD = struct.Struct("<qq7d")  # index of the kind, count of the numbers, the numbers
+_ATTEMPTS = 3  # The writer needs a microsecond; a reader that meets it goes on with the last jog.
 
 
-@dataclass(frozen=True, slots=True)
-class JogCommand:
-    """How the arm shall move while it is held."""
+class HeldJog:
+    """The `JogSource` of the control process: the jog that is held in the block.
 
-    kind: JogKind
-    values: tuple[float, ...]
-    """n joint velocities, [rad/s], or six numbers of a twist, linear first, [m/s, rad/s]."""
-
-    def __post_init__(self) -> None:
-        if self.kind not in _KINDS:
-            raise InvalidValueError("kind", self.kind, f"is no way to jog; there are {', '.join(_KINDS)}")
-
-
-def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
-    """Returns a jog of an arm with n joints.
-
-    Raises:
-        InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+    Args:
+        block: The shared block.
     """
-    size, unit = (n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
-    return JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
+
+    def __init__(self, block: ControlBlock) -> None:
+        self._block = block
+
+    def read(self, current: JogCommand | None) -> JogCommand | None:
+        """Returns the jog that is held now; None: nothing is held.
+
+        Args:
+            current: What was read last; it is returned again while another one is being written.
+        """
+        counters = self._block.counters
+        if not is_held(counters):
+            return None
+        return read_jog(self._block.jog, counters) or current
 
 
 def hold_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> None:

@@ -1,0 +1,117 @@
+"""Jogging: a callback that moves the arm as long as a jog is held, and stops it afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, get_args
+
+from numpy.typing import ArrayLike
+
+from rcilab.core.arrays import JointVector, as_vector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import JointPosition
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.state import RobotState
+from rcilab.model.dynamics.symmetric_solver import (
+    SymmetricSolver as SymmetricSolver,  # Loaded now, not as the arm waits.
+)
+from rcilab.motion import Jog
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+JogKind: TypeAlias = Literal["joint", "base", "tool"]
+"""What the numbers are: joint velocities, or a twist of the tool in axes of the base or of the tool."""
+
+_KINDS: tuple[JogKind, ...] = get_args(JogKind)
+_NO_TWIST = (0.0,) * 6
+LINGER = 1.0  # [s] at standstill after which a jog ends; until then the next one begins at once.
+
+
+@dataclass(frozen=True, slots=True)
+class JogCommand:
+    """How the arm shall move while it is held."""
+
+    kind: JogKind
+    values: tuple[float, ...]
+    """n joint velocities, [rad/s], or six numbers of a twist, linear first, [m/s, rad/s]."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in _KINDS:
+            raise InvalidValueError("kind", self.kind, f"is not a kind of jog; there are {', '.join(_KINDS)}")
+
+
+def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
+    """Returns a jog of an arm with n joints.
+
+    Raises:
+        InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+    """
+    size, unit = (n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
+    return JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
+
+
+class JogSource(Protocol):
+    """Where the jog that is held comes from."""
+
+    def read(self, current: JogCommand | None) -> JogCommand | None:
+        """Returns the jog that is held now, `current` where it cannot be read just now; None: nothing is held."""
+        ...
+
+
+class JogCallback:
+    """Gives the command of every cycle of a jog. Owned by the control loop's thread.
+
+    Args:
+        source: Where the jog is read from.
+        model: The arm, with its tool.
+        q: Commanded joint angles now, shape (n,), [rad]; at standstill.
+
+    Raises:
+        PlanningError: A joint is outside its limits: the arm cannot move inside them.
+    """
+
+    def __init__(self, source: JogSource, model: RobotModel, q: JointVector) -> None:
+        self._source = source
+        self._jog = Jog(model, q)
+        self._command: JogCommand | None = None
+        self._cycle = 0
+        self._resting = 0
+        self.is_wanted = True
+        """False: stop and end, whatever is held."""
+
+    def __call__(self, state: RobotState, t: float) -> JointPosition:
+        """Returns the command that answers a state; the last one is sent at standstill when no jog is held any more."""
+        cycle = round(t / CYCLE_TIME)
+        self._lead()
+        q = self._jog.q
+        for _ in range(cycle - self._cycle):
+            q = self._jog.step()
+        is_free = self._command is None and self._jog.is_at_rest
+        self._resting = self._resting + cycle - self._cycle if is_free else 0
+        self._cycle = cycle
+        is_over = is_free and (not self.is_wanted or self._resting * CYCLE_TIME >= LINGER)
+        return JointPosition(q, finished=is_over and cycle > 0)
+
+    def _lead(self) -> None:
+        """Follows what is held now."""
+        command = self._source.read(self._command) if self.is_wanted else None
+        if command is None:
+            if self._command is not None:
+                self._let_go(self._command.kind)
+                self._command = None
+            return
+        if command == self._command:
+            return
+        self._command = command
+        if command.kind == "joint":
+            self._jog.set_joint_velocity(command.values)
+        else:
+            self._jog.set_twist(command.values, frame=command.kind)
+
+    def _let_go(self, kind: JogKind) -> None:
+        """Stops; a tool stays on its line meanwhile."""
+        if kind == "joint":
+            self._jog.stop()
+        else:
+            self._jog.set_twist(_NO_TWIST, frame=kind)

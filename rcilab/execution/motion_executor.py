@@ -1,0 +1,122 @@
+"""What moves the arm over a driver: prepared motions and callbacks, with the conditions that stop them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.limits import Limits
+from rcilab.core.state import ControllerMode, Mode
+from rcilab.execution.control_loop import SILENCE, Callback, ControlLoop, StopCheck
+from rcilab.execution.filters import CommandFilter, RateLimiter
+from rcilab.execution.recorder import CycleLog
+from rcilab.execution.streaming import MotionStream
+from rcilab.makers.driver import StreamingDriver
+
+if TYPE_CHECKING:
+    from rcilab.core.safety_box import SafetyBox
+    from rcilab.model.robot_model import RobotModel
+
+LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up: every cycle of it is recorded.
+HELD_TOO_LONG = "held for more than 120 s"
+"""Why a motion ends that is held for `LONGEST_PAUSE`."""
+
+
+class MotionExecutor:
+    """Runs one motion after the other; a session and the control process use it alike. Owned by the driver's thread.
+
+    Args:
+        driver: The connection.
+        log: Takes every cycle.
+        stop_check: Called in every cycle with the motion time; returns why the motion is to stop, or None.
+        limits: Bounds that every command keeps.
+        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        on_stopping: Called with the reason when a motion begins to stop before its end.
+    """
+
+    def __init__(
+        self,
+        driver: StreamingDriver,
+        log: CycleLog,
+        stop_check: StopCheck,
+        limits: Limits,
+        *,
+        silence: float = SILENCE,
+        on_stopping: Callable[[str], object] | None = None,
+    ) -> None:
+        self._driver = driver
+        self._log = log
+        self._stop_check = stop_check
+        self._limits = limits
+        self._silence = silence
+        self._on_stopping = on_stopping
+        self._stream: MotionStream | None = None
+        self._is_torque = False
+        self._reason: str | None = None  # Why a motion in torques is being stopped along its reference.
+
+    def run(
+        self,
+        callback: Callback,
+        mode: Mode,
+        model: RobotModel,
+        filters: Sequence[CommandFilter] = (),
+        *,
+        box: SafetyBox | None = None,
+        collision_thresholds: JointVector | None = None,
+    ) -> str | None:
+        """Runs a motion to its end.
+
+        A `MotionStream` in torque mode passes a rate limiter, and stops along its reference: there is no commanded
+        place to brake, so the reference stops and the torques bring the arm after it.
+
+        Args:
+            callback: A `MotionStream`, or any other callback.
+            mode: How the arm is commanded.
+            model: The arm.
+            filters: What every command passes before it is sent.
+            box: The safety box that the controller has, as far as it is known, for the message of a fault.
+            collision_thresholds: Those of the controller, shape (n,), [N m], as far as they are known, for the same.
+
+        Returns:
+            None when it ran to its end, or why it stopped before.
+
+        Raises:
+            ControlError: The controller stopped it.
+            ConnectionLostError: The controller is gone.
+            Exception: What the callback raised; the arm was stopped.
+        """
+        self._stream = callback if isinstance(callback, MotionStream) else None
+        self._is_torque, self._reason = mode == "torque", None
+        if self._stream is not None and self._is_torque:
+            filters = [*filters, RateLimiter(self._limits)]
+        loop = ControlLoop(
+            self._driver,
+            self._limits,
+            ControllerMode[mode.upper()],
+            self._log,
+            watch=self._check,
+            silence=self._silence,
+            model=model,
+            filters=filters,
+            box=box,
+            collision_thresholds=collision_thresholds,
+        )
+        try:
+            return loop.run(callback) or self._reason
+        finally:
+            self._stream = None
+
+    def _check(self, t: float) -> str | None:
+        """Returns why the motion is to stop; called in every cycle."""
+        reason, stream = self._stop_check(t), self._stream
+        if reason is None and stream is not None and stream.held > LONGEST_PAUSE:
+            reason = HELD_TOO_LONG
+        if reason is not None and self._reason is None:
+            if self._on_stopping is not None:
+                self._on_stopping(reason)
+            if stream is not None and self._is_torque:
+                self._reason = reason
+                stream.stop()
+                self._log.braking = True
+        return None if self._reason else reason
