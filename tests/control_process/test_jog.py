@@ -135,7 +135,7 @@ def test_what_cannot_be_jogged_is_refused_in_words(supervisor):
     for kind, values, said in (
         ("joint", [0.0] * 6, "needs (7,)"),
         ("base", [0.0, 0.0, math.nan, 0.0, 0.0, 0.0], "finite"),
-        ("sideways", [0.0] * 6, "no way to jog"),
+        ("sideways", [0.0] * 6, "not a kind of jog"),
     ):
         with pytest.raises(InvalidValueError, match=said.replace("(", r"\(").replace(")", r"\)")):
             supervisor.jog(kind, values)
