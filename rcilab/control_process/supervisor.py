@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rcilab.conformance.speed_scaling_check import plan_start
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
 from rcilab.control_process.jog_record import hold_jog, release_jog
 from rcilab.control_process.launch import require_plant
@@ -51,6 +52,8 @@ from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration, require_setup
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
+from rcilab.makers.maker import require_driver
+from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
 if TYPE_CHECKING:
@@ -96,9 +99,6 @@ class Supervisor(Closeable):
         auto_restart: bool = True,
         setup: RobotConfiguration | None = None,
     ) -> None:
-        from rcilab.makers.maker import require_driver
-        from rcilab.model.robot_model import require_model
-
         self.model = require_driver(require_model(model))
         require_plant(plant)
         self._target = VIRTUAL if target == VIRTUAL else normalise_address(target)
@@ -290,8 +290,6 @@ class Supervisor(Closeable):
             UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
                 than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
         """
-        from rcilab.conformance.speed_scaling_check import plan_start
-
         stops = self.stops if stops is None else stops
         require_admissible(
             motion,

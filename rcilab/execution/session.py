@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from rcilab.conformance.check import check
+from rcilab.conformance.speed_scaling_check import plan_start
 from rcilab.core.arrays import as_number, described
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
@@ -29,6 +31,11 @@ from rcilab.execution.start_pose_check import describe_start_mismatch, require_m
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
+from rcilab.makers.maker import require_driver
+from rcilab.model.robot_model import load_model, require_model
+from rcilab.motion import plan_joint
+from rcilab.motion.cartesian import arm_angles, follow_path, schedule
+from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.speed_scaling import require_pace
 from rcilab.recording.run import Run
 
@@ -98,15 +105,10 @@ def open_session(
     """
     require_timeout(timeout)
     if model is not None:
-        from rcilab.makers.maker import require_driver
-        from rcilab.model.robot_model import require_model
-
         require_driver(require_model(model))
     driver = open_driver(address, timeout, None if model is None else ExpectedArm.of(model))
     try:
         if model is None:
-            from rcilab.model.robot_model import load_model
-
             model = load_model(driver.arm_name)
         model = driver.with_tool(model)
         if world is None and driver.simulation_address is not None:
@@ -358,8 +360,6 @@ class RobotSession(Closeable):
             ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
             ConnectionLostError: The controller is gone.
         """
-        from rcilab.conformance.speed_scaling_check import plan_start
-
         require_motion(motion, certificate)
         require_mode(mode)
         require_pace(pace)
@@ -489,8 +489,6 @@ class RobotSession(Closeable):
             ConformanceError: The motion breaks a condition; nothing moved.
             ControlError: The controller stopped it. `recover()` leads on.
         """
-        from rcilab.motion import plan_joint
-
         with self._lock.begin_motion("move_j"):
             state = self.receive_state()
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
@@ -517,9 +515,6 @@ class RobotSession(Closeable):
             ConformanceError: The joints would break a condition; nothing moved.
             ControlError: The controller stopped it. `recover()` leads on.
         """
-        from rcilab.motion.cartesian import arm_angles
-        from rcilab.motion.path import build_line
-
         with self._lock.begin_motion("move_l"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
@@ -546,9 +541,6 @@ class RobotSession(Closeable):
             ConformanceError: The joints would break a condition; nothing moved.
             ControlError: The controller stopped it. `recover()` leads on.
         """
-        from rcilab.motion.cartesian import arm_angles
-        from rcilab.motion.path import build_arc
-
         with self._lock.begin_motion("move_c"):
             state = self.receive_state()
             angles = arm_angles(self.model, state.q_c, psi)
@@ -592,16 +584,12 @@ class RobotSession(Closeable):
         )
 
     def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
-        from rcilab.conformance.check import check
-
         check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
 
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
     ) -> Run:
         """Streams a path in Cartesian position mode once its joint motion is found good."""
-        from rcilab.motion.cartesian import follow_path, schedule
-
         motion = follow_path(self.model, state.q_c, path, speed)
         self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
