@@ -65,6 +65,7 @@ __all__ = ["PendingRequest", "Supervisor"]
 
 VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
+_LOSS_LOOKS = 3  # Looks that have to find a connection lost before it is told; a choice, 0.06 s.
 
 
 class Supervisor(Closeable):
@@ -115,6 +116,7 @@ class Supervisor(Closeable):
         self._jogging: PendingRequest | None = None
         self._crash: tuple[str, str] | None = None
         self._incident: Incident | None = None
+        self._lost_looks = 0  # So many looks have found the connection lost.
         self._watcher: threading.Thread | None = None
         self._is_closing = threading.Event()
 
@@ -552,6 +554,7 @@ class Supervisor(Closeable):
                 self._block.counters[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
                 self._collect_replies()
                 self._bear_deaths()
+                self._look_for_loss()
                 if self._connecting is None and self._keeper.is_ready:
                     with suppress(UsageError):  # It died just now; the next look will tell.
                         self._connecting = self.reconnect()
@@ -573,6 +576,17 @@ class Supervisor(Closeable):
             if death.is_worker:
                 self._client.fail_all(ConnectionLostError(death.message))
 
+    def _look_for_loss(self) -> None:
+        """Notes a connection that went while nobody had asked for anything, unless a death of ours explains it.
+
+        A controller's death is known a little later than the end of its connection: hence more looks than one.
+        """
+        shown = self._reader.read_snapshot()
+        is_lost = shown.code == "lost.unreachable" and self._crash is None and self._connecting is not None
+        self._lost_looks = self._lost_looks + 1 if is_lost else 0
+        if self._lost_looks == _LOSS_LOOKS:
+            self._note(shown.code, shown.message)
+
     def _judge(self, shown: Snapshot) -> tuple[Phase, str, str]:
         """Returns phase, code and message: what we know of the processes goes before what one of them says."""
         if self._is_closing.is_set():
@@ -591,6 +605,7 @@ class Supervisor(Closeable):
     def _note(self, code: str, message: str) -> None:
         number = 1 if self._incident is None else self._incident.number + 1
         self._incident = Incident(number=number, code=code, message=message)
+        self._lost_looks = _LOSS_LOOKS  # Once is enough.
 
     def _end_processes(self, reason: RcilabError) -> None:
         """Has the arm brought to rest, ends our processes, and fails what was under way."""
