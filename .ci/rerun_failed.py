@@ -31,8 +31,8 @@ def read_failed(cache: Path) -> list[str]:
 
 def strip_group(name: str) -> str:
     """Returns a test's id without its group."""
-    at = name.rfind("@")
-    return name[:at] if at > name.rfind("]") else name
+    at = name.find("@", name.rfind("]") + 1)  # Parameters may hold an @, and so may the group.
+    return name if at < 0 else name[:at]
 
 
 def run_alone(tests: list[str], folder: Path, number: int) -> list[str] | None:

@@ -39,16 +39,21 @@ def lane_of(file: str) -> str | None:
     return next((lane for lane, places in _LANES.items() if file.startswith(places)), None)
 
 
+def group_of(item: pytest.Item) -> str:
+    """Returns the group of a test: its lane, or its file."""
+    file = item.path.relative_to(_HERE).as_posix()
+    return lane_of(file) or file
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Groups the tests for `--dist loadgroup`, before pytest-xdist reads the groups."""
+    item.add_marker(pytest.mark.xdist_group(group_of(item)))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Groups the tests for `--dist loadgroup`, lanes first: they take longest (`--no-loadscope-reorder`)."""
-    lanes = list(_LANES)
-    ranks: dict[pytest.Item, int] = {}
-    for item in items:
-        file = item.path.relative_to(_HERE).as_posix()
-        lane = lane_of(file)
-        item.add_marker(pytest.mark.xdist_group(lane or file))
-        ranks[item] = len(lanes) if lane is None else lanes.index(lane)
-    items.sort(key=ranks.__getitem__)
+    """Puts the lanes first: they take longest (`--no-loadscope-reorder`)."""
+    lanes = [*_LANES]
+    items.sort(key=lambda item: lanes.index(group) if (group := group_of(item)) in _LANES else len(lanes))
 
 
 @pytest.fixture(scope="session", autouse=True)

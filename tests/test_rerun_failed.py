@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -43,6 +44,8 @@ def rerun(folder: Path, *, broken: bool) -> tuple[int, list[str]]:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
     command = [sys.executable, "-m", "pytest", "-n", "1", "--dist", "loadgroup", "-o", f"cache_dir={folder}/parallel"]
     assert subprocess.run(command, cwd=folder, env=environment, capture_output=True, check=False).returncode == 1
+    failed = json.loads((folder / "parallel" / "v" / "cache" / "lastfailed").read_text())
+    assert "test_some.py::test_flaky[x@y]@a@b" in failed, "pytest-xdist does not group tests with this pytest"
     done = subprocess.run(
         [sys.executable, str(SCRIPT), str(folder)],
         cwd=folder,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.rokae.faults import Fault
 
 __all__ = ["MESSAGES", "PHASES", "Incident", "Lateness", "Phase", "SupervisorStatus", "cycle_dtype"]
 
@@ -134,7 +134,7 @@ class SupervisorStatus:
     """At how many connections it has taken a set-up."""
     robot_mode: RobotMode | None = None
     controller_mode: ControllerMode | None = None
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[FaultCode, ...] = ()
     """Error bits that are set."""
     powered: bool | None = None
     """Motor power; None while unknown."""

@@ -13,10 +13,10 @@ from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.makers.driver import SIGNALS
-from rcilab.makers.rokae.faults import faults_from_bits
 
 
 class StatusReader:
@@ -24,9 +24,11 @@ class StatusReader:
 
     Args:
         block: The shared block.
+        faults: The faults of the controller's maker; a cycle has one bit for each.
     """
 
-    def __init__(self, block: ControlBlock) -> None:
+    def __init__(self, block: ControlBlock, faults: type[FaultCode]) -> None:
+        self._faults = tuple(faults)
         self._block = block
         self._ring = RingReader(block)
         self._tool: tuple[bytes, Pose | None] = b"", None
@@ -76,7 +78,7 @@ class StatusReader:
             "dq": last["dq"],
             "robot_mode": RobotMode(last["robot_mode"]),
             "controller_mode": ControllerMode(last["controller_mode"]),
-            "faults": faults_from_bits(bits >> place & 1 for place in range(32)) if bits else (),
+            "faults": tuple(fault for fault in self._faults if bits >> fault & 1) if bits else (),
             "tau_ext": np.array(self._block.felt),
             "T_flange_tool": self._read_tool(),
             "success_rate": float(last["success_rate"]),

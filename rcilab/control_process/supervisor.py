@@ -52,7 +52,7 @@ from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration, require_setup
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
-from rcilab.makers.maker import require_driver
+from rcilab.makers.maker import maker_of, require_driver
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
 
@@ -513,6 +513,8 @@ class Supervisor(Closeable):
         """Makes the shared block and what works on it, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
+        maker = maker_of(self.model)
+        assert maker is not None  # It has a driver.
         try:
             self._keeper = ProcessSupervisor(
                 block, self.model.name, self._plant, address, auto_restart=self._auto_restart
@@ -522,7 +524,7 @@ class Supervisor(Closeable):
                 block, self._lock, self._require_cycle, lambda request: self._ask("change of speed", request)
             )
             self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
-            self._reader, self._ring = StatusReader(block), RingReader(block)
+            self._reader, self._ring = StatusReader(block, maker.faults()), RingReader(block)
         except BaseException:
             block.close()
             raise

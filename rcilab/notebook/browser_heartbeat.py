@@ -13,13 +13,13 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import ipywidgets
 import traitlets
 
-from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
 
@@ -44,6 +44,8 @@ class BrowserHeartbeat:
     """Asks the page for signs of life while somebody wants to know. Where no page ever answered, none is missed."""
 
     def __init__(self) -> None:
+        self.is_cell_running: Callable[[], bool] = lambda: False
+        """Whether the kernel runs a cell; the registry of cells sets it."""
         self._widgets: tuple[Any, ...] = ()
         self._lock = threading.RLock()
         self._asked = float("-inf")
@@ -68,7 +70,7 @@ class BrowserHeartbeat:
         """Whether a cell runs and the kernel does not hear the page: a press there waits for the end of the cell."""
         heard = self._heard
         is_silent = heard is not None and time.monotonic() - heard > _DEAF
-        return is_silent and kernel_cells().is_running and not self.is_gone
+        return is_silent and self.is_cell_running() and not self.is_gone
 
     def beat(self) -> None:
         """Asks, if it is time to; to be called several times a second for as long as the answer matters."""
@@ -118,5 +120,5 @@ class BrowserHeartbeat:
     def _on_awake(self) -> None:
         """In the ear's thread."""
         self._asking_ear = False
-        if not (self._is_main and kernel_cells().is_running):  # A cell that awaits lets us in, but no message.
+        if not (self._is_main and self.is_cell_running()):  # A cell that awaits lets us in, but no message.
             self._missed += 1

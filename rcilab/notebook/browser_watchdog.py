@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rcilab.notebook.browser_heartbeat import kernel_heart
@@ -26,9 +27,13 @@ class BrowserWatchdog:
     """Looks after every session of the kernel. One thread; it sends nothing while nothing moves.
 
     It imports nothing either: two threads that load the same libraries can find them half loaded.
+
+    Args:
+        is_cell_running: Whether the kernel runs a cell.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_cell_running: Callable[[], bool]) -> None:
+        kernel_heart().is_cell_running = is_cell_running
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="rcilab-notebook-page", daemon=True)
         self._thread.start()

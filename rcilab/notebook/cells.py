@@ -136,7 +136,7 @@ def kernel_cells() -> CellRegistry:
         if getattr(shell, "kernel", None) is not None and find_spec("ipywidgets") is not None:
             from rcilab.notebook.browser_watchdog import BrowserWatchdog
 
-            _kernel_cells.keep(BrowserWatchdog())
+            _kernel_cells.keep(BrowserWatchdog(lambda: kernel_cells().is_running))
     return _kernel_cells
 
 

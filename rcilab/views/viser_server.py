@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rcilab.core.closeable import Closeable
-from rcilab.views import sendable
 from rcilab.views.access_control import Gate, Guesses, Refusal
 from rcilab.views.arrivals import BACKLOG, Arrivals, watch_loop
-from rcilab.views.message_guard import LARGEST_MESSAGE, MessageGuard
-from rcilab.views.viser_ext import assignments, icons, loop_event
+from rcilab.views.viser_ext import assignments, icons, loop_event, sendable
+from rcilab.views.viser_ext.message_guard import LARGEST_MESSAGE, MessageGuard
+from rcilab.views.viser_ext.version_guard import require_known_viser
 
 if TYPE_CHECKING:
     import viser
@@ -80,6 +80,7 @@ class GuardedServer(Closeable):
         self._protocol = f"viser-v{viser.__version__}"
         self._decorate = decorate
         self._routes = dict(routes or {})
+        require_known_viser()
         loop_event.install()
         assignments.install()
         icons.install()

@@ -12,6 +12,8 @@ from importlib.resources import files
 from typing import IO, TYPE_CHECKING, Any
 from uuid import uuid4
 
+from rcilab.views.viser_ext.client_messages import run_javascript
+
 if TYPE_CHECKING:
     import viser
 
@@ -43,10 +45,8 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
 
 def introduce(client: viser.ClientHandle, key: str) -> None:
     """Tells a page which of the server's clients it is, and the key that proves it on its live connection."""
-    from viser import _messages
-
     call = f"window.rcilabPage?.({client.client_id}, {json.dumps(key)});"
-    client.gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=call))
+    run_javascript(client, call)
 
 
 def dress(server: viser.ViserServer, theme: str) -> None:

@@ -76,11 +76,11 @@ def test_an_ear_that_the_page_has_taken_along_is_silence(asked: BrowserHeartbeat
 
 
 def test_the_thread_of_cells_hears_nothing_while_a_cell_runs(
-    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop, monkeypatch: pytest.MonkeyPatch
+    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
 ) -> None:
     running = cells.CellRegistry(None)
     running._running.set()
-    monkeypatch.setattr(heart, "kernel_cells", lambda: running)
+    asked.is_cell_running = lambda: running.is_running
     answer(asked, ear)
     for _ in range(2 * PATIENCE):
         asked.beat()

@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from rcilab.views.access_control import Gate
-from rcilab.views.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
+from rcilab.views.viser_ext.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
 from rcilab.views.viser_server import GuardedServer, listen
 from tests.waiting import wait_for
 

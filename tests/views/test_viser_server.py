@@ -18,7 +18,7 @@ from websockets.sync.client import connect
 
 from rcilab.views.access_control import Gate
 from rcilab.views.arrivals import MOST_WAITING
-from rcilab.views.message_guard import is_orderly
+from rcilab.views.viser_ext.message_guard import is_orderly
 from rcilab.views.viser_server import GuardedServer, listen
 
 PROTOCOL = f"viser-v{viser.__version__}"

@@ -12,7 +12,7 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.setup.configuration_sender import SetupPost
+from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
 from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
@@ -99,7 +99,7 @@ class ModeActions:
     def __init__(self, store: StateStore[AppState], session: MotionConnection, *, keeps_rest: bool = False) -> None:
         self._store, self._session, self._keeps_rest = store, session, keeps_rest
         self._was_running = False
-        self._post = SetupPost(session, self._refuse)
+        self._post = ConfigurationSender(session, self._refuse)
         self._wish = RequestedSpeed()
         self._changing: tuple[float, PendingRequest] | None = None  # A pace that the robot has not taken yet.
         self._asked_to_send = -math.inf

@@ -30,7 +30,7 @@ class ConfigurationTarget(Protocol):
         ...
 
 
-class SetupPost:
+class ConfigurationSender:
     """Owned by the conductor's thread.
 
     Args:

@@ -14,7 +14,7 @@ from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
 from rcilab.app.planning import Plan, tool_path
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.setup.configuration_sender import SetupPost
+from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.setup.configuration_state import (
     FORCE_AXES,
     LISTED,
@@ -121,7 +121,7 @@ class SetupActions:
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
         self._dragged = -math.inf  # When it was last heard to.
-        self._post = SetupPost(session, self._refuse)
+        self._post = ConfigurationSender(session, self._refuse)
         self._told_of: object = None  # The program of which it was said what another tool makes of it.
         self._is_back = False  # What came back with this workbench: it was said already.
         self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.

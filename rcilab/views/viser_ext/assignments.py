@@ -3,6 +3,8 @@
 A page sets hundreds of properties many times a second, nearly all of them to what they are. viser 1.1 builds four
 types anew at each, to see whether the value is an array of one of them, and reads the types of a handle's properties
 anew for every handle. That was a fifth of what the page's process did.
+
+Unnecessary once viser caches the types of the properties of a handle.
 """
 
 from __future__ import annotations

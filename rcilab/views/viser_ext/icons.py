@@ -4,6 +4,8 @@ viser 1.1 remembers 32 icons and opens its archive of 6000 anew for every other 
 ours has more than 32, so each time it was built that was a second and a half.
 
 It takes a hint for every control, and its page shows none over a button. Ours finds it in the icon (`names.js`).
+
+Unnecessary once viser keeps every icon that it has read, and shows the hint of a button.
 """
 
 from __future__ import annotations

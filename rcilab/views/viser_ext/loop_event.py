@@ -4,6 +4,8 @@ viser 1.1 pushes a message by calling `set()` of an asyncio event in whatever th
 waiters while the loop may be changing them ("deque mutated during iteration"), and wakes them in the wrong thread. It
 also wakes the loop for every message, though what has come is looked at 60 times a second anyway: two thirds of the
 times there is nothing to do, and a wake costs as much as all the rest of a message.
+
+Unnecessary once viser wakes its event loop with `call_soon_threadsafe`, at most once per pass of its sender.
 """
 
 from __future__ import annotations

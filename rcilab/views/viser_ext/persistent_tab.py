@@ -1,4 +1,7 @@
-"""A tab of viser's that stays, open or not, while everything in it is made anew."""
+"""A tab of viser's that stays, open or not, while everything in it is made anew.
+
+Unnecessary once viser's tabs have a public call that removes their children.
+"""
 
 from __future__ import annotations
 

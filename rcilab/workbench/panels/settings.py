@@ -12,7 +12,7 @@ from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.makers.maker import simulated_robots
-from rcilab.views.message_guard import for_anyone
+from rcilab.views.viser_ext.message_guard import for_anyone
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:

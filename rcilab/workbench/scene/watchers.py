@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from rcilab.views.viser_ext.client_messages import show_node
 
 if TYPE_CHECKING:
     import viser
@@ -49,12 +51,7 @@ class Watchers:
             self._told = now
             clients = self._server.get_clients()
             for page in (*hidden, *shown):
-                _tell(clients.get(page), handles, page in shown)
-
-
-def _tell(client: Any, nodes: tuple[str, ...], are_visible: bool) -> None:
-    from viser import _messages
-
-    if client is not None:  # It may have gone just now.
-        for name in nodes:
-            client.gui._websock_interface.queue_message(_messages.SetSceneNodeVisibilityMessage(name, are_visible))
+                client = clients.get(page)
+                if client is not None:  # It may have gone just now.
+                    for name in handles:
+                        show_node(client, name, visible=page in shown)

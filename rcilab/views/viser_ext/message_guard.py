@@ -6,6 +6,8 @@ ours sends none of that, but a script in its place could. What is not in order i
 
 viser keeps one value per control for all pages, so a page that only watches must not reach them at all: what it sends
 beyond its camera is dropped, too, and its own control goes back to what everybody sees.
+
+Unnecessary once viser validates what clients send, by control and by client.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@ r"""No text can end a page: what is no Unicode travels with its escapes.
 A lone surrogate (half a character, as `json` reads from "\ud800" and Python makes of a file name that is no UTF-8)
 cannot be encoded. viser 1.1 meets it while it sends, closes the connection, and does so again with every page that
 comes, because it repeats to a new page what it said to the others.
+
+Unnecessary once viser encodes text with `errors="backslashreplace"`.
 """
 
 from __future__ import annotations
