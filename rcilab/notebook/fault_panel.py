@@ -14,7 +14,7 @@ from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.fault_lab.table import FAULTS
 from rcilab.control_process.status_messages import tell_error
 from rcilab.core.errors import RcilabError
-from rcilab.core.fault import name_faults
+from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Text, message
 from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.exhibit_plot import draw_exhibit
@@ -44,7 +44,7 @@ class FaultPanel(Part):
         """The fault on show; None as long as none was provoked."""
         self._failed = ""  # Why it could not be provoked.
         self._now, self._told, self._record = block(), block(), block()
-        self._set: tuple[Fault, ...] | None = None
+        self._set: tuple[FaultCode, ...] | None = None
         self._arm = PrivateArm()
         self._work: LongTask[Fault, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
         self.fault: Any = lean(
