@@ -52,9 +52,10 @@ class NumericSolver:
 
     def __init__(self, description: RobotDescription) -> None:
         dh, joint = description.dh, description.limits.joint
-        if len(dh) > 7:
-            raise ModelError(f"{description.name}: no inverse for {len(dh)} joints; the numeric solver takes up to 7")
-        self._held = _HELD if len(dh) == 7 else None
+        n = len(dh)
+        if n > 7:
+            raise ModelError(f"{description.name}: no inverse for {n} joints; the numeric solver takes up to 7")
+        self._held = _HELD if n == 7 else None
         self.redundancy = NO_REDUNDANCY if self._held is None else Redundancy("joint", _HELD + 1)
         half = 0.5 * (dh[0].a + sum(hypot(row.a, row.d) for row in dh[1:-1]) + dh[-1].a)
         self.envelope = Envelope(shoulder=dh[0].d, upper=half, fore=half, hand=dh[-1].d)
