@@ -31,6 +31,7 @@ class SimulationStatusPoller(Closeable):
         self._requests: deque[WorldRequest] = deque()
         self._error: RcilabError | None = None
         self._is_ending = False
+        self._is_asking = False
         self.status: WorldStatus | None = None
         """How the controller was at the last look; None before the first, and when it does not answer."""
         self._thread = threading.Thread(target=self._run, name="world watch", daemon=True)
@@ -42,6 +43,12 @@ class SimulationStatusPoller(Closeable):
             self._requests = deque(other for other in self._requests if _kind(other) != _kind(request))
             self._requests.append(request)
             self._condition.notify()
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether every request has gone out; a status that is read after this counts them."""
+        with self._condition:
+            return not self._requests and not self._is_asking
 
     def take_error(self) -> RcilabError | None:
         """Returns why a request was not carried out, since the last call; None: nothing went wrong."""
@@ -63,6 +70,7 @@ class SimulationStatusPoller(Closeable):
                     self._condition.wait(PERIOD)
                 request = self._requests.popleft() if self._requests else None
                 is_ending = self._is_ending and request is None
+                self._is_asking = request is not None
             if is_ending:
                 self._world.close()
                 return
@@ -74,6 +82,8 @@ class SimulationStatusPoller(Closeable):
                 self.status = None
                 with self._condition:
                     self._error = error if request is not None else self._error
+            with self._condition:
+                self._is_asking = False
 
 
 def _kind(request: WorldRequest) -> tuple[str, object]:

@@ -80,7 +80,8 @@ class LimitFields:
         robot = self._state.robot
         self.auto.disabled = not is_ready or robot is None or not robot.is_virtual
         self._writing = True
-        self.auto.value = robot is not None and robot.is_virtual and robot.auto_limit
+        # A folder that was never opened needs no look at the controller.
+        self.auto.value = bool(self.fields) and robot is not None and robot.is_virtual and robot.auto_limit
         self._writing = False
         limits = self._state.model.limits.joint
         if self.fields and limits is not self._shown:

@@ -70,7 +70,7 @@ class RobotBackend(Protocol):
 
     @property
     def auto_limit(self) -> bool:
-        """Whether a virtual controller was told to lead commands to a standstill inside the soft joint limits."""
+        """Whether a virtual controller leads commands to a standstill inside the soft joint limits."""
         ...
 
     def status(self) -> SupervisorStatus:
@@ -174,7 +174,7 @@ class SupervisedRobot:
         self._model, self._plant = model, plant
         self._supervisor = Supervisor(model, target, plant)
         self._watch: SimulationStatusPoller | None = None
-        self._watched = ""  # Where the virtual controller is that was told of auto_limit.
+        self._watched = ""  # Where the virtual controller is whose auto_limit is looked at.
         self._auto_limit = False
         self._tickets: list[tuple[str, PendingRequest]] = []
         self._done: list[Outcome] = []
@@ -226,20 +226,30 @@ class SupervisedRobot:
 
     @property
     def auto_limit(self) -> bool:
-        """Whether the virtual controller of now was told so: another one starts without."""
-        return self._auto_limit and self._watched == self.status().world_address
+        """Whether the virtual controller of now does so: as it reports, until then as it was told from here."""
+        address = self.status().world_address
+        if address is None:
+            return False
+        watch = self._watch_at(address)
+        if watch.is_settled and watch.status is not None and watch.status.auto_limit is not None:
+            self._auto_limit = watch.status.auto_limit
+        return self._auto_limit
 
     def set_auto_limit(self, on: bool) -> None:
         """Has the virtual controller lead commands to a standstill inside the soft limits, or not."""
         address = self.status().world_address
         if address is None:
             raise UsageError("auto_limit can be set at a virtual controller only: a real one has its own settings")
+        self._watch_at(address).ask(AutoLimit(on))
+        self._auto_limit = on
+
+    def _watch_at(self, address: str) -> SimulationStatusPoller:
         if self._watch is None or self._watched != address:
             self._end_watch()
             host, _, port = address.partition(":")
             self._watch, self._watched = SimulationStatusPoller(SimulationControl(host, int(port))), address
-        self._watch.ask(AutoLimit(on))
-        self._auto_limit = on
+            self._auto_limit = False
+        return self._watch
 
     def _end_watch(self) -> None:
         watch, self._watch = self._watch, None

@@ -247,7 +247,17 @@ class SessionRobot:
     def _ask_power(self) -> None:
         if time.monotonic() - self._power_seen > _POWER_LOOK and not self._is_busy:
             self._powered = self._session.is_powered()
+            if self.is_virtual:
+                self._ask_auto_limit()
             self._power_seen = time.monotonic()
+
+    def _ask_auto_limit(self) -> None:
+        try:
+            said = self._session.world.status().auto_limit
+        except ConnectionLostError:  # Its world port may be gone while the arm is there.
+            return
+        if said is not None and not self._is_busy:
+            self.auto_limit = said
 
 
 def _settled(what: str) -> PendingRequest:

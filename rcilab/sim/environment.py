@@ -261,6 +261,7 @@ class Environment:
             ignored=controller.ignored,
             pushed=self._is_pushed,
             stalls=self._stalls.count,
+            auto_limit=controller.auto_limit,
             commands=commands,
             states=states,
         )

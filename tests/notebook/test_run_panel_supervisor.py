@@ -15,6 +15,7 @@ from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.errors import PlanningError, RcilabError
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.robot_side import Outcome
@@ -297,6 +298,14 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
             panel.state.pose(PRO7.home + np.eye(7)[0])
         limits.auto.value = True
         wait_for(lambda: panel.state.robot.auto_limit, what="auto_limit")
+        if is_own:
+            host, _, port = panel.state.robot.status().world_address.partition(":")
+            world = stack.enter_context(SimulationControl(host, int(port)))
+        else:
+            world = subject.world
+        wait_for(lambda: world.status().auto_limit, what="the controller")
+        world.set_auto_limit(False)  # As another client does.
+        wait_for(lambda: not limits.auto.value, what="the box")
         limits.whole.click()
         wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], what="the whole range")
         limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"

@@ -10,6 +10,7 @@ import pytest
 from rcilab.app.request import TypeField
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.setup_actions import PressSetup
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, wait
 
@@ -47,3 +48,13 @@ def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_fie
 def test_auto_limit_goes_to_our_own_controller(bench: Workbench) -> None:
     bench.conductor.ask(SetWiring(name="auto_limit", on=True))
     wait(lambda: bench.store.state.world.auto_limit, "the switch")
+
+
+def test_the_box_follows_the_controller_whoever_set_it(bench: Workbench) -> None:
+    address = bench.session.status().world_address
+    assert address is not None
+    host, _, port = address.partition(":")
+    with SimulationControl(host, int(port)) as world:
+        for on in (True, False, True):
+            world.set_auto_limit(on)
+            wait(lambda on=on: bench.store.state.world.auto_limit is on, "the box")

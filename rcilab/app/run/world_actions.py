@@ -123,8 +123,13 @@ class WorldActions:
         error = self._watch.take_error()
         if error is not None:
             self._store.say("bad", tell_error(error))
-        if self._watch.status is not self._store.state.world.status:
-            self._store.update(world=replace(self._store.state.world, status=self._watch.status))
+        is_settled, world, said = self._watch.is_settled, self._store.state.world, self._watch.status
+        if said is not world.status:
+            world = replace(world, status=said)
+        if is_settled and said is not None and said.auto_limit not in (None, world.auto_limit):
+            world = replace(world, auto_limit=said.auto_limit)  # Another client or a restart may have changed it.
+        if world is not self._store.state.world:
+            self._store.update(world=world)
 
     def close(self) -> None:
         """Ends the connection."""

@@ -66,6 +66,8 @@ class WorldStatus:
     """Whether something presses on the arm."""
     stalls: int = 0
     """How often the clock has stood still on request."""
+    auto_limit: bool | None = None
+    """Whether commands are led to a standstill inside the soft limits; None: an older controller does not say."""
     commands: NetworkFaults = field(default_factory=NetworkFaults)
     """Faults of the network towards the controller."""
     states: NetworkFaults = field(default_factory=NetworkFaults)
@@ -109,6 +111,8 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
         checked["success_rate"] = as_float(checked["success_rate"], "success_rate", "", 0.0, 1.0)
     if "pushed" in checked:
         checked["pushed"] = as_flag(checked["pushed"], "pushed")
+    if checked.get("auto_limit") is not None:
+        checked["auto_limit"] = as_flag(checked["auto_limit"], "auto_limit")
     for name in ("commands", "states"):
         if name in checked:
             checked[name] = NetworkFaults(**checked[name])

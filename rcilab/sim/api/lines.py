@@ -87,6 +87,10 @@ def _request(content: dict[str, Any]) -> WorldRequest:
         raise DecodeError(f"{name}: {error}") from error
 
 
+_BESIDE = ("auto_limit",)
+"""Fields of the status that were added to it later."""
+
+
 def encode_world_answer(answer: WorldAnswer, request_id: int) -> bytes:
     """Returns the line of an answer to the request with this id; 0 where none could be read."""
     content: dict[str, Any] = {"id": request_id, "ok": not isinstance(answer, Refused)}
@@ -97,6 +101,8 @@ def encode_world_answer(answer: WorldAnswer, request_id: int) -> bytes:
                 content |= {"code": code, "facts": dict(facts)}
         case WorldStatus():
             content["status"] = status_as_dict(answer)
+            # Beside the status: readers of releases before it refuse a status with a name that they do not know.
+            content |= {name: content["status"].pop(name) for name in _BESIDE}
         case Done():
             pass
     return _encode(content)
@@ -117,7 +123,8 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
     if "status" not in content:
         return request_id, Done()
     try:
-        return request_id, status_from_dict(content["status"])
+        beside = {name: content[name] for name in _BESIDE if name in content}
+        return request_id, status_from_dict(content["status"] | beside)
     except (InvalidValueError, TypeError, ValueError) as error:
         raise DecodeError(f"status: {error}") from error
 

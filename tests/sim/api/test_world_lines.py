@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,7 @@ ANSWERS = st.one_of(
         q=st.lists(length, max_size=7).map(tuple),
         success_rate=share,
         missed=st.integers(0, 2**40),
+        auto_limit=st.none() | st.booleans(),
         commands=FAULTS,
         states=FAULTS,
     ),
@@ -94,6 +95,15 @@ def test_an_answer_survives_the_wire(answer: world.WorldAnswer, request_id: int)
     line = world.encode_world_answer(answer, request_id)
     assert line.count(b"\n") == 1
     assert world.decode_world_answer(line) == (request_id, answer)
+
+
+def test_readers_of_earlier_releases_understand_the_status_and_theirs_is_understood() -> None:
+    status = world.WorldStatus(model="xMatePro7", plant="ideal", cycle=1, phase="idle", auto_limit=True)
+    content = json.loads(world.encode_world_answer(status, 1))
+    assert "auto_limit" not in content["status"]  # They refuse names in it that they do not know.
+    assert content.pop("auto_limit") is True
+    _, back = world.decode_world_answer(json.dumps(content).encode())
+    assert back == replace(status, auto_limit=None)
 
 
 JSON = st.recursive(
