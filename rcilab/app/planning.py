@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
+from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
@@ -110,10 +111,10 @@ def make_plan(
     """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
     from rcilab.conformance.check import check
 
-    for name, q in (("plan.start_limit", start), ("plan.at_limit", goal)):
+    for place, q in (("start", start), ("goal", goal)):
         joint = find_outside(model, q)
         if joint is not None:
-            return message(name, joint=joint)
+            return _outside(place, model.limits.joint, joint, float(q[joint - 1]))
     if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
         return message("plan.here")
     if kind == "arc" and via is None:
@@ -147,6 +148,20 @@ def find_outside(model: RobotModel, q: JointVector) -> int | None:
     """Returns the first joint, counted from 1, that is not strictly inside its range; None when all are."""
     outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
     return int(outside[0]) + 1 if outside.size else None
+
+
+def _outside(place: str, limits: JointLimits, joint: int, angle: float) -> Message:
+    soft = limits.soft_bound_passed(joint, angle)
+    low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
+    told = {name: f"{np.degrees(value):.1f}" for name, value in (("angle", angle), ("low", low), ("high", high))}
+    if soft is not None:
+        code = "plan.start_soft" if place == "start" else "plan.at_soft"
+        return message(code, joint=joint, angle=told["angle"], limit=f"{np.degrees(soft):.1f}")
+    if place == "start":
+        return message("plan.start_limit", joint=joint)
+    if low <= angle <= high:
+        return message("plan.at_limit", joint=joint)
+    return message("plan.beyond_limit", joint=joint, **told)
 
 
 def _go(

@@ -30,7 +30,16 @@ def with_degrees(angle: float, text: str) -> str:
     return f"{text} rad ({shown}°)"
 
 
-def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio: float, off_start: bool) -> Phrase:
+def advise(
+    condition: Condition,
+    motion: Motion,
+    *,
+    row: int,
+    count: int,
+    ratio: float,
+    off_start: bool,
+    soft: float | None = None,
+) -> Phrase:
     """Returns what to do about a violation.
 
     Args:
@@ -40,6 +49,7 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         count: Number of samples in a row.
         ratio: Worst value over bound.
         off_start: Whether the motion starts elsewhere than the start state of the check.
+        soft: The soft limit of the joint's angle that is passed, [rad]; None: the arm's own range is left.
     """
     if condition.stage == "start" and condition.signal == "torque":
         return Phrase("advice.torque.rate")
@@ -51,6 +61,8 @@ def advise(condition: Condition, motion: Motion, *, row: int, count: int, ratio:
         return Phrase("advice.measured")
     if condition.signal == "torque":
         return _softer(condition, motion)
+    if condition.order == 0 and condition.signal == "joint" and soft is not None:
+        return Phrase("advice.range_soft", limit=f"{degrees(soft):.2f}")
     if condition.order == 0:
         return Phrase(_WAYS.get(condition.signal, "advice.range"))
     if row <= condition.order and off_start:

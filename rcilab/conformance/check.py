@@ -192,10 +192,15 @@ class _MotionChecker:
         row = begin + int(ratio[begin:end, column].argmax())
         value, worst = float(values[row, column]), float(ratio[row, column])
         off_start = self._signals.is_off_start
-        advice = advise(condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=off_start)
+        joint = _axis(condition, column)
+        is_angle = condition.signal == "joint" and condition.order == 0
+        soft = self._limits.joint.soft_bound_passed(joint, value) if is_angle else None
+        advice = advise(
+            condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=off_start, soft=soft
+        )
         return Violation(
             condition=condition,
-            joint=_axis(condition, column),
+            joint=joint,
             time=first_time + begin * CYCLE_TIME,
             count=end - begin,
             value=value,

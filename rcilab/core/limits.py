@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Literal
 
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
+
+_ROUNDING = 1e-6  # [rad] Soft limits this close to the own ones, converted from degrees, are the own ones.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -32,9 +35,26 @@ class JointLimits:
     """Largest threshold that `setCollisionBehavior` takes, [N m]."""
     stiffness: JointVector
     """Largest stiffness that `setJointImpedance` takes, [N m/rad]."""
+    own: JointLimits | None = None
+    """The arm's own limits, where soft limits of the joint angles were set; None: these are its own."""
 
     def __repr__(self) -> str:
-        return f"<JointLimits of {len(self.velocity)} joints: {', '.join(self.__slots__)}>"
+        names = ", ".join(name for name in self.__slots__ if name != "own")
+        return f"<JointLimits of {len(self.velocity)} joints: {names}>"
+
+    def is_soft(self, joint: int, side: Literal["lower", "upper"]) -> bool:
+        """Returns whether a soft limit bounds the angle of a joint, counted from 1, on this side."""
+        if self.own is None:
+            return False
+        inwards = getattr(self, side)[joint - 1] - getattr(self.own, side)[joint - 1]
+        return bool((inwards if side == "lower" else -inwards) > _ROUNDING)
+
+    def soft_bound_passed(self, joint: int, angle: float) -> float | None:
+        """Returns the soft limit that an angle of a joint, counted from 1, reaches or passes, [rad]; None: no such."""
+        lower, upper = float(self.lower[joint - 1]), float(self.upper[joint - 1])
+        if angle <= lower:
+            return lower if self.is_soft(joint, "lower") else None
+        return upper if angle >= upper and self.is_soft(joint, "upper") else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,7 +29,9 @@ class Parsed:
     problem: Message | None = None
 
 
-def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
+def parse_number(
+    typed: str, low: float, high: float, unit: str, *, soft_low: bool = False, soft_high: bool = False
+) -> Parsed:
     """Returns the number that somebody typed.
 
     Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
@@ -40,6 +42,8 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
         low: Smallest number allowed, in the unit of the field.
         high: Largest number allowed.
         unit: The unit of the field, such as "deg".
+        soft_low: Whether the smallest is a soft limit of a joint.
+        soft_high: Whether the largest is one.
     """
     shown = typed.strip()
     shown = shown if len(shown) <= _LONGEST else shown[: _LONGEST - 1] + "…"
@@ -63,6 +67,9 @@ def parse_number(typed: str, low: float, high: float, unit: str) -> Parsed:
     if not math.isfinite(value):
         return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
     value *= _UNITS.get(unit, {}).get(behind, 1.0)
+    if (soft_low and value < low) or (soft_high and value > high):
+        limit = _short(low if value < low else high)
+        return Parsed(None, message("parse.range_soft", typed=shown, bounds=_bounds(low, high, unit), limit=limit))
     if not low <= value <= high:
         return Parsed(None, message("parse.range", typed=shown, bounds=_bounds(low, high, unit)))
     return Parsed(value)

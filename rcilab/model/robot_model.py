@@ -145,7 +145,7 @@ class RobotModel(ReachingArm):
             )
         limits = self.limits
         sources = {**limits.sources, "joint.lower": _SOFT_LIMIT, "joint.upper": _SOFT_LIMIT}
-        joint = replace(limits.joint, lower=low, upper=high)
+        joint = replace(limits.joint, lower=low, upper=high, own=limits.joint.own or limits.joint)
         limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
         description = replace(self.description, limits=limits)
         return RobotModel(description, self.T_flange_tool, self.load, self.T_tool_stiffness)
@@ -283,7 +283,7 @@ class RobotModel(ReachingArm):
         joint, cartesian = d.limits.joint, d.limits.cartesian
         geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]
         masses = [(link.mass, *link.center_of_mass, *link.inertia.flat, link.origin_height) for link in d.links]
-        bounds = [getattr(joint, name).tolist() for name in joint.__slots__]
+        bounds = [getattr(joint, name).tolist() for name in joint.__slots__ if name != "own"]
         paths = [getattr(cartesian, name) for name in cartesian.__slots__]
         load = (self.load.mass, *self.load.center_of_mass, *self.load.inertia.flat)
         return MappingProxyType(

@@ -46,10 +46,17 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
+        soft, back = limits.soft_bound_passed(i + 1, angle), "plan_recovery(model, q) leads back inside"
+        if soft is None and what == "start":
+            raise PlanningError(f"{said}where the arm is there, {back}").coded("range_start", **facts)
+        if soft is None:
+            raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
+        said += f"{degrees(soft):.2f}° is the soft limit that was set; "
+        facts |= _in_degrees(limit=soft)
+        widen = "widen the soft limit (set_joint_limit)"
         if what == "start":
-            remedy = "where the arm is there, plan_recovery(model, q) leads back inside"
-            raise PlanningError(said + remedy).coded("range_start", **facts)
-        raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
+            raise PlanningError(f"{said}where the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
+        raise PlanningError(f"{said}choose an angle between them, or {widen}").coded("range_soft", **facts)
 
 
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:

@@ -256,7 +256,14 @@ class GoalActions:
         if kind == "joint" and name in map(str, range(state.model.n)):
             low, high = np.degrees(state.model.limits.joint.lower), np.degrees(state.model.limits.joint.upper)
             number = int(name)
-            parsed = parse_number(request.text, round(float(low[number]), 6), round(float(high[number]), 6), "deg")
+            parsed = parse_number(
+                request.text,
+                round(float(low[number]), 6),
+                round(float(high[number]), 6),
+                "deg",
+                soft_low=state.model.limits.joint.is_soft(number + 1, "lower"),
+                soft_high=state.model.limits.joint.is_soft(number + 1, "upper"),
+            )
             value = parsed.value
             act = None if value is None else lambda: self.move_joint(
                 MoveJoint(joint=number, angle=math.radians(value))

@@ -114,10 +114,21 @@ def why_not(refusal: UnreachableError, missed: float) -> Message:
     return message("reach.no")
 
 
+def _at_limit(model: RobotModel, q: JointVector, least: JointLimitMargin) -> Message:
+    limits, joint, angle = model.limits.joint, least.joint, float(q[least.joint - 1])
+    soft, shown = limits.soft_bound_passed(joint, angle), f"{math.degrees(angle):.1f}"
+    if soft is not None:
+        return message("reach.at_soft", joint=joint, angle=shown, limit=f"{math.degrees(soft):.1f}")
+    if least.angle == 0.0:
+        return message("reach.at_limit", joint=joint)
+    low, high = (f"{math.degrees(bound[joint - 1]):.1f}" for bound in (limits.lower, limits.upper))
+    return message("reach.beyond_limit", joint=joint, angle=shown, low=low, high=high)
+
+
 def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> TargetStatus:
     least = margin(model, q)
     if least.angle <= 0.0:
-        return TargetStatus(tone="warn", reason=message("reach.at_limit", joint=least.joint), q=q, solutions=solutions)
+        return TargetStatus(tone="warn", reason=_at_limit(model, q, least), q=q, solutions=solutions)
     if model.dexterity(q).smallest < NEAR_SINGULAR:
         return TargetStatus(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
     if least.angle < NEAR_LIMIT:
