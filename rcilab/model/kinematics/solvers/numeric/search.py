@@ -119,7 +119,7 @@ def search(arm: NumericArm, rotations: Array, positions: Array, q: Array) -> tup
 def _turns(axes: tuple[Array, Array, Array], rotations: Array) -> Array:
     """Returns the rotation vectors from the flange to its wanted rotations, base axes, shape (M, 3), [rad]."""
     wanted = [rotations[:, :, i].T for i in range(3)]
-    sines: Array = 0.5 * sum(cross(now, there) for now, there in zip(axes, wanted, strict=True))
+    sines = 0.5 * np.sum([cross(now, there) for now, there in zip(axes, wanted, strict=True)], axis=0)
     cosine = 0.5 * (sum((now * there).sum(axis=0) for now, there in zip(axes, wanted, strict=True)) - 1.0)
     sine = np.sqrt((sines * sines).sum(axis=0))
     factor = np.arctan2(sine, cosine) / np.maximum(sine, 1e-12)  # Half a turn has no axis here: a start is lost.
