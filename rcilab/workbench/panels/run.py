@@ -20,7 +20,9 @@ from rcilab.app.run.readiness import (
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
+from rcilab.i18n.translator import Remark
 from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
@@ -122,18 +124,19 @@ class RunPanel:
         self._buttons["recover"].disabled = status.phase != "fault" or status.is_pressed
         self._buttons["power_on"].disabled = moving or status.powered is not False or status.is_pressed
         self._buttons["power_off"].disabled = moving or status.powered is not True
-        self._faults.show(faults_html(status, text))
+        self._faults.show(faults_html(status, text, state.world.status))
 
 
 def _drive(what: Any):  # type: ignore[no-untyped-def]
     return lambda page: RobotCommand(page=page, what=what)
 
 
-def faults_html(status: SupervisorStatus, text: Text) -> str:
+def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None) -> str:
     """Returns every fault that is set, with its cause and what to do about it; nothing while none is."""
-    if status.is_pressed:  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
+    was_stop = world is not None and isinstance(world.reason, Remark) and world.reason.code in ("estop", "gstop")
+    if status.is_pressed or was_stop:  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
         names = esc(name_faults(status.faults))
-        said = f'<div class="rl-facts">{esc(text("fault.by_stop"))}</div>'
+        said = f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
         return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
