@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi, radians
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -58,7 +59,7 @@ _SEVEN_AXIS_NOTE = "; the manual prints the 6-axis range, this one is the vendor
 def xmate_limits(n: int) -> Limits:
     """Returns the limits of the 6-axis or the 7-axis arms."""
     axes = range(7) if n == 7 else _MANUAL_AXES_OF_SIX
-    table = {name: readonly_copy([row[axis] for axis in axes]) for name, row in _SEVEN_AXIS.items()}
+    table: dict[str, Any] = {name: readonly_copy([row[axis] for axis in axes]) for name, row in _SEVEN_AXIS.items()}
     upper = table.pop("position")
     arms = "xMatePro3, xMatePro7" if n == 7 else "xMate3, xMate7"
     note = _SEVEN_AXIS_NOTE if n == 7 else ""
