@@ -82,10 +82,10 @@ def _limits() -> Limits:
     arm_angle = {
         name.replace("elbow", "arm_angle"): f"{source}; the arm angle is the elbow's" for name, source in elbow.items()
     }
-    joint: dict[str, Any] = {name: readonly_copy(row) for name, row in _TABLE.items()}
+    bounds: dict[str, Any] = {name: readonly_copy(row) for name, row in _TABLE.items()}
     velocity, acceleration, jerk = 2.175, 10.0, 5000.0
     return Limits(
-        joint=JointLimits(**joint),
+        joint=JointLimits(**bounds),
         cartesian=CartesianLimits(
             translation_velocity=1.7,
             translation_acceleration=13.0,
