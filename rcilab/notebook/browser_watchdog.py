@@ -67,5 +67,6 @@ class BrowserWatchdog:
 
 
 def _sessions() -> list[RobotSession]:
-    module = sys.modules.get("rcilab.execution.session")  # Where it is not, nobody can have opened one.
-    return [] if module is None else module.open_sessions()
+    # Where the module is not loaded yet, or another thread is loading it, no session can be open.
+    find = getattr(sys.modules.get("rcilab.execution.session"), "open_sessions", None)
+    return [] if find is None else find()
