@@ -27,7 +27,6 @@ from collections.abc import Iterable, Sequence
 from os import PathLike
 from typing import Any
 
-from rcilab.core.cycle_log import save_cycles
 from rcilab.core.error_base import InvalidValueError, RcilabError, UsageError, plain_text
 
 __all__ = [
@@ -166,6 +165,8 @@ class RecordedError(RcilabError):
             UsageError: There is no record.
             InvalidValueError: The ending is unknown, or the file cannot be written.
         """
+        from rcilab.core.cycle_log import save_cycles
+
         if self.record is None:
             raise UsageError("this error carries no record: nothing was recorded before it")
         save_cycles(self.record, file)

@@ -200,7 +200,7 @@ def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> N
 
 def _shade_violations(ax: Axes, panel: _Panel, violations: Sequence[Violation], joints: Sequence[int]) -> None:
     """Hatches the time over which some joint is beyond its bound, and marks the worst sample of each violation."""
-    broken = [v for v in violations if v.condition is panel.condition and v.joint - 1 in joints]
+    broken = [v for v in violations if v.condition.id == panel.condition.id and v.joint - 1 in joints]
     for begin, end in _union((v.time - CYCLE_TIME, v.time + (v.count - 1) * CYCLE_TIME) for v in broken):
         ax.axvspan(begin, end, facecolor=VIOLATION_COLOR, edgecolor=VIOLATION_COLOR, alpha=0.2, hatch="///", zorder=0.7)
     worst: dict[str, Any] = {"color": VIOLATION_COLOR, "markersize": 5, "markeredgewidth": 1.5, "linestyle": "none"}

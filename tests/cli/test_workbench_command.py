@@ -67,7 +67,7 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
 @pytest.mark.parametrize(
     ("arguments", "answer"),
     [
-        (["--model", "kuka"], "known robots: xMatePro3"),
+        (["--model", "kuka"], "known robots: Panda, xMatePro3"),
         (["--host", "0.0.0.0"], "nobody would learn the token"),
         (["--private"], "RCILAB_TOKEN"),
         (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
@@ -169,13 +169,13 @@ from rcilab.control_process.layout import ControlBlock
 def create(*_):
     raise OSError(12, "Cannot allocate memory")
 ControlBlock.create = create
-from rcilab.workbench.dispatcher import Conductor
-before = Conductor._run
+from rcilab.app.dispatcher import Dispatcher
+before = Dispatcher._run
 def run(self):
     if DIES:
         raise RuntimeError("can't start new thread")
     before(self)
-Conductor._run = run
+Dispatcher._run = run
 from rcilab.cli import main
 sys.exit(main(["--no-browser", "--port", "0", "--quality", "light"]))
 """

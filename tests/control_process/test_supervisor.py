@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.conformance import speed_scaling_check as pacing
 from rcilab.conformance.check import check
 from rcilab.conformance.speed_scaling_check import plan_start
 from rcilab.control_process import Supervisor
@@ -134,7 +133,7 @@ def test_a_stop_while_a_motion_is_judged_for_the_last_time_keeps_the_arm_where_i
         supervisor.stop().wait(SOON)
         return plan_start(*args)
 
-    monkeypatch.setattr(pacing, "plan_start", stopped_meanwhile)
+    monkeypatch.setattr("rcilab.control_process.supervisor.plan_start", stopped_meanwhile)
     with pytest.raises(UsageError, match="a stop came before the arm had begun to move"):
         begin(supervisor)
     monkeypatch.undo()

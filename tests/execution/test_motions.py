@@ -119,7 +119,7 @@ def test_a_jump_is_told_with_numbers_and_record_and_the_same_session_goes_on(rob
     error.save(tmp_path / "flight.npz")
     with np.load(tmp_path / "flight.npz") as flight:
         assert len(flight["t"]) == len(error.record) > 30
-        assert flight["faults"][-1] >> fault & 1
+        assert flight["faults"][-1] >> int(fault) & 1
     assert set(robot.state.faults) == set(error.faults)
     robot.recover()
     robot.power_on()

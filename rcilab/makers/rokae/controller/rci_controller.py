@@ -220,6 +220,7 @@ class RciController:
     @auto_limit.setter
     def auto_limit(self, on: bool) -> None:
         self.settings = replace(self.settings, auto_limit=on)
+        self._arm.configure(self.settings)
 
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
