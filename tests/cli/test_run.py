@@ -13,11 +13,13 @@ import pytest
 
 from rcilab.cli import main
 from rcilab.client import connect
+from rcilab.client.world import World
 from rcilab.command import JointPosition
 from rcilab.errors import ControlError
 from rcilab.model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint
 from rcilab.supervisor.launch import start_controller
+from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.2, 0.5, 0.1, 1.1, 0.0, 1.4, 0.1])
@@ -146,7 +148,9 @@ def test_a_signal_brings_the_arm_to_rest_and_says_where(number, tmp_path):
         )  # fmt: skip
         while "will move for" not in (line := process.stdout.readline()):
             assert line, process.stderr.read()
-        time.sleep(1.5)
+        host, port = controller.world_address.split(":")
+        with World(host, int(port)) as world:
+            wait_for(lambda: np.abs(np.array(world.status().q) - MODEL.home).max() > 1e-4, what="the arm moving")
         process.send_signal(number)
         out, err = process.communicate(timeout=20)
         assert process.returncode == 1, err
