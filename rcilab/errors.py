@@ -237,7 +237,8 @@ class InvalidValueError(UsageError, ValueError):
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
         name, requirement = plain_text(name), plain_text(requirement)
-        text = plain_text(repr(value))
+        is_array = type(value).__module__ == "numpy" and hasattr(value, "tolist")
+        text = plain_text(repr(value.tolist() if is_array else value))  # type: ignore[attr-defined]
         said = text if len(text) < 120 else text[:117] + "..."
         is_missing = text in ("None", "nothing") and requirement.startswith("is missing")
         super().__init__(f"{name} {requirement}" if is_missing else f"{name}: {said} {requirement}")

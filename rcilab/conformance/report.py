@@ -182,7 +182,9 @@ class Violation:
         row = self.condition
         lasting = f" and for {self.count} ms" if self.count > 1 else ""
         when = f" at t = {self.time:.3f} s{lasting}" if row.stage == "throughout" else ""
-        return f"{self.place}: {self._what()}{when} ({row.necessity} condition); {self.advice}"
+        is_advice = row.necessity == "recommended" and row.fault is None
+        passes = ": the controller does not stop for it" if is_advice else ""
+        return f"{self.place}: {self._what()}{when} ({row.necessity} condition{passes}); {self.advice}"
 
     def _what(self) -> str:
         """Returns quantity, value and bound in words."""

@@ -20,6 +20,7 @@ from rcilab.words.text import Remark
 
 _ANYWHERE = (0.0, 0.0, 0.0)
 _NO_REASON = Remark("")
+_LEAST = 1e-3  # [N m] So that a threshold of zero divides nothing by zero; the client has it too.
 
 
 class Watch:
@@ -107,11 +108,13 @@ class Watch:
         return faults, Remark.all(reasons) if reasons else _NO_REASON
 
     def find_collision(self, thresholds: Sequence[float]) -> Remark | None:
-        """Returns which outside torque is above its threshold, in words, or None."""
+        """Returns which outside torque is farthest above its threshold, in words, or None."""
         torques: list[float] = self.tau_ext.tolist()
         if not any(map(gt, map(abs, torques), thresholds)):
             return None
-        joint = next(i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
+        # As the client does: several joints pass theirs at once, and both ends name the same one.
+        beyond = (i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
+        joint = max(beyond, key=lambda i: abs(torques[i]) / max(thresholds[i], _LEAST))
         torque, threshold = torques[joint], thresholds[joint]
         said = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
         return Remark(said, "collision", joint=joint + 1, value=f"{torque:.3g} N m", bound=f"{threshold:g} N m")

@@ -34,7 +34,11 @@ class Payload:
         mass = as_number(self.mass, "load mass", "kg")
         if not 0.0 <= mass <= _HEAVIEST:
             raise InvalidValueError("load mass", mass, f"must be from 0 to {_HEAVIEST:g} [kg]")
-        inertia = as_vector(np.ravel(self.inertia), 9, "load inertia", "kg m^2").reshape(3, 3)
+        try:
+            moments = np.array(self.inertia, dtype=np.float64).ravel()
+        except (TypeError, ValueError, OverflowError):
+            moments = self.inertia  # It is refused as it came in.
+        inertia = as_vector(moments, 9, "load inertia", "kg m^2").reshape(3, 3)
         if mass == 0.0 and np.any(inertia):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be zero: a load without mass has none")
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):

@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 from numpy.typing import NDArray
 
 from rcilab.client.control_settings import ControlSettings
-from rcilab.client.setup import RobotSetup
+from rcilab.client.setup import RobotSetup, SoftJointLimits
+from rcilab.client.world import World
+from rcilab.client.world_watch import WorldWatch
 from rcilab.errors import RcilabError, UsageError
+from rcilab.protocols.world import AutoLimit
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.setup import Setup
@@ -34,8 +37,8 @@ class Outcome:
     """What came of something that was asked for."""
 
     what: str
-    """"execute", "cell", "pace", "control", "power_on", "power_off", "recover", "output", "inputs", "reboot" or
-    "connect"; cell: a motion of one."""
+    """"execute", "cell", "pace", "control", "power_on", "power_off", "recover", "output", "inputs", "reboot",
+    "limits", "auto_limit" or "connect"; cell: a motion of one."""
     run: Run | None = None
     error: RcilabError | None = None
 
@@ -66,6 +69,11 @@ class RobotSide(Protocol):
     is_virtual: bool
     """Whether nothing but numbers moves."""
 
+    @property
+    def auto_limit(self) -> bool:
+        """Whether a virtual controller was told to lead commands to a standstill inside the soft joint limits."""
+        ...
+
     def status(self) -> SupervisorStatus:
         """Returns how it stands."""
         ...
@@ -92,6 +100,14 @@ class RobotSide(Protocol):
         Raises:
             UsageError: The arm moves, or something else is under way.
         """
+        ...
+
+    def set_joint_limit(self, joints: SoftJointLimits) -> None:
+        """Tells the controller soft limits of the joint angles."""
+        ...
+
+    def set_auto_limit(self, on: bool) -> None:
+        """Has a virtual controller lead commands to a standstill inside these limits, or raise a fault beyond them."""
         ...
 
     def set_output(self, signal: int, level: bool) -> None:
@@ -154,6 +170,9 @@ class SupervisedRobot:
         self.is_virtual = target == VIRTUAL
         self._model, self._plant = model, plant
         self._supervisor = Supervisor(model, target, plant)
+        self._watch: WorldWatch | None = None
+        self._watched = ""  # Where the virtual controller is that was told of auto_limit.
+        self._auto_limit = False
         self._tickets: list[tuple[str, Ticket]] = []
         self._done: list[Outcome] = []
         self._live: LiveRecording | None = None
@@ -198,6 +217,32 @@ class SupervisedRobot:
         """Tells the controller parameters of the modes."""
         self._tickets.append(("control", self._supervisor.set_up(RobotSetup(control=control))))
 
+    def set_joint_limit(self, joints: SoftJointLimits) -> None:
+        """Tells the controller soft limits of the joint angles."""
+        self._tickets.append(("limits", self._supervisor.set_up(RobotSetup(joints=joints))))
+
+    @property
+    def auto_limit(self) -> bool:
+        """Whether the virtual controller of now was told so: another one starts without."""
+        return self._auto_limit and self._watched == self.status().world_address
+
+    def set_auto_limit(self, on: bool) -> None:
+        """Has the virtual controller lead commands to a standstill inside the soft limits, or not."""
+        address = self.status().world_address
+        if address is None:
+            raise UsageError("auto_limit can be set at a virtual controller only: a real one has its own settings")
+        if self._watch is None or self._watched != address:
+            self._end_watch()
+            host, _, port = address.partition(":")
+            self._watch, self._watched = WorldWatch(World(host, int(port))), address
+        self._watch.ask(AutoLimit(on))
+        self._auto_limit = on
+
+    def _end_watch(self) -> None:
+        watch, self._watch = self._watch, None
+        if watch is not None:
+            watch.close()
+
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output."""
         self._tickets.append(("output", self._supervisor.set_output(signal, level)))
@@ -236,6 +281,10 @@ class SupervisedRobot:
         if self._live is not None:
             self._live.add(self._reader.drain())
         done, self._done = self._done, []
+        failed = None if self._watch is None else self._watch.take_error()
+        if failed is not None:
+            self._auto_limit = False
+            done.append(Outcome(what="auto_limit", error=failed))
         for entry in list(self._tickets):
             what, ticket = entry
             if not ticket.done:
@@ -259,6 +308,7 @@ class SupervisedRobot:
     def close(self) -> None:
         """Brings a running motion to rest and ends the processes."""
         self._opener.join()
+        self._end_watch()
         self._supervisor.close()
 
     def _open(self) -> None:

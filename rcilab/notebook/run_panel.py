@@ -12,6 +12,7 @@ from rcilab.errors import PlanningError, RcilabError
 from rcilab.notebook.at_once import hear_at_once
 from rcilab.notebook.heart import kernel_heart
 from rcilab.notebook.lean import lean
+from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.look import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.pace_desk import PaceDesk
@@ -83,6 +84,7 @@ class RunPanel(Part):
         self._desk = ParameterDesk(self.state)
         self.modes = ModeFields(self.state, text, self._desk)
         self.signals = SignalFields(text, lambda: self._robot, self._button)
+        self.limits = LimitFields(self.state, text, lambda: self._robot, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
@@ -100,6 +102,7 @@ class RunPanel(Part):
             self.progress,
             self._outcome,
             self.modes.parameters,
+            self.limits.folder,
             self.signals.folder,
             self._health,
         ], min_width="360px")  # fmt: skip
@@ -158,6 +161,7 @@ class RunPanel(Part):
             if last is not None:
                 self.state.leave_arm(last)
             robot.close()
+            self.state.free_joints()
 
     def _watch(self, robot: RobotSide) -> None:
         """The watching thread: shows the robot, says that somebody is here, stops when nobody is any more."""
@@ -180,6 +184,8 @@ class RunPanel(Part):
         if outcome.what == "pace":
             self._pacing.take(outcome.error)
             return
+        if outcome.what == "limits":
+            self.limits.take(outcome.error)
         if outcome.what == "execute":
             self.state.take_run(outcome.run, outcome.error)
         said = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
@@ -260,6 +266,7 @@ class RunPanel(Part):
         self._show_progress(status, is_moving)
         self.pace.show(status)
         self.modes.show(status)
+        self.limits.show(status)
         self.signals.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 

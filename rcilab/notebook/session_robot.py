@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.client.commands import SIGNALS
 from rcilab.client.control_settings import ControlSettings, give_control
-from rcilab.client.setup import RobotSetup
+from rcilab.client.setup import RobotSetup, SoftJointLimits
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.notebook.page_watch import LEFT_ALONE
 from rcilab.notebook.robot_side import BusyError, Outcome
@@ -49,6 +49,7 @@ class SessionRobot:
         self._held = RobotSetup()  # What it was told from here.
         self._inputs: tuple[bool, ...] | None = None
         self._outputs: tuple[bool | None, ...] = (None,) * len(SIGNALS)  # What was set from here.
+        self.auto_limit = False
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
@@ -134,6 +135,24 @@ class SessionRobot:
             self._held = self._held.updated(RobotSetup(control=control))
 
         self._do("control", tell)
+
+    def set_joint_limit(self, joints: SoftJointLimits) -> None:
+        """Tells the controller soft limits of the joint angles."""
+
+        def tell() -> None:
+            self._session.set_joint_limit(joints.lower, joints.upper)
+            self._held = self._held.updated(RobotSetup(joints=joints))
+
+        self._do("limits", tell)
+
+    def set_auto_limit(self, on: bool) -> None:
+        """Has the virtual controller lead commands to a standstill inside the soft limits, or not."""
+
+        def tell() -> None:
+            self._session.world.set_auto_limit(on)
+            self.auto_limit = on
+
+        self._do("auto_limit", tell)
 
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output."""

@@ -54,6 +54,7 @@ class LabState:
 
     def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
         self._model = require_model(model)
+        self._own_limits = self._model.limits.joint  # Without what a controller was told here.
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotSide | None = None
@@ -234,6 +235,27 @@ class LabState:
             self.plan, self.no_plan = (made, None) if isinstance(made, Plan) else (None, made)
             self.run, self.moment, self.exhibition, self._ran = None, None, None, None
             self.tell("plan", "moment")
+
+    def limit_joints(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Takes soft limits that the controller has: reach, plans and checks keep inside; the plan is checked anew.
+
+        Args:
+            lower: Shape (n,), [rad].
+            upper: Above `lower`, shape (n,), [rad].
+        """
+        with self.lock:
+            if self.session is None:  # A session has them already.
+                self._model = self._model.with_joint_limits(lower, upper)
+            self.reach = judge_joints(self.model, self.goal)
+            self.tell("goal")
+            if self.plan is not None:
+                self.take_motion(self.plan.motion)
+
+    def free_joints(self) -> None:
+        """Takes the arm's range back that it had before a controller that is gone was told soft limits."""
+        own, now = self._own_limits, self._model.limits.joint
+        if now is not own:
+            self.limit_joints(own.lower, own.upper)
 
     def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
         """Shows what came of an execution beside its plan: the run, and why it did not reach its end."""

@@ -173,7 +173,7 @@ def _pack_path(
         "points": packed.add(model.position_path(run.q[rows])),
         "error": packed.add(error),
         "worst": worst,
-        "worst_told": f"{plain_number(worst, 2)} {scale.unit}",
+        "worst_told": scale.told(plain_number(worst, 2)),
     }
     if run.plan is not None:
         place["plan"] = packed.add(model.position_path(run.planned[rows]))

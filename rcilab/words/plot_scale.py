@@ -34,6 +34,10 @@ class PlotScale:
         """Behind the point of a single value."""
         return max(0, math.ceil(math.log10(_FINEST / self.least))) if self.least else 3
 
+    def told(self, number: str) -> str:
+        """Returns a single value with its unit."""
+        return f"{number}·{self.unit}" if self.unit[0].isdigit() else f"{number} {self.unit}"
+
 
 def plot_scale(name: str, units: Units = USUAL) -> PlotScale:
     """Returns how a quantity is drawn.
@@ -44,5 +48,5 @@ def plot_scale(name: str, units: Units = USUAL) -> PlotScale:
     """
     factor, unit = units.from_si(_SI[name])
     if name in ERRORS and factor == 1.0:  # Errors are small, and a plot's numbers end three digits behind the point.
-        factor, unit = 1e3, f"m{unit}"
+        factor, unit = 1e3, "10⁻³ m" if unit == "m" else f"m{unit}"  # Whoever has chosen metres reads no mm.
     return PlotScale(unit=unit, factor=factor, least=factor * _LEAST.get(name, 0.0))

@@ -33,6 +33,7 @@ from rcilab.workbench.run.world_actions import WorldActions
 from rcilab.workbench.scene.actions import SceneActions
 from rcilab.workbench.session import Session
 from rcilab.workbench.setup.actions import SetupActions, is_setup_field
+from rcilab.workbench.setup.wanted import name_parts
 from rcilab.workbench.store import Store
 from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
@@ -233,12 +234,18 @@ class Conductor:
         self._keepsake.keep(self._store.state)
 
     def _resume(self, kept: Kept) -> None:
+        back: list[str] = [] if kept.program is None else ["program"]
+        back += kept.setup.parts
         self._setup.restore(kept.setup)
         if kept.q is not None:
             self._goal.pose(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
-        self._store.say("good", message("notice.program_back" if kept.q is None else "notice.resumed"))
+        if kept.q is not None:
+            self._store.say("good", message("notice.resumed"))
+        elif back:
+            name = self._store.state.model.name
+            self._store.say("good", message("setup.back", what=name_parts(tuple(back)), model=name))
 
     def _refuse(self, request: requests.Request) -> None:
         """Tells a page that it only watches, unless it has got the controls meanwhile."""

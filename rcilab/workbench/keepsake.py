@@ -1,4 +1,4 @@
-"""What a workbench had comes back with the next one: program and looks; after a crash goal and set-up, too."""
+"""What a workbench had comes back with the next one: program, set-up and looks; after a crash the goal, too."""
 
 from __future__ import annotations
 
@@ -146,15 +146,19 @@ class Keepsake:
             self._write(self._arms)
 
     def close(self, state: UiState) -> None:
-        """Forgets goals and set-ups: the workbench was closed by somebody who wanted that. Programs and looks stay."""
+        """Forgets goals: somebody has closed the workbench on purpose. What belongs to an arm stays, and looks."""
         if self._file is None:
             return
         self._next = 0.0
         self.keep(state)
-        programs = {name: {"program": own["program"]} for name, own in self._arms.items() if own.get("program")}
+        arms = {
+            name: {"program": own.get("program"), "setup": own.get("setup") or {}}
+            for name, own in self._arms.items()
+            if own.get("program") or own.get("setup")
+        }
         with suppress(OSError):
-            if programs or self._looks:
-                self._write(programs)
+            if arms or self._looks:
+                self._write(arms)
             else:
                 self._file.unlink(missing_ok=True)
 

@@ -77,7 +77,7 @@ def test_a_torque_too_high_is_advice_with_joint_value_and_way_out_and_the_motion
     assert abs(advice.value) > abs(advice.bound)
     assert "torque rate of the motion" in str(advice)
     assert 'law="torque_rate_limited"' in str(advice)
-    assert "(recommended condition)" in str(advice)
+    assert "(recommended condition: the controller does not stop for it)" in str(advice)
 
 
 @settings(max_examples=25)  # Joint angles of one arm: test_verdicts.py.

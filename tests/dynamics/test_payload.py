@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from rcilab.dynamics.payload import Payload
@@ -21,3 +22,12 @@ from rcilab.errors import InvalidValueError
 def test_grams_millimetres_and_words_are_refused(facts, said):
     with pytest.raises(InvalidValueError, match=said):
         Payload(**facts)
+
+
+@pytest.mark.parametrize("inertia", ["x", ["x"], np.array(["x"]), [[1.0], [2.0, 3.0]], np.eye(2)])
+def test_an_inertia_that_is_none_is_refused_in_plain_text(inertia):
+    with pytest.raises(InvalidValueError) as caught:
+        Payload(mass=1.0, inertia=inertia)
+    assert str(caught.value).startswith("load inertia: ")
+    assert "array(" not in str(caught.value)
+    assert "dtype" not in str(caught.value)

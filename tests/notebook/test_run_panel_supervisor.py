@@ -263,3 +263,37 @@ def test_outputs_and_inputs_are_shown_and_a_restart_is_asked_about(is_own: bool)
         assert phase(panel) == "idle"
         signals.yes.click()
         wait_for(lambda: phase(panel) in ("lost", "closed"), "the end of the connection")
+
+
+@pytest.mark.parametrize("is_own", [True, False], ids=["control_process", "session"])
+def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: bool) -> None:
+    with ExitStack() as stack:
+        subject = PRO7 if is_own else stack.enter_context(rcilab.simulate(PRO7))
+        panel = stack.enter_context(notebook.RunPanel(subject))
+        if is_own:
+            panel.connect.click()
+        wait_for(lambda: phase(panel) == "idle", "a robot")
+        panel.state.pose(PRO7.home + np.eye(7)[0])
+        panel.state.make_plan()
+        assert panel.state.plan.report.ok
+        limits = panel.limits
+        limits.folder.selected_index = 0
+        limits.fields[0][1].box.value = "-200"
+        assert limits.fields[0][1].problem
+        limits.fields[0][1].box.value = "30"
+        limits.send.click()
+        wait_for(lambda: np.isclose(panel.model.limits.joint.upper[0], np.radians(30.0)), "the limit in the model")
+        wait_for(lambda: not panel.state.plan.report.ok, "the plan checked anew")
+        assert panel.state.status.setup.joints.upper[0] == pytest.approx(np.radians(30.0))
+        assert panel.execute.disabled
+        panel.state.make_plan()
+        assert panel.state.plan is None or not panel.state.plan.report.ok
+        with pytest.raises(RcilabError, match="joint 1"):
+            panel.state.pose(PRO7.home + np.eye(7)[0])
+        limits.auto.value = True
+        wait_for(lambda: panel.state.robot.auto_limit, "auto_limit")
+        limits.whole.click()
+        wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], "the whole range")
+        limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"
+        limits.send.click()
+        assert "20.0° to 10.0° is no range" in limits.said.value

@@ -11,16 +11,22 @@ from rcilab.words.units import Units
 SI = Units(angle="rad", length="m")
 
 
-def test_errors_are_shown_in_thousandths_where_a_page_is_in_radians_and_metres():
+def test_errors_are_shown_in_thousandths_of_the_unit_chosen_where_a_page_is_in_radians_and_metres():
     shown = {(name, units): plot_scale(name, units) for name in ("error", "tool", "q") for units in (Units(), SI)}
     assert {key: (scale.factor, scale.unit) for key, scale in shown.items()} == {
         ("error", Units()): (pytest.approx(np.degrees(1.0)), "°"),
         ("tool", Units()): (1000.0, "mm"),
         ("error", SI): (1000.0, "mrad"),
-        ("tool", SI): (1000.0, "mm"),
+        ("tool", SI): (1000.0, "10⁻³ m"),
         ("q", Units()): (pytest.approx(np.degrees(1.0)), "°"),
         ("q", SI): (1.0, "rad"),
     }
+
+
+def test_a_number_in_thousandths_of_a_metre_reads_as_a_product():
+    assert plot_scale("tool", SI).told("0.25") == "0.25·10⁻³ m"
+    assert plot_scale("tool").told("0.25") == "0.25 mm"
+    assert plot_scale("error").told("0.25") == "0.25 °"
 
 
 def test_the_smallest_range_is_the_same_angle_in_every_unit_and_its_hundredth_is_told():

@@ -230,9 +230,11 @@ def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
     ask(requests.ChooseDestination(where="address", address="999.1.1.1"))
     wait(lambda: told(idle) == "address.bad", "the complaint")
+    assert "is not a valid controller address" in Text("en").say(idle.store.state.notice.text)
     assert idle.store.state.drive.typed_address == "", "the question was about another address"
     ask(requests.ChooseDestination(where="address", address="rci://127.0.0.1:9"))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:9", "the question again")
+    assert told(idle) != "address.bad", "a good address was typed"
     ask(requests.ChooseDestination(where="address", address="rci://127.0.0.1:10", answer="yes"))
     wait(lambda: idle.store.state.drive.typed_address == "rci://127.0.0.1:10", "the question about the other one")
     assert idle.store.state.target == "virtual", "a yes to one address connects to no other"

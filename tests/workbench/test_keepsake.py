@@ -24,6 +24,7 @@ from rcilab.workbench.goal.actions import initial_goal
 from rcilab.workbench.keepsake import Keepsake, keepsake_file
 from rcilab.workbench.program.draft import draft_of
 from rcilab.workbench.store import UiState
+from rcilab.workbench.text import Text
 from tests.recording.runs import some_run
 from tests.waiting import wait_for
 
@@ -102,13 +103,15 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
     with Workbench(WorkbenchConfig(port=port)) as bench:
-        assert bench.store.state.notice.text.code == "notice.program_back"
+        assert Text("en").say(bench.store.state.notice.text) == f"Back with the {MODEL.name}: program, tool."
         assert len(bench.store.state.program.draft.steps) == 2
         assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
-        assert bench.store.state.setup.touched == frozenset()
+        assert bench.store.state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.12]
+        wait_for(lambda: bench.session.status().setup.parts == ("tool",), what="our controller to be told the tool")
         bench.conductor.ask(requests.EditProgram(what="clear"))
         wait_for(lambda: not bench.store.state.program.draft.steps, what="an empty program")
-    assert not file.exists()
+    with Workbench(WorkbenchConfig(port=port)) as bench:
+        assert Text("en").say(bench.store.state.notice.text) == f"Back with the {MODEL.name}: tool."
     file.write_text(left)  # As if it had been killed.
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert np.allclose(bench.store.state.goal.q, GOAL, atol=1e-12)
@@ -118,6 +121,20 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         assert len(bench.store.state.program.draft.steps) == 2
         plan = wait_for(lambda: bench.store.state.plan, what="a plan from the arm to the goal")
         assert np.allclose(plan.motion.goal, GOAL, atol=1e-12)
+
+
+def test_after_an_orderly_end_every_arm_has_its_set_up_and_none_its_goal(tmp_path):
+    file, other = tmp_path / "kept.json", load_model("xMate3")
+    kept = Keepsake(file)
+    kept.keep(state_with_all())
+    kept.close(UiState(model=other, goal=initial_goal(other, other.home)))
+    again = Keepsake(file)
+    assert again.recall(other) is None
+    assert again.recall_setups(other)[MODEL.name].parts == SETUP.parts
+    back = again.recall(MODEL)
+    assert back.q is None
+    assert back.setup.parts == SETUP.parts
+    assert len(back.program.waypoints) == 2
 
 
 def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_is_chosen():

@@ -384,3 +384,6 @@ def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
     assert (wanted(bench).tool, wanted(bench).load, wanted(bench).box) == (before.tool, before.load, before.box)
     assert told(bench) == "setup.back"
     wait(lambda: settled(bench), "the controller to have it again")
+    wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
+    said = Text("en").say(bench.store.state.notice.text)
+    assert said == "The controller was connected anew and told the set-up again: safety box, tool, load."

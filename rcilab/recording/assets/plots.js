@@ -135,7 +135,7 @@ class Plots {
       const chosen = this.curves(row);
       if (chosen.length !== 1 || i < 0) return;
       const v = row.actual[chosen[0]][i];
-      if (v === v) g.fillStyle = "#0f1c2e", g.fillText(`${fixed(v, row.digits)} ${row.unit}`, LEFT + this.columns, k * each + TITLE - 9);
+      if (v === v) g.fillStyle = "#0f1c2e", g.fillText(`${fixed(v, row.digits)}${/^\d/.test(row.unit) ? "·" : " "}${row.unit}`, LEFT + this.columns, k * each + TITLE - 9);
     });
   }
 }

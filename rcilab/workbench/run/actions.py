@@ -171,9 +171,9 @@ class RobotActions:
             self._untouched = initial_goal(model, model.home)
             changes |= {"model": model, "goal": self._untouched, "setup": setup}
             changes |= {"drive": replace(state.drive, control=None, refusal=None, typed_address="", world=None)}
-        is_same = model.name == state.model.name
+            state = replace(state, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
-        self._session.open(model, target, state.plant, _own_setup(state, target) if is_same else None)
+        self._session.open(model, target, state.plant, _own_setup(state, target))
         self._store.update(place=0.0, playing=False, **changes)
 
     def remember_setup(self, name: str, setup: RobotSetup) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import cast
 
 from rcilab.client.address import parse_address
+from rcilab.errors import RcilabError
 from rcilab.workbench import requests
 from rcilab.workbench.run.actions import RobotActions
 from rcilab.workbench.run.driving import DESTINATIONS
@@ -13,7 +14,11 @@ from rcilab.workbench.run.pushing import Plant
 from rcilab.workbench.run.readiness import is_moving
 from rcilab.workbench.session import Session
 from rcilab.workbench.store import Store
+from rcilab.workbench.telling import tell_error
 from rcilab.workbench.text import message
+
+_ADDRESS = "address"
+"""Names the trouble that what stands in the field is no address."""
 
 
 class WhereActions:
@@ -27,6 +32,7 @@ class WhereActions:
         state = self._store.state
         if request.where not in DESTINATIONS:
             return
+        self._store.settle(_ADDRESS)
         if is_moving(self._session.status()):
             self._store.say("warn", message("notice.moving"))
             return
@@ -49,9 +55,13 @@ class WhereActions:
             self._robot.open(self._store.state.model.name, asked)
             return
         if not address:
-            self._store.say("warn", message("run.address_needed"))
+            self._store.say("warn", message("run.address_needed"), trouble=_ADDRESS)
             return
-        parse_address(address)
+        try:
+            parse_address(address)
+        except RcilabError as error:
+            self._store.say("bad", tell_error(error), trouble=_ADDRESS)
+            return
         self._ask(address)
 
     def _ask(self, address: str) -> None:

@@ -63,6 +63,7 @@ class SetupActions:
         self._dragged = -math.inf  # When it was last heard to.
         self._post = SetupPost(session, self._refuse)
         self._told_of: object = None  # The program of which it was said what another tool makes of it.
+        self._is_back = False  # What came back with this workbench: it was said already.
         self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
 
     def type_field(self, request: requests.TypeField) -> None:
@@ -212,6 +213,7 @@ class SetupActions:
         now = self._store.state.setup
         parts: set[SetupPart] = set(setup.parts)
         if parts:
+            self._is_back = True
             self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
 
     def tick(self, status: SupervisorStatus) -> None:
@@ -226,7 +228,9 @@ class SetupActions:
         state = self._store.state
         told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
         if self._told > told:
-            self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
+            if not self._is_back:
+                self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
+            self._is_back = False
         is_held = time.monotonic() - self._dragged < _HAND_GONE
         if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
             self._send(status)
@@ -236,6 +240,7 @@ class SetupActions:
         state = self._store.state
         parts = pending_parts(state, status)
         if parts and not self._post.is_underway:
+            self._is_back = False
             self._post.send(state.setup.wanted.only(parts))
 
     def _refuse(self, why: Message) -> None:

@@ -1,0 +1,161 @@
+"""Soft joint limits, and whether a virtual controller leads commands to a standstill inside them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import ipywidgets
+import numpy as np
+
+from rcilab.client.setup import SoftJointLimits
+from rcilab.errors import RcilabError
+from rcilab.limits import JointLimits
+from rcilab.notebook.lean import lean
+from rcilab.notebook.look import block, esc, problem, soft, verdict, write
+from rcilab.notebook.number_field import NumberField
+from rcilab.notebook.robot_side import RobotSide
+from rcilab.notebook.state import LabState
+from rcilab.robots import describe_robot
+from rcilab.supervisor import SupervisorStatus
+from rcilab.words.text import Text, message
+
+_WIDTHS = ("8em", "3.4em", "2.6em")  # So that both ends of a joint stand in a row.
+
+
+class LimitFields:
+    """A folded group of `RunPanel`; what is typed is a proposal until it is sent.
+
+    Args:
+        state: What the parts share.
+        text: Words.
+        robot: Returns the robot that is connected.
+        button: Makes a button of the panel.
+    """
+
+    def __init__(self, state: LabState, text: Text, robot: Callable[[], RobotSide], button: Callable[..., Any]) -> None:
+        self._state, self._text, self._robot = state, text, robot
+        self.fields: list[tuple[NumberField, NumberField]] = []
+        """Lower and upper end of every joint, once somebody has opened the group."""
+        self._typed: list[list[float]] = []  # Lower ends and upper ends, [rad].
+        self._shown: JointLimits | None = None
+        self._asked: SoftJointLimits | None = None
+        self._writing = False
+        self.send = button("softlimits.send", lambda: self._propose(*self._typed))
+        self.whole = button("softlimits.whole", self._propose_whole)
+        self.yes = button("softlimits.confirm", self._give, style="danger")
+        self.no = button("run.cancel", self._forget)
+        self.auto: Any = lean(
+            ipywidgets.Checkbox, value=False, indent=False, description=text("softlimits.auto"),
+            tooltip=text("softlimits.auto_hint"), layout={"width": "auto"},
+        )  # fmt: skip
+        self.auto.observe(self._on_auto, names="value")
+        self._inside: Any = lean(ipywidgets.VBox, [])
+        self.said = block()
+        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        rows = [
+            block(soft(text("softlimits.hint"))),
+            self._inside,
+            lean(ipywidgets.HBox, [self.send, self.whole]),
+            self.said,
+            self._answers,
+            self.auto,
+            block(soft(text("softlimits.note"))),
+        ]
+        self.folder: Any = lean(
+            ipywidgets.Accordion, [lean(ipywidgets.VBox, rows)], titles=(text("softlimits.title"),), selected_index=None
+        )
+        self.folder.observe(self._on_open, names="selected_index")
+
+    def show(self, status: SupervisorStatus | None) -> None:
+        """Follows the controller and the limits of the arm."""
+        is_ready = status is not None and status.phase in ("idle", "fault")
+        self.send.disabled = not is_ready or not self.fields
+        self.whole.disabled = not is_ready
+        if not is_ready:
+            self._forget()
+        robot = self._state.robot
+        self.auto.disabled = not is_ready or robot is None or not robot.is_virtual
+        self._writing = True
+        self.auto.value = robot is not None and robot.is_virtual and robot.auto_limit
+        self._writing = False
+        limits = self._state.model.limits.joint
+        if self.fields and limits is not self._shown:
+            self._fill(limits)
+
+    def take(self, error: RcilabError | None) -> None:
+        """Takes note of the answer: model, plan and checks have the limits that a controller has taken."""
+        asked, self._asked = self._asked, None
+        if error is None and asked is not None:
+            self._state.limit_joints(asked.lower, asked.upper)
+            write(self.said, soft(self._text("softlimits.taken")))
+
+    def _propose(self, lower: list[float], upper: list[float]) -> None:
+        for low, high in zip(lower, upper, strict=True):
+            if not low < high:
+                ends = {"low": f"{math.degrees(low):.1f}", "high": f"{math.degrees(high):.1f}"}
+                write(self.said, problem(self._text.say(message("setup.joint_ends", **ends))))
+                return
+        self._asked = SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
+        robot = self._robot()
+        if robot.is_virtual:
+            self._give()
+            return
+        write(self.said, verdict("warn", "▲", self._text("softlimits.ask", address=robot.name)))
+        self._answers.layout.display = None
+
+    def _propose_whole(self) -> None:
+        own = describe_robot(self._state.model.name).limits.joint
+        self._propose(own.lower.tolist(), own.upper.tolist())
+
+    def _give(self) -> None:
+        self._answers.layout.display = "none"
+        write(self.said, "")
+        if self._asked is not None:
+            self._robot().set_joint_limit(self._asked)
+
+    def _forget(self) -> None:
+        if self._answers.layout.display is None:
+            self._asked = None
+            self._answers.layout.display = "none"
+            write(self.said, "")
+
+    def _on_auto(self, change: Any) -> None:
+        if not self._writing:
+            try:
+                self._robot().set_auto_limit(bool(change["new"]))
+            except RcilabError as error:
+                write(self.said, problem(str(esc(error))))
+
+    def _on_open(self, change: Any) -> None:
+        """Makes the fields when they are wanted: fourteen of them would delay the cell."""
+        if change["new"] != 0 or self.fields:
+            return
+        own = describe_robot(self._state.model.name).limits.joint
+        rows: list[Any] = []
+        for joint, (least, largest) in enumerate(zip(np.degrees(own.lower), np.degrees(own.upper), strict=True)):
+            low, high = self._field("lower", joint, least, largest), self._field("upper", joint, least, largest)
+            self.fields.append((low, high))
+            rows += [lean(ipywidgets.HBox, [*low.cells, *high.cells]), low.said, high.said]
+        self._fill(self._state.model.limits.joint)
+        self._inside.children = tuple(rows)
+        self.show(self._state.status)
+
+    def _field(self, end: str, joint: int, least: float, largest: float) -> NumberField:
+        def take(degrees: float) -> None:
+            own = describe_robot(self._state.model.name).limits.joint
+            bound = float(getattr(own, end)[joint])  # Where it stands in the field, rounded, it is meant.
+            angle = math.radians(degrees)
+            self._typed["lower upper".split().index(end)][joint] = bound if abs(angle - bound) < 1e-5 else angle
+
+        label = self._text(f"softlimits.{end}", joint=joint + 1)
+        low, high = round(float(least), 6), round(float(largest), 6)
+        return NumberField(self._text, label, "deg", low, high, take, widths=_WIDTHS)
+
+    def _fill(self, limits: JointLimits) -> None:
+        self._shown = limits
+        self._typed = [limits.lower.tolist(), limits.upper.tolist()]
+        for joint, ends in enumerate(self.fields):
+            for field, bounds in zip(ends, self._typed, strict=True):
+                field.show(math.degrees(bounds[joint]))
