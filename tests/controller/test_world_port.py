@@ -146,6 +146,44 @@ def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
         assert world.status().phase == "off", "it has connected again by itself"
 
 
+def ask_as_stranger(found: Running) -> dict:
+    """What another account of this machine is answered when it presses the emergency stop."""
+    assert found.server.world_address is not None
+    host, _, port = found.server.world_address.partition(":")
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setuid(65534)
+            with socket.create_connection((host, int(port)), timeout=PATIENCE) as link:
+                link.sendall(b'{"id": 1, "request": "press", "button": "estop"}\n')
+                said = b""
+                with suppress(ConnectionResetError):
+                    while part := link.recv(4096):
+                        said += part
+                os.write(writing, said)
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        return json.loads(stream.read())
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+def test_another_account_takes_no_place_from_a_guest_that_is_silent(
+    lockstep: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rcilab.controller.world_port.IDLE", 0.05)
+    with ExitStack() as stack:
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
+        time.sleep(0.1)
+        answer = ask_as_stranger(lockstep)
+        assert "for the user who started the controller" in answer["error"]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
+
+
 def test_guests_that_are_gone_before_they_are_looked_at_disturb_nobody(lockstep: Running) -> None:
     """A reset connection has no other end any more."""
     for _ in range(50):
@@ -186,26 +224,7 @@ def test_an_account_is_not_taken_for_root_because_it_has_hung_up(user: int, stay
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
 def test_another_account_of_this_machine_is_refused(lockstep: Running) -> None:
-    assert lockstep.server.world_address is not None
-    host, _, port = lockstep.server.world_address.partition(":")
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.setuid(65534)
-            with socket.create_connection((host, int(port)), timeout=PATIENCE) as link:
-                link.sendall(b'{"id": 1, "request": "press", "button": "estop"}\n')
-                said = b""
-                with suppress(ConnectionResetError):
-                    while part := link.recv(4096):
-                        said += part
-                os.write(writing, said)
-        finally:
-            os._exit(0)
-    os.waitpid(child, 0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as stream:
-        answer = json.loads(stream.read())
+    answer = ask_as_stranger(lockstep)
     assert answer["ok"] is False
     assert "for the user who started the controller" in answer["error"]
     with Guest(lockstep) as guest:
