@@ -92,7 +92,11 @@ class WorldPort:
         if len(self._guests) >= MOST_GUESTS:
             self._drop_idle()
         if len(self._guests) >= MOST_GUESTS:
-            guest.close()
+            full = UsageError(
+                f"all {MOST_GUESTS} places of the world port are taken; close what uses it, or try again later: one "
+                f"that has been silent for {IDLE:g} s gives its place up"
+            ).coded("world_full", most=MOST_GUESTS, seconds=f"{IDLE:g}")
+            _turn_away(guest, Refused(str(full), full.code, full.facts))
             return
         self._guests[guest], self._heard[guest] = LineReader(), self._clock()
         self.sockets = (self._listener, *self._guests)

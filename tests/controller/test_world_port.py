@@ -119,6 +119,10 @@ def test_eight_guests_are_welcome_and_the_ninth_is_not(lockstep: Running) -> Non
         for guest in guests:
             guest.ask(request="status")
         with Guest(lockstep) as ninth:
+            answer = json.loads(ninth.stream.readline())
+            assert answer["ok"] is False
+            assert "all 8 places of the world port are taken" in answer["error"]
+            assert "60 s" in answer["error"]
             assert ninth.is_cut_off()
         guests.pop().__exit__()
         guests[0].ask(request="status")
@@ -168,6 +172,23 @@ def ask_as_stranger(found: Running) -> dict:
     os.close(writing)
     with os.fdopen(reading, "rb") as stream:
         return json.loads(stream.read())
+
+
+def test_who_finds_all_places_taken_is_told_so_in_words_and_comes_in_later(lockstep: Running) -> None:
+    assert lockstep.server.world_address is not None
+    host, _, port = lockstep.server.world_address.partition(":")
+    with World(host, int(port)) as world, ExitStack() as stack:
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
+        for _ in range(3):
+            with pytest.raises(
+                UsageError, match=r"all 8 places of the world port are taken.* silent for 60 s"
+            ) as caught:
+                world.status()
+            assert caught.value.code == "world_full"
+        guests[0].__exit__()
+        guests[1].ask(request="status")
+        assert world.status().phase == "off"
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
