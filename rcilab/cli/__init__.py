@@ -10,6 +10,7 @@ from importlib import import_module
 
 from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
 from rcilab.errors import RcilabError
+from rcilab.starved import STARVED, is_starved
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
@@ -41,16 +42,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except RcilabError as error:
         print(f"rcilab: {one_line_each(str(error))}", file=sys.stderr)
         return _USAGE
+    except (MemoryError, ImportError, RuntimeError) as error:
+        if not is_starved(error):
+            raise
+        print(f"rcilab: {STARVED}", file=sys.stderr)
+        return _USAGE
     except OSError as error:
+        if is_starved(error):
+            print(f"rcilab: {STARVED}", file=sys.stderr)
+            return _USAGE
         if not is_unwritable(error):
             raise
         drop_output()
         print(f"rcilab: the output could not be written: {error.strerror}", file=sys.stderr)
-        return _USAGE
-    except MemoryError:
-        print(
-            "rcilab: there is not enough free memory for this; close other programs or raise ulimit -v", file=sys.stderr
-        )
         return _USAGE
     except KeyboardInterrupt:
         return _INTERRUPTED

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.errors import UsageError
+from rcilab.starved import STARVED, is_starved
 
 if TYPE_CHECKING:
     from rcilab.supervisor import SupervisorStatus
@@ -112,7 +113,7 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
-    with Workbench(config) as bench:
+    with _ended_by_starving(ending), Workbench(config) as bench:
         is_secret = config.token is not None and not sys.stdout.isatty()
         address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
         print(f"rcilab workbench: {address}  (Ctrl-C ends it)", flush=True)
@@ -121,6 +122,31 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
             while not ending.wait(0.5):
                 trouble = _tell_trouble(bench.session.status(), trouble)
     return 0
+
+
+@contextmanager
+def _ended_by_starving(ending: threading.Event) -> Iterator[None]:
+    """Ends the page when a thread of ours has died for want of memory: half a page is worse than none.
+
+    Raises:
+        UsageError: That has happened.
+    """
+    before, died = threading.excepthook, threading.Event()
+
+    def hear(args: threading.ExceptHookArgs) -> None:
+        if args.exc_value is None or not is_starved(args.exc_value):
+            before(args)
+            return
+        died.set()
+        ending.set()
+
+    threading.excepthook = hear
+    try:
+        yield
+    finally:
+        threading.excepthook = before
+    if died.is_set():
+        raise UsageError(STARVED)
 
 
 @contextmanager

@@ -70,6 +70,7 @@ class World(Closing):
         self._socket: socket.socket | None = None
         self._reader = LineReader()
         self._last_id = 0
+        self._is_turned_away = False  # The last answer was to the connection and not to a request, and the last one.
 
     def push(
         self,
@@ -198,6 +199,8 @@ class World(Closing):
                 raise ConnectionLostError(
                     f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
                 ).coded("world_silent") from error
+            if self._is_turned_away:
+                self._disconnect()
         if isinstance(answer, Refused):
             raise UsageError(plain_text(answer.reason)).coded(answer.code, **answer.facts)
         return answer
@@ -221,7 +224,8 @@ class World(Closing):
                 raise ConnectionResetError("it closed the connection")
             for line in self._reader.feed(data):
                 number, answer = decode_world_answer(line)
-                if number == self._last_id:
+                self._is_turned_away = number == 0 and isinstance(answer, Refused)
+                if number == self._last_id or self._is_turned_away:
                     return answer
 
     def _disconnect(self) -> None:

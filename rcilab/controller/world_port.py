@@ -12,6 +12,7 @@ import ipaddress
 import socket
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from rcilab.controller.peer_user import is_ours
 from rcilab.errors import DecodeError, UsageError
@@ -83,18 +84,21 @@ class WorldPort:
             guest, _ = self._listener.accept()
         except OSError:  # It was gone before we looked.
             return
+        guest.setblocking(False)
+        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if not is_ours(guest):  # Before anything else: whoever may not enter takes no place from anybody.
+            _turn_away(guest, Refused("this world port is for the user who started the controller"))
+            return
         if len(self._guests) >= MOST_GUESTS:
             self._drop_idle()
         if len(self._guests) >= MOST_GUESTS:
-            guest.close()
+            full = UsageError(
+                f"all {MOST_GUESTS} places of the world port are taken; close what uses it, or try again later: one "
+                f"that has been silent for {IDLE:g} s gives its place up"
+            ).coded("world_full", most=MOST_GUESTS, seconds=f"{IDLE:g}")
+            _turn_away(guest, Refused(str(full), full.code, full.facts))
             return
-        guest.setblocking(False)
-        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._guests[guest], self._heard[guest] = LineReader(), self._clock()
-        if not is_ours(guest):
-            if self._answer(guest, Refused("this world port is for the user who started the controller"), 0):
-                self._drop(guest)
-            return
         self.sockets = (self._listener, *self._guests)
 
     def _read(self, guest: socket.socket) -> None:
@@ -139,6 +143,12 @@ class WorldPort:
         guest.close()
         del self._guests[guest], self._heard[guest]
         self.sockets = (self._listener, *self._guests)
+
+
+def _turn_away(guest: socket.socket, why: Refused) -> None:
+    with suppress(OSError):  # It is gone already.
+        guest.send(encode_world_answer(why, 0))
+    guest.close()
 
 
 def _listen(host: str, port: int) -> socket.socket:

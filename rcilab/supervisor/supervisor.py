@@ -15,6 +15,7 @@ from rcilab.client.setup import RobotSetup, require_setup
 from rcilab.clock import CYCLE_TIME
 from rcilab.closing import Closing
 from rcilab.errors import ConnectionLostError, RcilabError, UsageError
+from rcilab.starved import memory_needed
 from rcilab.supervisor.arm_requests import ArmRequests
 from rcilab.supervisor.keeper import ANSWER_TIMEOUT, ProcessKeeper
 from rcilab.supervisor.launch import require_plant
@@ -101,16 +102,19 @@ class Supervisor(ArmRequests, Closing):
 
         Raises:
             ConnectionLostError: A process of ours could not be started; the message carries what it said.
-            UsageError: It was started before.
+            UsageError: It was started before, or memory is short.
         """
         with self._lock:
             if self._block is not None:
                 raise UsageError("the supervisor has been started already; use restart(), or make a new one")
-            self._open()
-            self._watcher = threading.Thread(target=self._watch, name="rcilab-supervisor", daemon=True)
-            self._watcher.start()
         try:
-            self._await_connection(timeout)
+            with memory_needed():
+                with self._lock:
+                    self._open()
+                    watcher = threading.Thread(target=self._watch, name="rcilab-supervisor", daemon=True)
+                    watcher.start()
+                    self._watcher = watcher
+                self._await_connection(timeout)
         except BaseException:
             self.close()
             raise
@@ -236,10 +240,14 @@ class Supervisor(ArmRequests, Closing):
         """Makes the shared block and what works on it, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
-        self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
-        self._desk = TicketDesk(block)
-        self._pace, self._round_trip = PaceDesk(block), RoundTrip(block)
-        self._reader, self._ring = StatusReader(block), RingReader(block)
+        try:
+            self._keeper = ProcessKeeper(block, self.model.name, self._plant, address, auto_restart=self._auto_restart)
+            self._desk = TicketDesk(block)
+            self._pace, self._round_trip = PaceDesk(block), RoundTrip(block)
+            self._reader, self._ring = StatusReader(block), RingReader(block)
+        except BaseException:
+            block.close()
+            raise
         self._is_closing.clear()
         self._block = block
         try:

@@ -175,8 +175,9 @@ class Conductor:
 
     def start(self) -> None:
         """Starts the thread."""
-        self._thread = threading.Thread(target=self._run, name="conductor", daemon=True)
-        self._thread.start()
+        thread = threading.Thread(target=self._run, name="conductor", daemon=True)
+        thread.start()
+        self._thread = thread
 
     def close(self) -> None:
         """Ends the thread."""

@@ -126,8 +126,9 @@ class Presenter:
     def start(self) -> None:
         """Draws once, then goes on in a thread of its own."""
         self.show()
-        self._thread = threading.Thread(target=self._run, name="presenter", daemon=True)
-        self._thread.start()
+        thread = threading.Thread(target=self._run, name="presenter", daemon=True)
+        thread.start()
+        self._thread = thread
 
     def close(self) -> None:
         """Ends the thread."""

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rcilab.errors import RcilabError
+from rcilab.errors import RcilabError, UsageError
+from rcilab.starved import memory_needed
 from rcilab.workbench.telling import StartingError
 
 if TYPE_CHECKING:
@@ -34,19 +35,17 @@ class Session:
         self._is_apart = False  # Nobody wants a connection.
 
     def open(self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotSetup | None = None) -> None:
-        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once."""
+        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once.
+
+        Raises:
+            UsageError: Memory is short.
+        """
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
             self._is_apart = False
-            self._worker = threading.Thread(
-                target=self._exchange,
-                args=(generation, previous, model, target, plant, setup),
-                name="session",
-                daemon=True,
-            )
-            self._worker.start()
+            self._work(self._exchange, generation, previous, model, target, plant, setup)
 
     def disconnect(self) -> None:
         """Closes what is open and starts nothing; returns at once, `status` is "closed" from then on."""
@@ -54,9 +53,8 @@ class Session:
             self._generation += 1
             previous = self._worker
             self._ready = self._shown = None
-            self._worker = threading.Thread(target=self._let_go, args=(previous,), name="session", daemon=True)
             self._is_apart = True
-            self._worker.start()
+            self._work(self._let_go, previous)
 
     def close(self) -> None:
         """Ends the supervisor and waits for its processes to go."""
@@ -121,6 +119,16 @@ class Session:
             with suppress(RcilabError):  # Closed in the meantime.
                 ready.set_operator_present(True)
 
+    def _work(self, work: Callable[..., None], *args: object) -> None:
+        worker = threading.Thread(target=work, args=args, name="session", daemon=True)
+        try:
+            with memory_needed():
+                worker.start()
+        except UsageError:
+            self._is_apart = True  # Nothing is being started.
+            raise
+        self._worker = worker
+
     def _let_go(self, previous: threading.Thread | None) -> None:
         if previous is not None:
             previous.join()
@@ -146,12 +154,16 @@ class Session:
             if generation != self._generation:
                 return
         try:
-            from rcilab.supervisor import Supervisor
+            with memory_needed():
+                from rcilab.supervisor import Supervisor
 
-            supervisor = Supervisor(model, target, plant, setup=setup)
-            self._current = self._shown = supervisor
-            supervisor.start()
+                supervisor = Supervisor(model, target, plant, setup=setup)
+                self._current = self._shown = supervisor
+                supervisor.start()
         except RcilabError as error:
+            with self._lock:
+                if generation == self._generation:
+                    self._is_apart = True  # Else a supervisor that could not even be made would be starting for ever.
             self._on_failure(error)
             return
         with self._lock:

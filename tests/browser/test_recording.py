@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import csv
 import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rcilab.model import RobotModel
 from rcilab.recording.export import export_run
 from rcilab.recording.run import build_run
 from rcilab.recording.setup import Setup
 from rcilab.workbench import requests
 from rcilab.workbench.run.keeper import whole_recording
-from tests.recording.runs import MODEL, some_cycles, some_ideal_run, some_long_run, some_run
+from tests.recording.runs import MODEL, PLAN, some_cycles, some_ideal_run, some_long_run, some_run
 
 
 def plot_numbers(page) -> list[list[str]]:
@@ -157,8 +159,10 @@ _HOSTILE = (
 
 def test_words_of_a_run_are_words_on_the_exported_page_whatever_they_are(chromium, tmp_path):
     setup = Setup(target=f"{_HOSTILE} 1", plant=f"{_HOSTILE} 2", mode=f"{_HOSTILE} 3", started_ns=1)
-    run = build_run(some_cycles(), plan=None, model=MODEL, setup=setup, stopped=f"{_HOSTILE} 4")
-    file = Path(tmp_path / "run.html")
+    arm = RobotModel(replace(MODEL.description, name=f"{_HOSTILE} 5"), MODEL.T_flange_tool, MODEL.load)
+    plan = replace(PLAN, notes=(f"{_HOSTILE} 6",))
+    run = build_run(some_cycles(), plan=plan, model=arm, setup=setup, stopped=f"{_HOSTILE} 4")
+    file = Path(tmp_path / f"{_HOSTILE.replace('/', '')}.html")
     file.write_bytes(export_run(run, ".html"))
     tab = chromium.new_page()
     problems: list[str] = []
@@ -168,6 +172,7 @@ def test_words_of_a_run_are_words_on_the_exported_page_whatever_they_are(chromiu
     tab.wait_for_selector("body[data-ready=yes]", state="attached", timeout=60_000)
     shown = tab.locator("#tables").inner_text()
     assert [f"{_HOSTILE} {number}" in shown for number in (1, 2, 3, 4)] == [True] * 4
+    assert f"{_HOSTILE} 5" in tab.title()
     assert tab.evaluate("window.hurt") is None
     tab.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.hurt = 3\">')")
     tab.evaluate("document.body.append(Object.assign(document.createElement('script'), {text: 'window.hurt = 4'}))")

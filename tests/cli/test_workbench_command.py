@@ -163,6 +163,49 @@ def test_too_few_file_descriptors_get_one_sentence():
     assert done.stderr == "rcilab: only 40 files may be open, the page needs 48: run `ulimit -n 48` before\n"
 
 
+STARVING = """
+import threading, sys
+from rcilab.supervisor.layout import ControlBlock
+def create(*_):
+    raise OSError(12, "Cannot allocate memory")
+ControlBlock.create = create
+from rcilab.workbench.conductor import Conductor
+before = Conductor._run
+def run(self):
+    if DIES:
+        raise RuntimeError("can't start new thread")
+    before(self)
+Conductor._run = run
+from rcilab.cli import main
+sys.exit(main(["--no-browser", "--port", "0", "--quality", "light"]))
+"""
+
+
+def test_a_thread_that_dies_for_want_of_memory_ends_the_page_in_one_sentence():
+    code = STARVING.replace("DIES", "True")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "rcilab: there is not enough free memory for this; close other programs or raise ulimit -v\n"
+
+
+def test_a_page_whose_robot_side_finds_no_memory_stays_without_a_traceback():
+    process = subprocess.Popen(
+        [sys.executable, "-c", STARVING.replace("DIES", "False")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        address = process.stdout.readline().split()[2]
+        with urllib.request.urlopen(address, timeout=10) as page:
+            assert page.status == 200
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        process.wait()
+    assert (process.returncode, errors) == (0, "")
+
+
 def names_of(pids: list[int]) -> list[str]:
     """What `top` shows for processes; those that have gone are left out."""
     files = [Path(f"/proc/{pid}/comm") for pid in pids]

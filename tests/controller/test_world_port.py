@@ -119,6 +119,10 @@ def test_eight_guests_are_welcome_and_the_ninth_is_not(lockstep: Running) -> Non
         for guest in guests:
             guest.ask(request="status")
         with Guest(lockstep) as ninth:
+            answer = json.loads(ninth.stream.readline())
+            assert answer["ok"] is False
+            assert "all 8 places of the world port are taken" in answer["error"]
+            assert "60 s" in answer["error"]
             assert ninth.is_cut_off()
         guests.pop().__exit__()
         guests[0].ask(request="status")
@@ -144,6 +148,61 @@ def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
             with Guest(lockstep) as guest:
                 assert guest.ask(request="status")["ok"]
         assert world.status().phase == "off", "it has connected again by itself"
+
+
+def ask_as_stranger(found: Running) -> dict:
+    """What another account of this machine is answered when it presses the emergency stop."""
+    assert found.server.world_address is not None
+    host, _, port = found.server.world_address.partition(":")
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.setuid(65534)
+            with socket.create_connection((host, int(port)), timeout=PATIENCE) as link:
+                link.sendall(b'{"id": 1, "request": "press", "button": "estop"}\n')
+                said = b""
+                with suppress(ConnectionResetError):
+                    while part := link.recv(4096):
+                        said += part
+                os.write(writing, said)
+        finally:
+            os._exit(0)
+    os.waitpid(child, 0)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as stream:
+        return json.loads(stream.read())
+
+
+def test_who_finds_all_places_taken_is_told_so_in_words_and_comes_in_later(lockstep: Running) -> None:
+    assert lockstep.server.world_address is not None
+    host, _, port = lockstep.server.world_address.partition(":")
+    with World(host, int(port)) as world, ExitStack() as stack:
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
+        for _ in range(3):
+            with pytest.raises(
+                UsageError, match=r"all 8 places of the world port are taken.* silent for 60 s"
+            ) as caught:
+                world.status()
+            assert caught.value.code == "world_full"
+        guests[0].__exit__()
+        guests[1].ask(request="status")
+        assert world.status().phase == "off"
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
+def test_another_account_takes_no_place_from_a_guest_that_is_silent(
+    lockstep: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rcilab.controller.world_port.IDLE", 0.05)
+    with ExitStack() as stack:
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
+        time.sleep(0.1)
+        answer = ask_as_stranger(lockstep)
+        assert "for the user who started the controller" in answer["error"]
+        assert all(guest.ask(request="status")["ok"] for guest in guests)
 
 
 def test_guests_that_are_gone_before_they_are_looked_at_disturb_nobody(lockstep: Running) -> None:
@@ -186,26 +245,7 @@ def test_an_account_is_not_taken_for_root_because_it_has_hung_up(user: int, stay
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
 def test_another_account_of_this_machine_is_refused(lockstep: Running) -> None:
-    assert lockstep.server.world_address is not None
-    host, _, port = lockstep.server.world_address.partition(":")
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        try:
-            os.setuid(65534)
-            with socket.create_connection((host, int(port)), timeout=PATIENCE) as link:
-                link.sendall(b'{"id": 1, "request": "press", "button": "estop"}\n')
-                said = b""
-                with suppress(ConnectionResetError):
-                    while part := link.recv(4096):
-                        said += part
-                os.write(writing, said)
-        finally:
-            os._exit(0)
-    os.waitpid(child, 0)
-    os.close(writing)
-    with os.fdopen(reading, "rb") as stream:
-        answer = json.loads(stream.read())
+    answer = ask_as_stranger(lockstep)
     assert answer["ok"] is False
     assert "for the user who started the controller" in answer["error"]
     with Guest(lockstep) as guest:

@@ -19,6 +19,11 @@ def told(bench: Workbench) -> str | None:
     return None if notice is None else notice.text.code
 
 
+def all_told(bench: Workbench) -> set[str]:
+    """The codes of all notices that are kept."""
+    return {notice.text.code for notice in bench.store.state.notices}
+
+
 @contextmanager
 def opened() -> Iterator[Workbench]:
     """A workbench with an idle arm; no error of ours may have been swallowed by the end."""

@@ -16,7 +16,7 @@ import msgspec
 from rcilab.workbench import requests
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.fuzz.wires import open_page
-from tests.workbench.opened import told, wait
+from tests.workbench.opened import all_told, told, wait
 from tests.workbench.test_surprises import is_ready, move_on, set_out
 
 PROCESS_GROWTH = 1_000_000  # [bytes] Of controller and control process.
@@ -142,7 +142,8 @@ def fill_the_disk(plant: str, folder: Path) -> None:
             bench.conductor.ask(requests.SetRecording(on=True))
             swing(bench)
             wait(lambda: bench.store.state.recording is not None, "the run")
-            wait(lambda: told(bench) == "record.unwritable", "to be told")
+            # That the arm has arrived is told right afterwards, and the page shows both.
+            wait(lambda: {"record.unwritable", "notice.arrived"} <= all_told(bench), "to be told of both")
             move_on(bench)
             assert all(file.stat().st_size for file in folder.glob("*.rcirun"))
     finally:
