@@ -11,6 +11,7 @@ import numpy as np
 from browser.page import BenchPage, close_toasts
 from rcilab.words.units import USUAL
 from rcilab.workbench import requests
+from rcilab.workbench.text import Text, message
 
 
 def test_the_language_changes_everywhere_and_back(page):
@@ -22,6 +23,21 @@ def test_the_language_changes_everywhere_and_back(page):
     page.tab.locator('[role="tab"][aria-selected="true"]', has_text="设置").wait_for()  # The tab stays open.
     choose(page, "语言", "English")
     page.tab.get_by_role("tab", name="Settings").wait_for()
+
+
+def test_a_warning_stays_beside_later_good_news_and_keeps_its_colour(page):
+    store, text = page.bench.store, Text("en")
+    said = message("record.unwritable", file="run.rcirun", why="cannot be written"), message("notice.arrived")
+    try:
+        for at, (tone, news) in enumerate(zip(("warn", "good"), said, strict=True)):
+            page.tab.evaluate(f"Date.now = () => {1e12 + 2000 * at}")
+            store.say(tone, news)
+            store.changed.set()
+            page.wait(lambda news=news: text.say(news) in page.toast(), "the notice")
+        assert text.say(said[0]) in page.toast()
+        assert "rl-warn" in page.tab.locator("#rl-toast.rl-shown").get_attribute("class")
+    finally:
+        page.tab.evaluate("Date.now = () => Math.floor(performance.timeOrigin + performance.now())")
 
 
 def test_another_arm_stands_there_without_a_restart(page):

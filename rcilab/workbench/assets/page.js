@@ -17,8 +17,10 @@
   const NARROWEST = 240;  // [px] of the scene that a notice is shown over; else it is shown at the window's lower edge.
   const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
   const TOGETHER = 1000;  // [ms] A choice: notices that come closer than this are shown together, at most three.
+  const WARNED = 3500;  // [ms] A warning stays beside later notices for so long: time to read it once.
+  const TONES = ["good", "warn", "bad"];  // From the mildest; notices shown together have the worst.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
-  let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0, lines = [], shownAt = 0;
+  let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0, lines = [];
 
   const send = (message) => {
     if (live && live.readyState === WebSocket.OPEN) { live.send(JSON.stringify(message)); return true; }
@@ -33,11 +35,11 @@
   const goHome = () => send({ kind: "home" });
 
   const show = (message) => {
-    const isLater = Date.now() - shownAt > TOGETHER || !toast.className;
-    lines = isLater ? [message.text] : [...lines.filter((line) => line !== message.text), message.text].slice(-3);
-    shownAt = Date.now();
-    toast.textContent = lines.join("\n");
-    toast.className = "rl-shown rl-" + message.tone;
+    const now = Date.now(), stays = (line) => now - line.at <= (TONES.indexOf(line.tone) > 0 ? WARNED : TOGETHER);
+    const kept = toast.className ? lines.filter((line) => line.text !== message.text && stays(line)) : [];
+    lines = [...kept, { text: message.text, tone: message.tone, at: now }].slice(-3);
+    toast.textContent = lines.map((line) => line.text).join("\n");
+    toast.className = "rl-shown rl-" + TONES[Math.max(...lines.map((line) => TONES.indexOf(line.tone)))];
     toast.dataset.serial = message.serial || "";
     place();
     clearTimeout(hideTimer);
