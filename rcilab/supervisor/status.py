@@ -57,7 +57,8 @@ MESSAGES: dict[str, str] = {
     "lost.rebooted": "{address} restarts; reconnect once it is up.",
     "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",
-    "crashed.controller": "The virtual controller has died ({how}); {next}.",
+    "crashed.controller": "The virtual controller has died ({how}); {next}. The arm is then at its wake-up pose, "
+    "motor power off.",
     "crashed.worker": "The control process has died ({how}); {next}.",
     "crashed.frozen": "The control process has not answered for {seconds:.1f} s; {next}.",
 }

@@ -38,6 +38,7 @@ __all__ = ["Supervisor", "Ticket"]
 
 VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
+_LOSS_LOOKS = 3  # Looks that have to find a connection lost before it is told; a choice, 0.06 s.
 
 
 class Supervisor(ArmRequests, Closing):
@@ -89,6 +90,7 @@ class Supervisor(ArmRequests, Closing):
         self._jogging: Ticket | None = None
         self._crash: tuple[str, str] | None = None
         self._incident: Incident | None = None
+        self._lost_looks = 0  # So many looks have found the connection lost.
         self._watcher: threading.Thread | None = None
         self._is_closing = threading.Event()
 
@@ -276,6 +278,7 @@ class Supervisor(ArmRequests, Closing):
                 self._block.words[Word.SUPERVISOR_BEAT] = time.monotonic_ns()
                 self._collect_replies()
                 self._bear_deaths()
+                self._look_for_loss()
                 if self._connecting is None and self._keeper.is_ready:
                     with suppress(UsageError):  # It died just now; the next look will tell.
                         self._connecting = self.reconnect()
@@ -297,6 +300,17 @@ class Supervisor(ArmRequests, Closing):
             if death.is_worker:
                 self._desk.fail_all(ConnectionLostError(death.message))
 
+    def _look_for_loss(self) -> None:
+        """Notes a connection that went while nobody had asked for anything, unless a death of ours explains it.
+
+        A controller's death is known a little later than the end of its connection: hence more looks than one.
+        """
+        shown = self._reader.read_snapshot()
+        is_lost = shown.code == "lost.unreachable" and self._crash is None and self._connecting is not None
+        self._lost_looks = self._lost_looks + 1 if is_lost else 0
+        if self._lost_looks == _LOSS_LOOKS:
+            self._note(shown.code, shown.message)
+
     def _judge(self, shown: Snapshot) -> tuple[Phase, str, str]:
         """Returns phase, code and message: what we know of the processes goes before what one of them says."""
         if self._is_closing.is_set():
@@ -315,6 +329,7 @@ class Supervisor(ArmRequests, Closing):
     def _note(self, code: str, message: str) -> None:
         number = 1 if self._incident is None else self._incident.number + 1
         self._incident = Incident(number=number, code=code, message=message)
+        self._lost_looks = _LOSS_LOOKS  # Once is enough.
 
     def _end_processes(self, reason: RcilabError) -> None:
         """Has the arm brought to rest, ends our processes, and fails what was under way."""

@@ -86,9 +86,12 @@ class Worker:
             print(granted.warning, file=sys.stderr, flush=True)
         try:
             while not (self._is_ending or self._is_orphan()):
-                self._listen()
-                self._serve()
-                self._mind_guiding()
+                try:
+                    self._listen()
+                    self._serve()
+                    self._mind_guiding()
+                except ConnectionLostError as error:  # It never ends this process, whatever was under way.
+                    self._lose(error)
         finally:
             self._disconnect()
         return 0
@@ -173,14 +176,18 @@ class Worker:
         if isinstance(error, StoppedError):
             pass  # Said already.
         elif isinstance(error, ConnectionLostError) or (request["kind"] == "connect" and self._link is None):
-            self._disconnect()
-            code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
-            self._publisher.say("lost", code, error=str(error))
+            self._lose(error)
         elif isinstance(error, ControlError) and error.faults:
             self._say_fault(error.faults)
         elif self._link is not None and self._guide is None:
             self._publisher.say("idle", "idle.failed", error=str(error))
         self._letters.answer(request, error)
+
+    def _lose(self, error: Exception) -> None:
+        """Gives the connection up and says why."""
+        self._disconnect()
+        code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
+        self._publisher.say("lost", code, error=str(error))
 
     def _do_connect(self, request: Letter) -> None:
         self._disconnect()
@@ -267,6 +274,8 @@ class Worker:
             return
         try:
             self._end_guiding("idle.operator", seconds=OPERATOR_TIMEOUT)
+        except ConnectionLostError:
+            raise
         except RcilabError as error:  # Whatever it was, the states that follow tell where the arm is.
             self._publisher.say("idle", "idle.failed", error=str(error))
 

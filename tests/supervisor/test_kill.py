@@ -80,6 +80,41 @@ def test_a_killed_controller_is_noticed_started_again_and_moves_again():
         assert np.abs(supervisor.status().q - GOAL).max() <= 1e-12
 
 
+@pytest.mark.parametrize("powered", [True, False])
+def test_a_controller_killed_while_the_arm_rests_is_named_and_the_control_process_lives_on(powered):
+    with running() as supervisor:
+        if not powered:
+            supervisor.power_off().wait(SOON)
+        before = supervisor.status()
+        os.kill(before.controller_pid, signal.SIGKILL)
+        wait_for(lambda: supervisor.status().incident)
+        status = wait_for_phase(supervisor, "idle")
+        assert (status.incident.number, status.incident.code) == (1, "crashed.controller")
+        assert "virtual controller has died (signal 9" in status.incident.message
+        assert "wake-up pose" in status.incident.message
+        assert "motor power off" in status.incident.message
+        assert status.worker_pid == before.worker_pid
+        assert status.powered is False
+        assert np.array_equal(status.q_c, MODEL.home)
+
+
+def test_a_controller_of_somebody_else_that_goes_while_the_arm_rests_is_lost():
+    controller = start_controller(MODEL.name)
+    try:
+        with running(controller.address) as supervisor:
+            before = supervisor.status()
+            controller.kill()
+            status = wait_for(lambda: s if (s := supervisor.status()).phase == "lost" else None)
+            assert "closed the connection" in status.message
+            incident = wait_for(lambda: supervisor.status().incident)
+            assert (incident.number, incident.code) == (1, "lost.unreachable")
+            with pytest.raises(ConnectionLostError, match="no robot at"):
+                supervisor.reconnect().wait(SOON)
+            assert supervisor.status().worker_pid == before.worker_pid
+    finally:
+        controller.end()
+
+
 def test_a_killed_control_process_is_noticed_and_started_again_and_the_arm_stops_within_its_limits():
     with recording_controller() as (address, setpoints), running(address, auto_restart=False) as supervisor:
         ticket = begin_moving(supervisor)

@@ -89,6 +89,22 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
     move_on(bench)
 
 
+def test_a_controller_killed_while_the_arm_rests_is_named_on_the_page_with_what_went_with_it(bench):
+    wait(lambda: is_ready(bench), "an idle arm")
+    before = bench.session.status()
+    os.kill(before.controller_pid, signal.SIGKILL)
+    wait(lambda: told(bench) == "incident.over.crashed.controller", "to be told that the trouble is over")
+    for language, words in (
+        ("en", ("virtual controller", "wake-up pose", "motor power")),
+        ("zh", ("虚拟控制器", "开机位姿", "电机")),
+    ):
+        said = Text(language).say(bench.store.state.notice.text)
+        assert all(word in said for word in words), said
+    assert bench.session.status().worker_pid == before.worker_pid
+    wait(lambda: is_ready(bench), "motor power")  # The words say that it comes back.
+    assert np.array_equal(bench.session.status().q_c, bench.store.state.model.home)
+
+
 def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
     with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
