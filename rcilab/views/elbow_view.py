@@ -124,13 +124,18 @@ def free_colors(psi: Array, dexterity: Array) -> Array:
         psi: Arm angles, [rad].
         dexterity: Smallest singular values at equally spaced arm angles from -pi on, shape (N,).
     """
+    good = free_goodness(psi, dexterity)[..., None]
+    return good * np.array(ARC_COLORS["free"], dtype=float) + (1.0 - good) * np.array(_AMBER, dtype=float)
+
+
+def free_goodness(psi: Array, dexterity: Array) -> Array:
+    """Returns how well the tool moves, from 0 (drawn amber) to 1 (blue-green), for arguments as of `free_colors`."""
     known = np.nan_to_num(dexterity)
     place = (psi + math.pi) / math.tau * len(known)
     low = np.floor(place).astype(np.intp)
     share = place - low
     value = (1.0 - share) * known[low % len(known)] + share * known[(low + 1) % len(known)]
-    good = np.clip((value - _POOR) / (_GOOD - _POOR), 0.0, 1.0)[..., None]
-    return good * np.array(ARC_COLORS["free"], dtype=float) + (1.0 - good) * np.array(_AMBER, dtype=float)
+    return np.clip((value - _POOR) / (_GOOD - _POOR), 0.0, 1.0)
 
 
 def _strokes(kind: str, start: float, end: float) -> list[tuple[float, float]]:

@@ -128,6 +128,21 @@ def test_a_stretched_arm_has_no_free_range_from_0_to_0(bench):
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
+def test_out_of_reach_the_ring_names_its_orange_and_the_pose_that_it_is_about(bench, language):
+    text = Text(language)
+    bench.aim(2.0, 0.0, 0.0)
+    bench.scene.tick()
+    elbow, goal = bench.state.scene.elbow, bench.state.goal
+    assert goal.reach.tone == "bad"
+    html = ring_html(elbow, text, is_nearest=True)
+    legend = html[html.index('<div class="rl-arcs">') :]
+    assert text("elbow.kind.near") in legend
+    assert "rl-arc-free" not in legend, "nothing of it is blue-green"
+    nearest = {"en": "nearest reachable pose", "zh": "最近的可达位姿"}[language]
+    assert nearest in legend
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
 def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, language):
     html = ring_html(bench.state.scene.elbow, Text(language))
     assert "url(#rl-arc-limits)" in html

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.views.elbow_view import ARC_COLORS, free_colors
+from rcilab.views.elbow_view import ARC_COLORS, free_colors, free_goodness
 from rcilab.workbench import requests
 from rcilab.workbench.goal.elbow import LOOKS, Elbow, say_why
 from rcilab.workbench.panels.jog import problems_html
@@ -27,7 +27,7 @@ class ElbowPanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
-        self._drawn: Elbow | None = None
+        self._drawn: tuple[Elbow | None, bool] | None = None
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -54,25 +54,36 @@ class ElbowPanel:
             is_deg = self._text.units.angle == "deg"
             self._psi.show(float(round(math.degrees(goal.psi))) if is_deg else round(goal.psi, 2))
             self._field.show(shown(math.degrees(goal.psi)), state.problems.get("psi"), state.entered)
-        if elbow is not self._drawn or elbow is None:
-            self._drawn = elbow
+        is_nearest = goal.reach.tone == "bad"
+        if (elbow, is_nearest) != self._drawn or elbow is None:
+            self._drawn = elbow, is_nearest
             self._ring.show(f'<p class="rl-note">{esc(self._text("elbow.none"))}</p>' if elbow is None
-                            else ring_html(elbow, self._text))  # fmt: skip
+                            else ring_html(elbow, self._text, is_nearest=is_nearest))  # fmt: skip
         said = problems_html(state, self._text, [("psi", "ψ")])
         if goal.snapped is not None:
             said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.say(goal.snapped))}</p>'
         self._said.show(said)
 
 
-def ring_html(elbow: Elbow, text: Text) -> str:
-    """Returns the ring from -180 to 180 degrees as a bar, a legend of what is in it, and what is free in words."""
+def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:
+    """Returns the ring from -180 to 180 degrees as a bar, a legend of what is in it, and what is free in words.
+
+    Args:
+        elbow: Where the elbow can go.
+        text: The page's words.
+        is_nearest: Whether that holds at the reachable pose nearest to the target, which itself is out of reach.
+    """
     parts: list[str] = []
+    kinds: list[str] = []
     for arc in elbow.arcs:
         title = esc(_title(arc.kind, arc.joints, text))
+        kinds += [arc.kind] if arc.kind != "free" else []
         for start, end in _unrolled(arc.start, arc.end):
             left, width = math.degrees(start) + 180.0, math.degrees(end - start)
             if arc.kind == "free":
-                parts += _shaded(start, end, elbow, title)
+                shaded, shades = _shaded(start, end, elbow, text)
+                parts += shaded
+                kinds += shades
             else:
                 height = _HEIGHT.get(arc.kind, 10)
                 fill = f"url(#rl-arc-{arc.kind})" if arc.kind != "other" else _css(ARC_COLORS["other"])
@@ -81,9 +92,10 @@ def ring_html(elbow: Elbow, text: Text) -> str:
                     f"<title>{title}</title></rect>"
                 )
     here = math.degrees(elbow.psi) + 180.0
-    kinds = list(dict.fromkeys(arc.kind for arc in elbow.arcs))
-    legend = "".join(f'<span class="rl-arc-{kind}">{esc(text(f"elbow.kind.{kind}"))}</span>' for kind in kinds)
-    words = _words(elbow, text)
+    legend = "".join(
+        f'<span class="rl-arc-{kind}">{esc(text(f"elbow.kind.{kind}"))}</span>' for kind in dict.fromkeys(kinds)
+    )
+    words = _words(elbow, text, is_nearest)
     return (
         f'<div class="rl-ring"><svg viewBox="0 0 360 14" preserveAspectRatio="none" role="img" '
         f'aria-label="{esc(words)}">{_PATTERNS}{"".join(parts)}</svg><i style="left:{here / 3.6:.2f}%"></i></div>'
@@ -91,26 +103,30 @@ def ring_html(elbow: Elbow, text: Text) -> str:
     )
 
 
-def _words(elbow: Elbow, text: Text) -> str:
+def _words(elbow: Elbow, text: Text, is_nearest: bool) -> str:
     """Returns the free ranges; those in which the elbow hardly moves are left out."""
     free = [arc for arc in elbow.arcs if arc.kind == "free"]
     wide = [arc for arc in free if arc.end - arc.start > _NARROW]
     if not wide:
         return text("elbow.stretched" if free else "elbow.nowhere")
-    return text("elbow.free", ranges=", ".join(_range(arc.start, arc.end, text) for arc in wide))
+    key = "elbow.free_nearest" if is_nearest else "elbow.free"
+    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in wide))
 
 
-def _shaded(start: float, end: float, elbow: Elbow, title: str) -> list[str]:
-    """Returns a free arc in pieces, from amber next to a singularity to blue-green."""
+def _shaded(start: float, end: float, elbow: Elbow, text: Text) -> tuple[list[str], list[str]]:
+    """Returns a free arc in pieces, from amber next to a singularity to blue-green, and what the legend calls each."""
     pieces = max(1, math.ceil((end - start) / math.tau * LOOKS))
     marks = np.linspace(start, end, pieces + 1)
-    colors = free_colors(0.5 * (marks[:-1] + marks[1:]), elbow.dexterity)
+    middles = 0.5 * (marks[:-1] + marks[1:])
+    colors = free_colors(middles, elbow.dexterity)
+    shades = np.where(free_goodness(middles, elbow.dexterity) < 0.5, "near", "free").tolist()
     width = math.degrees(end - start) / pieces
-    return [
+    drawn = [
         f'<rect x="{math.degrees(mark) + 180.0:.2f}" y="2" width="{width + 0.3:.2f}" height="10" fill="{_css(color)}">'
-        f"<title>{title}</title></rect>"
-        for mark, color in zip(marks[:-1].tolist(), colors.tolist(), strict=True)
+        f"<title>{esc(text(f'elbow.kind.{shade}'))}</title></rect>"
+        for mark, color, shade in zip(marks[:-1].tolist(), colors.tolist(), shades, strict=True)
     ]
+    return drawn, shades
 
 
 def _unrolled(start: float, end: float) -> list[tuple[float, float]]:
