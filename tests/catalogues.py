@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 
 def fields(entry: str) -> set[str]:
@@ -11,9 +11,7 @@ def fields(entry: str) -> set[str]:
     return {name for _, name, _, _ in string.Formatter().parse(entry) if name}
 
 
-def require_equal(
-    load: Callable[[str], Mapping[str, str]], languages: Iterable[str], may_be_blank: Collection[str] = ()
-) -> None:
+def require_equal(load: Callable[[str], Mapping[str, str]], languages: Iterable[str]) -> None:
     """Fails where a language lacks a key, has one too many, or fills other places than English."""
     english = load("en")
     for language in languages:
@@ -21,4 +19,4 @@ def require_equal(
         assert set(catalogue) == set(english), language
         for key, entry in catalogue.items():
             assert fields(entry) == fields(english[key]), f"{language}: {key}"
-            assert entry.strip() or key in may_be_blank, key
+            assert entry.strip(), key

@@ -188,7 +188,7 @@ def test_no_module_is_outside_the_layers() -> None:
 
 
 def test_importing_the_package_loads_no_heavy_library() -> None:
-    heavy = ["pinocchio", "coal", "mujoco", "viser", "ruckig", "matplotlib", "meshcat", "yourdfpy", "IPython"]
+    heavy = ["pinocchio", "coal", "mujoco", "viser", "ruckig", "matplotlib", "meshcat", "yourdfpy", "IPython", "babel"]
     code = f"import sys, rcilab; print(*[name for name in {heavy} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert result.stdout.split() == []

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rcilab.i18n import translator as text
+from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES, Language
-from rcilab.i18n.translator import Explains, Message, load_face, message
+from rcilab.i18n.translator import Explains, Message, message
 from rcilab.i18n.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
@@ -50,4 +51,4 @@ class Text(text.Text):
 
 def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all entries of one language that the page has."""
-    return load_face(_PAGE, language)
+    return load_ui_catalogue(_PAGE, language)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from functools import lru_cache
 from types import MappingProxyType
 
-from rcilab.i18n.locale import Language, load_words, require_language
+from rcilab.i18n import catalogue
+from rcilab.i18n.locale import Language, require_language
 from rcilab.robots import ROBOTS_BY_MAKER
 
 __all__ = ["Language", "Phrase", "load_catalogue", "say"]
@@ -46,4 +47,6 @@ def say(language: Language, key: str, **values: str) -> str:
 def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all sentences of one language by key: those of the engine, and of every maker on its faults and rows."""
     packages = ["rcilab.conformance", *(f"rcilab.makers.{maker}" for maker in ROBOTS_BY_MAKER)]
-    return MappingProxyType({key: text for package in packages for key, text in load_words(package, language).items()})
+    return MappingProxyType(
+        {key: text for package in packages for key, text in catalogue.load_catalogue(package, language).items()}
+    )

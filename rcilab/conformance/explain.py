@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING
 
 from rcilab.conformance.advice import amount, with_degrees
@@ -31,6 +32,10 @@ class _Voice:
 
     def say(self, key: str, **values: str) -> str:
         return say(self.language, key, **values)
+
+    def join(self, *sentences: str) -> str:
+        """Returns sentences one after the other."""
+        return reduce(lambda first, second: self.say("sentences", first=first, second=second), sentences)
 
 
 def explain_report(
@@ -70,7 +75,7 @@ def explain_violation(violation: Violation, language: Language = "en", units: Un
     advice = violation.advice.text(language) if isinstance(violation.advice, Phrase) else violation.advice
     if units is not None:
         advice = units.restate(advice)
-    return voice.say("gap").join((*sentences, voice.say("remedy", advice=advice)))
+    return voice.join(*sentences, voice.say("remedy", advice=advice))
 
 
 def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
@@ -103,7 +108,7 @@ def explain_slow_down(result: SlowDown, language: Language = "en") -> str:
     if not result.unmet:
         return text
     names = say(language, "comma").join(explain_quantity(row, voice.language) for row in result.unmet)
-    return say(language, "gap").join((text, say(language, "slow_down.warned", at_most=at_most, quantities=names)))
+    return voice.join(text, voice.say("slow_down.warned", at_most=at_most, quantities=names))
 
 
 def explain_verdict(report: Report, language: Language = "en", units: Units | None = None) -> str:
@@ -121,7 +126,7 @@ def explain_verdict(report: Report, language: Language = "en", units: Units | No
         parts = [voice.say("verdict.ok"), _nearest(report.worst, voice)]
     if report.warnings:
         parts.append(voice.say("verdict.warned", count=str(len(report.warnings))))
-    return voice.say("gap").join(parts)
+    return voice.join(*parts)
 
 
 def _nearest(row: ConditionResult, voice: _Voice) -> str:

@@ -1,11 +1,8 @@
-"""The languages people are spoken to in, and the catalogues of words that parts of the package bring along."""
+"""The languages of the user interfaces."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from functools import lru_cache
-from importlib.resources import files
 from types import MappingProxyType
 from typing import Literal, TypeAlias, cast
 
@@ -27,10 +24,3 @@ def require_language(language: str) -> Language:
     if language not in LANGUAGES:
         raise InvalidValueError("language", language, f"is unknown; known: {', '.join(LANGUAGES)}")
     return cast(Language, language)
-
-
-@lru_cache
-def load_words(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all entries of one language by key: `catalogues/LANGUAGE.json` of a package, such as rcilab.app."""
-    path = files(package) / "catalogues" / f"{language}.json"
-    return MappingProxyType(json.loads(path.read_text(encoding="utf-8")))

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
 
-from rcilab.i18n.locale import Language, load_words, require_language
+from rcilab.i18n.catalogue import load_ui_catalogue
+from rcilab.i18n.locale import Language, require_language
 from rcilab.i18n.units import USUAL, Units
 
 _STOPS = (".", "。")
-SHARED = "rcilab.i18n"
-"""Whose catalogue every face has."""
 
 
 @runtime_checkable
@@ -124,7 +122,7 @@ class Text:
     def __init__(self, language: str, package: str) -> None:
         self.language: Language = require_language(language)
         self.units: Units = USUAL
-        self._entries = load_face(package, self.language)
+        self._entries = load_ui_catalogue(package, self.language)
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
@@ -157,9 +155,3 @@ class Text:
 
     def _explain(self, said: Explains) -> str:
         return said.explain(self.language)
-
-
-@lru_cache
-def load_face(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all entries of one language that a face of the program has: the shared ones and its own."""
-    return MappingProxyType({**load_words(SHARED, language), **load_words(package, language)})

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.i18n.locale import load_words
+from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.i18n.units import plain_number
 from rcilab.recording.html_facts import fact_rows
@@ -106,7 +106,7 @@ class _Packed:
 
 def _words(run: Run, text: Text) -> dict[str, str]:
     """Returns the words of the page; a run without a plan is compared with its commands, and they say so."""
-    words = dict(load_words("rcilab.recording", text.language))
+    words = dict(load_catalogue("rcilab.recording", text.language))
     if run.plan is None:
         words |= {name: words[f"{name}_commanded"] for name in ("path", "table.title")}
     return words

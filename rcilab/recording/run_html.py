@@ -8,7 +8,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from rcilab.core.fault import name_faults
-from rcilab.i18n.locale import load_words, require_language
+from rcilab.i18n.catalogue import load_catalogue
+from rcilab.i18n.locale import require_language
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -26,7 +27,7 @@ def run_html(run: Run, language: str = "en") -> str:
     Raises:
         InvalidValueError: There is no such language.
     """
-    words, timing = load_words("rcilab.recording", require_language(language)), run.timing
+    words, timing = load_catalogue("rcilab.recording", require_language(language)), run.timing
     ended = words["card.fault" if run.faults else "card.goal"]
     if run.stopped:
         ended = words.get(f"stop.{run.stopped}", run.stopped)

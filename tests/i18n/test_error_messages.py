@@ -14,8 +14,9 @@ import pytest
 import rcilab
 from rcilab.control_process.messages import as_sendable
 from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
+from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.error_messages import _ADVISING, tell, tell_note
-from rcilab.i18n.locale import LANGUAGES, load_words
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Finished, Message, Remark, Text
 from rcilab.makers.rokae.wire import GuideStatus, RecoveryStatus, SettingStatus, StartStatus, StopStatus
 
@@ -37,7 +38,7 @@ def test_every_code_has_words_and_whatever_fills_them():
     used = list(coded())
     assert len(used) > 70
     for language in LANGUAGES:
-        words = load_words("rcilab.i18n", language)
+        words = load_catalogue("rcilab.i18n", language)
         known = {key.removeprefix("error.") for key in words if key.startswith("error.")}
         assert {code for code, _ in used} == known
         for code, facts in used:
@@ -60,7 +61,7 @@ def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
 @pytest.mark.parametrize("about", ["waypoint_error", "way_error"])
 def test_all_that_advises_has_its_words_for_programs_too(about):
     for language in LANGUAGES:
-        words = load_words("rcilab.i18n", language)
+        words = load_catalogue("rcilab.i18n", language)
         found = {key.removeprefix(f"{about}.") for key in words if key.startswith(f"{about}.")}
         assert found == _ADVISING
         for code in found:
@@ -69,7 +70,7 @@ def test_all_that_advises_has_its_words_for_programs_too(about):
 
 @pytest.mark.parametrize("kind", [SettingStatus, StartStatus, StopStatus, RecoveryStatus, GuideStatus])
 def test_every_refusal_has_words(kind):
-    words = load_words("rcilab.i18n", "zh")
+    words = load_catalogue("rcilab.i18n", "zh")
     for status in kind:
         if status:
             said = tell(CommandRejectedError("StartMove", status))
@@ -100,7 +101,7 @@ def test_a_note_keeps_its_words_in_a_file_of_its_own():
     assert isinstance(said, Message)
     assert said.values["radius"] == "10.0"
     assert set(said.values) == {
-        name for _, name, _, _ in Formatter().parse(load_words("rcilab.i18n", "en")[said.code]) if name
+        name for _, name, _, _ in Formatter().parse(load_catalogue("rcilab.i18n", "en")[said.code]) if name
     }
     assert tell_note("plain") == Finished("plain")
 

@@ -14,8 +14,8 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.app.fault_lab import FaultDemo
+from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES
-from rcilab.i18n.translator import load_face
 from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.processes import processes
@@ -111,4 +111,4 @@ def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
 
 def test_every_fault_has_a_short_name_in_both_languages() -> None:
     for language in LANGUAGES:
-        assert {f"learn.fault.{fault.name}" for fault in Fault} <= load_face("rcilab.notebook", language).keys()
+        assert {f"learn.fault.{fault.name}" for fault in Fault} <= load_ui_catalogue("rcilab.notebook", language).keys()

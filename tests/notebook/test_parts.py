@@ -19,8 +19,8 @@ import rcilab.notebook
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetLaw
 from rcilab.core.errors import InvalidValueError, UsageError
-from rcilab.i18n.locale import LANGUAGES, load_words
-from rcilab.i18n.translator import load_face
+from rcilab.i18n.catalogue import load_catalogue, load_ui_catalogue
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.catalogues import require_equal
 from tests.waiting import wait_for
@@ -52,9 +52,9 @@ def text_of(widget: Any) -> str:
 
 
 def test_both_languages_say_the_same_things() -> None:
-    require_equal(lambda language: load_words("rcilab.notebook", language), LANGUAGES)
+    require_equal(lambda language: load_catalogue("rcilab.notebook", language), LANGUAGES)
     for language in LANGUAGES:
-        own, shared = (load_words(package, language).keys() for package in ("rcilab.notebook", "rcilab.i18n"))
+        own, shared = (load_catalogue(package, language).keys() for package in ("rcilab.notebook", "rcilab.i18n"))
         assert not own & shared
 
 
@@ -63,7 +63,7 @@ def test_every_key_in_the_code_has_words() -> None:
     pattern = r"""(?:\btext|message|_button)\(\s*["']([a-z_]+\.[a-z_.]+)["']"""
     written = {key for path in sources for key in re.findall(pattern, path.read_text(encoding="utf-8"))}
     assert len(written) > 60
-    assert sorted(written - load_face("rcilab.notebook", "en").keys()) == []
+    assert sorted(written - load_ui_catalogue("rcilab.notebook", "en").keys()) == []
 
 
 def test_the_names_of_the_architecture_are_there() -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rcilab.i18n.locale import Language, load_words, require_language
+from rcilab.i18n import catalogue
+from rcilab.i18n.locale import Language, require_language
 
 
 def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all sentences of one language, by key."""
-    return load_words("rcilab.app.fault_lab", language)
+    return catalogue.load_catalogue("rcilab.app.fault_lab", language)
 
 
 def say(language: Language, key: str, **values: str) -> str:
