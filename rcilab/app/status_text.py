@@ -1,19 +1,35 @@
-"""What errors, incidents and states of the library are called on the page: see `control_process.status_messages`."""
+"""The messages of page and notebook for errors, incidents and states: what happened and which button to press.
+
+The sentences of the library are English and name Python calls. Page and notebook have texts of their own for these
+keys, because their buttons differ.
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.app.text import Message, message
-from rcilab.control_process import status_messages as telling
-from rcilab.control_process.status_messages import phase_code, tell_incident, tell_status
-from rcilab.core.errors import RcilabError, UsageError
+from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT
+from rcilab.core.errors import (
+    CertificateError,
+    ConnectionLostError,
+    ControlError,
+    InvalidValueError,
+    RcilabError,
+    UsageError,
+)
 from rcilab.core.fault import name_faults
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Finished, Message, message
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
-__all__ = ["StartingError", "name_faults", "phase_code", "tell_error", "tell_incident", "tell_status"]
+_CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
+_PHASES = {
+    **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
+}  # fmt: skip
+"""States that have a text of their own instead of that of their phase."""
+_LOST = ("lost.silent", "lost.unreachable", "lost.other_arm", "lost.rebooted")
 
 
 class StartingError(UsageError):
@@ -21,7 +37,7 @@ class StartingError(UsageError):
 
 
 def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Message:
-    """Returns the sentence of the page for an error.
+    """Returns the sentence for an error.
 
     Args:
         error: What went wrong.
@@ -29,4 +45,63 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
     """
     if isinstance(error, StartingError):
         return message("ready.starting")
-    return telling.tell_error(error, status)
+    if isinstance(error, ControlError) and error.faults and not error.code:
+        return message("notice.fault", faults=name_faults(error.faults))
+    if isinstance(error, InvalidValueError) and error.name == "address":
+        return message("address.bad", typed=str(error.value))
+    if isinstance(error, CertificateError):
+        return message("notice.stale")
+    if isinstance(error, ConnectionLostError) and status is not None:
+        known = status.code in (*_CRASHES, *_LOST) or status.incident is None
+        return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
+    return message("notice.error", text=tell(error))
+
+
+def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
+    """Returns the sentence for an incident of the supervisor."""
+    if code == "fault.pressed":
+        return message("ready.pressed")
+    if code == "fault":
+        return message("notice.fault", faults=name_faults(status.faults))
+    if code in _CRASHES or code in _LOST:
+        return _tell_loss(code, status)
+    return message("notice.plain", text=Finished(sentence))
+
+
+def tell_status(status: SupervisorStatus) -> Message:
+    """Returns what the robot side is doing, in one sentence."""
+    if status.code == "fault.pressed":
+        return message("ready.pressed")
+    if status.code == "fault":
+        return message("ready.fault_of", faults=name_faults(status.faults))
+    if status.code in _CRASHES or status.code in _LOST:
+        return _tell_loss(status.code, status)
+    return message(phase_code(status))
+
+
+def tell_success(status: SupervisorStatus) -> Message:
+    """Returns the share of commands in time; the controller keeps that of the last motion until the next one."""
+    code = "health.success_now" if status.phase in ("moving", "stopping") else "health.success_last"
+    return message(code, share=f"{100.0 * status.success_rate:.1f}")
+
+
+def phase_code(status: SupervisorStatus) -> str:
+    """Returns the key of the two or three words for what the robot side is doing."""
+    if status.phase == "idle" and status.is_pressed:
+        return "phase.pressed"
+    if status.phase == "idle" and status.powered is False:
+        return "phase.unpowered"
+    return _PHASES.get(status.code, f"phase.{status.phase}")
+
+
+def _tell_loss(code: str, status: SupervisorStatus) -> Message:
+    """Returns what has gone, of whom, and what to press; a lost connection to our own controller names no cable."""
+    if code in _CRASHES:
+        pid = status.controller_pid if code == "crashed.controller" else status.worker_pid
+        return message(f"incident.{code}", next=message("incident.again" if pid is not None else "incident.press"))
+    if code == "lost.other_arm":
+        return message("incident.lost.other_arm", address=status.target)
+    if status.target == "virtual":
+        return message("incident.lost.virtual")
+    known = code if code in _LOST else "lost.unreachable"
+    return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")

@@ -12,7 +12,7 @@ from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.fault_lab.table import FAULTS
-from rcilab.control_process.status_messages import tell_error
+from rcilab.app.status_text import tell_error
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Text, message

@@ -34,7 +34,7 @@ def lab_command(
     require_lab(allow_root=allow_root)
     if not directory.is_dir():
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
-    command = [sys.executable, "-m", "rcilab.notebook.quick_lab", str(directory), "--ServerApp.ip=127.0.0.1"]
+    command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
     command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
     if (directory / INDEX).is_file():
         command.append(f"--LabApp.default_url=/lab/tree/{INDEX}")  # Our settings show it as a page, not as its source.

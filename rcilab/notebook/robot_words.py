@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
 from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.status_messages import phase_code, tell_error, tell_status, tell_success
 from rcilab.core.errors import ModelError, RcilabError
 from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots

@@ -9,8 +9,8 @@ from typing import Any
 import ipywidgets
 
 from rcilab.app.run.mode_actions import ModeActions, SetDrive
+from rcilab.app.run.requested_speed import is_running
 from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.requested_speed import is_running
 from rcilab.i18n.translator import Text
 from rcilab.motion.speed_scaling import SLOWEST_PACE
 from rcilab.notebook.number_field import NumberField

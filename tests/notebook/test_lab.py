@@ -2,12 +2,10 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from rcilab.core.errors import UsageError
-from rcilab.notebook import quick_lab
 from rcilab.notebook.lab import lab_command
 
 
@@ -27,14 +25,7 @@ def test_each_directory_has_open_tabs_of_its_own(tmp_path: Path) -> None:
     assert kept(tmp_path) == kept(tmp_path / "a" / "..") != kept(tmp_path / "a")
 
 
-def test_jupyterlab_builds_no_grammar_of_addresses_and_asks_yarn_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    commands, labapp = ModuleType("jupyterlab.commands"), ModuleType("jupyterlab.labapp")
-    package = ModuleType("jupyterlab")
-    package.commands = commands  # type: ignore[attr-defined]
-    labapp.main = lambda: (sys.modules["rfc3987_syntax"], commands._yarn_config(None))  # type: ignore[attr-defined]
-    for module in (package, commands, labapp):
-        monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.delitem(sys.modules, "rfc3987_syntax", raising=False)
-    grammar, yarn = quick_lab.main()
-    assert grammar is None
-    assert yarn == {"yarn config": {}, "npm config": {}}
+def test_jupyterlab_itself_is_started_without_asking_for_extensions(tmp_path: Path) -> None:
+    command = lab_command(tmp_path, allow_root=True)
+    assert command[:4] == [sys.executable, "-m", "jupyterlab", str(tmp_path)]
+    assert "--LabApp.extension_manager=readonly" in command

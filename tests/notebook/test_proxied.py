@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from tornado.httpclient import HTTPRequest
 
 
-QUICK = "import sys; sys.modules['rfc3987_syntax'] = None; from jupyter_server.serverapp import main; main()"
-"""As `rcilab.notebook.quick_lab` starts JupyterLab."""
 UNUSED = ("jupyter_lsp", "jupyter_server_terminals", "jupyterlab", "notebook_shim")
 
 
@@ -36,7 +34,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]
     (folder / "config").mkdir()
     chosen = {"ServerApp": {"jpserver_extensions": dict.fromkeys(UNUSED, False)}}
     (folder / "config" / "jupyter_server_config.json").write_text(json.dumps(chosen), encoding="utf-8")
-    command = [sys.executable, "-c", QUICK, "--ServerApp.ip=127.0.0.1", "--ServerApp.port=0"]
+    command = [sys.executable, "-m", "jupyter_server", "--ServerApp.ip=127.0.0.1", "--ServerApp.port=0"]
     with serving([*command, "--ServerApp.base_url=/arm/", f"--ServerApp.root_dir={folder}"], folder) as told:
         yield {**told, "runtime": str(folder / "runtime")}
 

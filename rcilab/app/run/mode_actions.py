@@ -12,10 +12,10 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
 from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
 from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
-from rcilab.control_process.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.run.world_state import NETWORK_LAB
+from rcilab.app.status_text import tell_success
 from rcilab.app.text import Text
-from rcilab.control_process.status_messages import tell_success
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import tell_note
 from rcilab.sim.api import DIRECTIONS

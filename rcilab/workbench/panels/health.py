@@ -6,8 +6,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.status_text import tell_success
 from rcilab.app.text import Text
-from rcilab.control_process.status_messages import tell_success
 from rcilab.workbench.widgets import Ask, Html, esc
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from rcilab.app.run.requested_speed import RequestedSpeed, tell_pace_refusal
 from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.requested_speed import RequestedSpeed, tell_pace_refusal
 from rcilab.core.errors import ConnectionLostError, PlanningError
 
 IDLE = SupervisorStatus(phase="idle", code="idle")

@@ -1,4 +1,4 @@
-"""A pace between the controls and the robot: handed over once the last change was taken."""
+"""A speed override between the controls and the robot: sent once the last change was accepted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _SAME_PACE = 1e-3
 
 
 class RequestedSpeed:
-    """The part of its planned speed that somebody wants a motion to run at; of a slider's many only the newest counts.
+    """The speed override that the operator wants for a motion; of a slider's many values only the newest counts.
 
     Used by one thread, or under a lock.
     """
@@ -23,24 +23,24 @@ class RequestedSpeed:
         self._wish: float | None = None
 
     def choose(self, pace: float, status: SupervisorStatus | None) -> None:
-        """Wants a pace for the motion under way; one that is held keeps waiting."""
+        """Requests a speed override for the motion in progress; a motion that is held stays held."""
         if is_running(status) and status is not None and status.code == "moving":
             self._wish = pace
 
     def hold(self) -> None:
-        """Wants the motion to be held."""
+        """Requests that the motion is held."""
         self._wish = 0.0
 
     def go_on(self, pace: float) -> None:
-        """Wants a motion that is held to go on at a pace."""
+        """Requests that a motion that is held continues with a speed override."""
         self._wish = pace
 
     def due(self, status: SupervisorStatus, *, is_under_way: bool) -> float | None:
-        """Returns the pace that the robot is to be asked for now, if any; to be called several times a second.
+        """Returns the speed override to send to the robot now, if any; call it several times a second.
 
         Args:
-            status: How the robot stands.
-            is_under_way: Whether the last change has not been taken yet; what is wanted meanwhile waits.
+            status: Of the robot.
+            is_under_way: Whether the last change is not accepted yet; a newer value waits.
         """
         if is_under_way:
             return None
@@ -48,22 +48,22 @@ class RequestedSpeed:
         return None if wish is None or not is_running(status) or abs(wish - status.pace) < _SAME_PACE else wish
 
     def forget(self) -> None:
-        """Wants nothing any more: another robot comes."""
+        """Drops the value: another robot is connected."""
         self._wish = None
 
 
 def is_running(status: SupervisorStatus | None) -> bool:
-    """Returns whether a motion is under way whose pace can change."""
+    """Returns whether a motion is in progress whose speed override can change."""
     return status is not None and status.code in ("moving", "moving.held") and status.motion_duration is not None
 
 
 def tell_pace_refusal(error: RcilabError, pace: float, status: SupervisorStatus | None) -> Message | None:
-    """Returns why a motion goes on as it is; None where it has ended meanwhile.
+    """Returns why a motion continues unchanged; None if it has ended meanwhile.
 
     Args:
-        error: What the change came to.
-        pace: What was wanted; 0 is to be held.
-        status: How the robot stands.
+        error: Why the change failed.
+        pace: The requested speed override; 0 holds the motion.
+        status: Of the robot.
     """
     if isinstance(error, PlanningError):
         return message("pace.no_pause" if pace == 0.0 else "pace.no_change")
