@@ -37,6 +37,7 @@ from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
 from rcilab.core.errors import RcilabError
+from rcilab.core.memory import memory_needed
 
 _TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot is looked at.
 _AGAIN = 1.0  # [s] A choice: a page that acts without the controls is told so once in that time.
@@ -236,17 +237,23 @@ class Dispatcher:
             now = time.monotonic()
             if now - last >= _TICK:
                 elapsed, last = now - last, now
-                self._guard(lambda elapsed=elapsed: self.tick(elapsed))
+                self._guard(lambda elapsed=elapsed: self.tick(elapsed), trouble="tick")
                 self._store.changed.set()
 
-    def _guard(self, action: Callable[[], None]) -> None:
+    def _guard(self, action: Callable[[], None], trouble: str = "") -> None:
+        """Shows what goes wrong with an action; with a `trouble`, once until the action succeeds again."""
         try:
-            action()
+            with memory_needed():
+                action()
         except RcilabError as error:
-            self._store.say("bad", tell_error(error))
+            if not trouble or all(notice.trouble != trouble for notice in self._store.state.notices):
+                self._store.say("bad", tell_error(error), trouble=trouble)
         except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
             if self.errors.report(error):
                 self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+        else:
+            if trouble:
+                self._store.settle(trouble)
 
 
 def _is_stop(request: Request) -> bool:

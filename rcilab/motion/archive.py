@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from math import prod
 from tokenize import TokenError
-from typing import IO
+from typing import IO, TypeAlias
 from zipfile import BadZipFile, ZipFile
 
 import numpy as np
@@ -25,7 +26,17 @@ _DAMAGE = (
 """What numpy and those it reads with raise on foreign or damaged bytes; a mistake in the code is none of them."""
 
 
-def read_arrays(content: bytes, what: str, name: str, problem: str, max_rows: int) -> dict[str, np.ndarray]:
+Shapes: TypeAlias = Mapping[str, tuple[int, ...]]
+
+
+def read_arrays(
+    content: bytes,
+    what: str,
+    name: str,
+    problem: str,
+    max_rows: int,
+    require_shapes: Callable[[Shapes], None] = lambda shapes: None,
+) -> dict[str, np.ndarray]:
     """Returns the arrays in the bytes of an .npz or .npy, by name.
 
     Args:
@@ -34,15 +45,18 @@ def read_arrays(content: bytes, what: str, name: str, problem: str, max_rows: in
         name: The file's name.
         problem: What the error says of it.
         max_rows: How much there may be in it, as of `file_bounds`.
+        require_shapes: Called with the arrays' shapes by name before anything is unpacked; raises where they do not
+            fit.
 
     Raises:
         InvalidValueError: The bytes are damaged, something else, too many unpacked, or hold objects of Python's.
     """
     try:
-        size = _unpacked_size(content)
+        size, shapes = _read_headers(content)
     except (*_DAMAGE, MemoryError) as error:  # Of the parser, on a header with too many brackets.
         raise InvalidValueError(what, name, problem) from error
     require_bytes(size, max_rows, what, name)
+    require_shapes(shapes)
     try:
         archive = np.load(BytesIO(content), allow_pickle=False)
         if isinstance(archive, np.ndarray):
@@ -53,21 +67,24 @@ def read_arrays(content: bytes, what: str, name: str, problem: str, max_rows: in
         raise InvalidValueError(what, name, problem) from error
 
 
-def _unpacked_size(content: bytes) -> int:
-    """Returns what the arrays will take, [bytes], by the headers of archive and arrays."""
+def _read_headers(content: bytes) -> tuple[int, Shapes]:
+    """Returns what the arrays will take, [bytes], and their shapes, by the headers of archive and arrays."""
     if not content.startswith(b"PK"):
-        return _array_size(BytesIO(content))
-    size = 0
+        size, shape = _read_header(BytesIO(content))
+        return size, {SINGLE_ARRAY: shape}
+    total, shapes = 0, dict[str, tuple[int, ...]]()
     with ZipFile(BytesIO(content)) as archive:
         for member in archive.infolist():
             with archive.open(member) as stream:
-                size += max(member.file_size, _array_size(stream))
-    return size
+                size, shape = _read_header(stream)
+            total += max(member.file_size, size)
+            shapes[member.filename.removesuffix(".npy")] = shape
+    return total, shapes
 
 
-def _array_size(stream: IO[bytes]) -> int:
-    """Returns what an array takes by its own header, [bytes]; 0 for what is none, which numpy will refuse."""
+def _read_header(stream: IO[bytes]) -> tuple[int, tuple[int, ...]]:
+    """Returns what an array takes by its own header, [bytes], and its shape."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(stream)
-    return prod(shape) * dtype.itemsize
+    return prod(shape) * dtype.itemsize, shape

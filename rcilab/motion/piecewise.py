@@ -17,6 +17,19 @@ DERIVATIVES = 4
 _SAME_BREAK = 1e-11  # [s] Breaks of two joints closer than this are one; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
 
 
+def require_piece_shapes(breaks: tuple[int, ...], coefficients: tuple[int, ...]) -> None:
+    """Refuses shapes of breaks and coefficients that do not fit together.
+
+    Raises:
+        InvalidValueError: They do not.
+    """
+    if len(breaks) != 1 or breaks[0] < 2 or len(coefficients) != 3 or coefficients[0] != breaks[0] - 1:
+        shapes = f"breaks of shape {breaks}, coefficients of shape {coefficients}"
+        raise InvalidValueError("polynomial pieces", shapes, "must have shapes (S + 1,) and (S, n, k)")
+    if coefficients[1] < 1 or coefficients[2] < 1:
+        raise InvalidValueError("coefficients", f"array of shape {coefficients}", "need a joint and a power")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewisePolynomial:
     """Joint angles over time: S polynomial pieces for n joints, powers of the time since each piece began.
@@ -39,11 +52,7 @@ class PiecewisePolynomial:
 
     def __post_init__(self) -> None:
         breaks, coefficients = readonly_copy(self.breaks), readonly_copy(self.coefficients)
-        if breaks.ndim != 1 or breaks.size < 2 or coefficients.ndim != 3 or coefficients.shape[0] != breaks.size - 1:
-            shapes = f"breaks of shape {breaks.shape}, coefficients of shape {coefficients.shape}"
-            raise InvalidValueError("polynomial pieces", shapes, "must have shapes (S + 1,) and (S, n, k)")
-        if coefficients.shape[1] < 1 or coefficients.shape[2] < 1:
-            raise InvalidValueError("coefficients", f"array of shape {coefficients.shape}", "need a joint and a power")
+        require_piece_shapes(breaks.shape, coefficients.shape)
         if not np.isfinite(breaks).all() or not np.isfinite(coefficients).all():
             raise InvalidValueError("polynomial pieces", "breaks, coefficients", "must be finite in every element")
         if breaks[0] != 0.0 or (breaks[1:] < breaks[:-1]).any():

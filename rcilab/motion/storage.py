@@ -16,8 +16,8 @@ from rcilab.core.atomic_file import read_whole, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
-from rcilab.motion.archive import read_arrays
-from rcilab.motion.piecewise import PiecewisePolynomial
+from rcilab.motion.archive import Shapes, read_arrays
+from rcilab.motion.piecewise import PiecewisePolynomial, require_piece_shapes
 
 M = TypeVar("M", bound=Sized)
 
@@ -130,7 +130,20 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dic
         raise InvalidValueError("motion file", name, "cannot be read as a motion: Motion.save did not write it")
     problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
     require_bytes(len(content), max_rows, "motion file", name)
-    return read_arrays(content, "motion file", name, problem, max_rows)
+    return read_arrays(content, "motion file", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name))
+
+
+def _require_shapes(shapes: Shapes, name: str) -> None:
+    """Refuses arrays that do not fit together; one that is missing is reported once the others are read."""
+    breaks, coefficients, goal = (shapes.get(key) for key in ("breaks", "coefficients", "goal"))
+    if breaks is None or coefficients is None:
+        return
+    try:
+        require_piece_shapes(breaks, coefficients)
+        if goal is not None and goal != coefficients[1:2]:
+            raise InvalidValueError("goal", f"array of shape {goal}", f"needs {coefficients[1]} joints")
+    except InvalidValueError as error:
+        raise InvalidValueError("motion file", name, f"holds a damaged motion: {error}") from error
 
 
 def _require_stream(file: object, method: str) -> None:

@@ -57,14 +57,21 @@ def broad(path: Path) -> Path:
 
 def within(path: Path) -> Path:
     """Coefficients of 0.9 GB, zeros: below what a file may hold, and above what there is room for."""
+    return archive(path, pieces=4_000_000, order=4, breaks=4_000_001)
+
+
+def unfit(path: Path) -> Path:
+    """As many bytes, of which the headers alone say that they do not fit together."""
     return archive(path, pieces=4_000_000, order=4)
 
 
-def archive(path: Path, pieces: int = 1_300_000, order: int = 18) -> Path:
+def archive(path: Path, pieces: int = 1_300_000, order: int = 18, breaks: int | None = None) -> Path:
     """Coefficients of 1.3 GB, zeros, in 1.3 MB."""
     motion = rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
     motion.save(path)
     parts = dict(np.load(path))
+    if breaks is not None:
+        parts["breaks"] = np.zeros(breaks)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
         for name, array in parts.items():
             with file.open(f"{name}.npy", "w", force_zip64=True) as stream:
@@ -127,6 +134,7 @@ CHECK = ("check", "--model", "xMatePro7")
         ),
         (broad, "a.rcirun", ("replay", "--no-browser", "--port", "0"), "a cycle takes 4096 bytes"),
         (within, "a.npz", CHECK, "not enough free memory"),
+        (unfit, "a.npz", CHECK, "must have shapes (S + 1,) and (S, n, k)"),
         (archive, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
         (header, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
         (slow, "a.npz", CHECK, "rows of 1 ms are more than 1000000"),

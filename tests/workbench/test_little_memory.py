@@ -87,3 +87,27 @@ def test_a_supervisor_without_a_thread_to_watch_leaves_no_process(monkeypatch) -
         supervisor.start()
     status = supervisor.status()
     assert (status.phase, status.worker_pid, status.controller_pid) == ("closed", None, None)
+
+
+@pytest.mark.parametrize("name", ["held push", "world watch"])
+def test_a_thread_for_the_world_port_is_started_once_there_is_memory(monkeypatch, capfd, name) -> None:
+    start, refused = threading.Thread.start, threading.Event()
+
+    def refuse(thread: threading.Thread) -> None:
+        if thread.name == name:
+            refused.set()
+            raise ERRORS[1]
+        start(thread)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", refuse)
+        with Workbench(WorkbenchConfig(port=0, quality="light")) as bench:
+            wait(refused.is_set, "a thread to be refused")
+            wait(lambda: told(bench) == "notice.error", "to be told")
+            assert bench.store.state.notice.text.values["text"].code == "error.starved"
+            assert sum(notice.trouble == "tick" for notice in bench.store.state.notices) == 1
+            patch.undo()
+            wait(lambda: any(thread.name == name for thread in threading.enumerate()), "the thread")
+            wait(lambda: all(notice.trouble != "tick" for notice in bench.store.state.notices), "the notice to go")
+            assert bench.conductor.errors == []
+    assert "Traceback" not in capfd.readouterr().err

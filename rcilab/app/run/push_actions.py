@@ -195,8 +195,9 @@ class PushActions:
         if self._push is not None:
             self._push.release()
             self._push.close()
-        self._push, self._address = None, address
+        self._push = self._address = None
         self._grip = self._button = None
         if address is not None:
             host, _, port = address.partition(":")
             self._push = ExternalForceHold(SimulationControl(host, int(port)))
+        self._address = address

@@ -113,10 +113,11 @@ class WorldActions:
         address = status.world_address
         if address != self._address:
             self.close()
-            self._address = address
+            self._address = None
             if address is not None:
                 host, _, port = address.partition(":")
                 self._watch = SimulationStatusPoller(SimulationControl(host, int(port)))
+            self._address = address
             self._store.update(world=WorldState())
         if self._watch is None:
             return
