@@ -242,7 +242,8 @@ class JitterBuffer:
             return
         ahead = played - last
         self._surplus = self._surplus + 1 if ahead == 0 else 0
-        self._passed_over = {i for i in self._passed_over if 0 < played - i <= LONGEST_GAP}
+        if self._passed_over:
+            self._passed_over = {i for i in self._passed_over if 0 < played - i <= LONGEST_GAP}
         if 1 < ahead <= LONGEST_GAP:
             self._passed_over.update(range(last + 1, played))
         self._last_id = played

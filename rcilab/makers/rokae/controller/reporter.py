@@ -156,8 +156,10 @@ class StateReporter:
     def _in_force_frame(self, wrench: Array, tool: ToolKinematics, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
         self._axes.follow(velocity, tool.pose)
+        if self._is_wrench_at_tool:
+            return wrench
         fx, fy, fz, mx, my, mz = wrench.tolist()
-        if self._is_wrench_at_tool or not (fx or fy or fz or mx or my or mz):
+        if not (fx or fy or fz or mx or my or mz):
             return wrench
         T_base_tool = tool.pose
         x, y, z = (T_base_tool @ self._axes.T_tool_force).parts[1]
