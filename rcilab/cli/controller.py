@@ -1,4 +1,4 @@
-"""`rcilab controller`: a virtual RCI controller on this machine."""
+"""`rcilab controller`: a virtual controller on this machine."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rcilab.core.errors import InvalidValueError
-    from rcilab.makers.rokae.controller.config import ControllerConfig
     from rcilab.sim.api import NetworkFaults, Stall
+    from rcilab.sim.controller_config import ControllerConfig
 
 DESCRIPTION = """\
-Runs a virtual RCI controller. Any RCI client can connect to it: this package, or a C++ program that uses the vendor's
-client library. It prints one line when it is ready, a second one with the address of its world port, and ends on
-Ctrl-C.
+Runs the virtual controller of an arm. Any client of its maker's interface can connect to it: this package, or a C++
+program that uses the vendor's client library. It prints one line when it is ready, a second one with the address of its
+world port, and ends on Ctrl-C.
 """
 
 MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, and answers whatever it finds then.
@@ -27,10 +27,10 @@ _OPTIONS = {"limit_table": "--limits", "client_host": "--client", "client_port":
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command to the command line."""
-    parser = subparsers.add_parser("controller", help="run a virtual RCI controller", description=DESCRIPTION)
+    parser = subparsers.add_parser("controller", help="run a virtual controller", description=DESCRIPTION)
     parser.add_argument("--model", required=True, metavar="NAME", help="arm, such as xMatePro7")
     parser.add_argument("--host", default="127.0.0.2", metavar="ADDR", help="address to listen on (%(default)s)")
-    parser.add_argument("--port", type=int, default=1337, metavar="N", help="TCP port (%(default)s); 0: any free one")
+    parser.add_argument("--port", type=int, metavar="N", help="TCP port (the interface's; RCI: 1337); 0: any free one")
     parser.add_argument("--udp-port", type=int, metavar="N", help="UDP port for commands (as --port); 0: any free one")
     parser.add_argument(
         "--client", metavar="HOST[:PORT]", help="where states go from power-up on (whoever connects, at --port)"
@@ -116,15 +116,15 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the controller until it is told to end."""
+    """Runs the controller until it is asked to end."""
     from rcilab.core.errors import InvalidValueError
-    from rcilab.makers.rokae.controller.server import ControllerServer
+    from rcilab.makers.virtual_controller import build_virtual_controller
 
     try:
         config = _config(args)
     except InvalidValueError as error:
         raise _named(error, args) from error
-    server = ControllerServer(config)
+    server = build_virtual_controller(config)
     signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
     if args.exit_with_parent is None:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())
@@ -149,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _config(args: argparse.Namespace) -> ControllerConfig:
-    from rcilab.makers.rokae.controller.config import ControllerConfig
+    from rcilab.sim.controller_config import ControllerConfig
 
     client_host, client_port = _client(args.client)
     network, states_network = _networks(args)

@@ -8,9 +8,10 @@ from collections.abc import Sequence
 
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.core.errors import ConnectionLostError, InvalidValueError
+from rcilab.sim.controller_config import PLANT_KINDS
 
 START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
-_LISTENING = re.compile(r"^listening (rci://\S+)( |$)")
+_LISTENING = re.compile(r"^listening ([a-z]+://\S+)( |$)")
 _WORLD = re.compile(r"^world (\S+)$", re.MULTILINE)
 
 
@@ -20,8 +21,6 @@ def require_plant(plant: object) -> None:
     Raises:
         InvalidValueError: It has not; the message lists the plants.
     """
-    from rcilab.makers.rokae.controller.config import PLANT_KINDS
-
     if plant not in PLANT_KINDS:
         raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
 

@@ -10,6 +10,7 @@ from rcilab.control_process.launch import require_plant, start_controller
 from rcilab.core.spatial import IDENTITY
 from rcilab.execution.session import RobotSession, open_session
 from rcilab.execution.simulation_control import SimulationControl
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 
@@ -31,7 +32,7 @@ def simulate(
 
     Raises:
         InvalidValueError: `model` is not a robot model, or the plant is unknown.
-        ModelError: The arm does not speak the RCI.
+        ModelError: The arm has no virtual controller.
         ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
     require_simulator(require_model(model))
@@ -58,7 +59,8 @@ def simulate(
             session.set_tool(model.T_flange_tool)
         own, joint = load_model(model.name).limits.joint, model.limits.joint
         if not (np.array_equal(joint.lower, own.lower) and np.array_equal(joint.upper, own.upper)):
-            session.rci.set_joint_limit(joint.lower, joint.upper)
+            soft = SoftJointLimits(lower=tuple(joint.lower.tolist()), upper=tuple(joint.upper.tolist()))
+            session.configure(RobotConfiguration(joints=soft))
         if model.load.mass > 0.0:
             session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
     except BaseException:

@@ -17,10 +17,10 @@ from rcilab.core.command import CartesianPosition, Command, JointPosition, Joint
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.rotation import nine, rotation_matrix, rotation_vector
-from rcilab.makers.rokae.wire.bounds import FILTER_OFF
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp
 
+FILTER_OFF = 1000.0  # [Hz] Cut-off frequency from which on nothing is filtered: the rate of the commands.
 _CATCH_UP = 300.0  # [1/s] What is behind is caught up with at most so much of itself a second; a choice.
 _BRAKING = (
     0.7  # Part of the acceleration that braking counts on: the rest is for the delay of a limited jerk. A choice.

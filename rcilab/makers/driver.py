@@ -1,8 +1,4 @@
-"""What a session and the control process need of a robot's driver, and which maker's driver an address belongs to.
-
-The driver of the scheme `rci` is the module `rci_driver` in its maker's folder `driver`, and so on. Such a module has
-`parse_address(text)`, whose `str()` is the normal form of an address, and `open_driver(address, timeout, expected)`.
-"""
+"""What a session and the control process need of a robot's driver, and which maker's driver an address belongs to."""
 
 from __future__ import annotations
 
@@ -10,7 +6,6 @@ import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
 
 import numpy as np
@@ -23,7 +18,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, RobotState
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.maker import find_scheme
+from rcilab.makers.maker import Maker, find_scheme
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
@@ -40,6 +35,25 @@ GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
 """What stays free in Cartesian space."""
 
 _DEFAULT_SCHEME = "rci"  # Of an address without one; also says what is wrong with an address of an unknown scheme.
+
+
+class RobotAddress(Protocol):
+    """A parsed address; `str()` is its normal form."""
+
+    @property
+    def host(self) -> str:
+        """Name or IPv4 address."""
+        ...
+
+    @property
+    def port(self) -> int:
+        """TCP port of the controller."""
+        ...
+
+    @property
+    def is_here(self) -> bool:
+        """Whether it is a loopback address: a virtual controller on this machine."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,7 +289,16 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
         ModelError: It moves another arm, or one that is not known.
         InvalidValueError: The address is not valid.
     """
-    return _driver_of(address).open_driver(address, timeout, expected)
+    return _maker_at(address).open_driver(address, timeout, expected)
+
+
+def parse_address(address: str) -> RobotAddress:
+    """Returns the parts of an address of any maker's controller.
+
+    Raises:
+        InvalidValueError: It is not a valid address.
+    """
+    return _maker_at(address).parse_address(address)
 
 
 def normalise_address(address: str) -> str:
@@ -284,7 +307,7 @@ def normalise_address(address: str) -> str:
     Raises:
         InvalidValueError: It is not a valid address.
     """
-    return str(_driver_of(address).parse_address(address))
+    return str(parse_address(address))
 
 
 def require_signal(signal: object) -> int:
@@ -311,10 +334,10 @@ def require_timeout(timeout: object) -> None:
         raise InvalidValueError("timeout", timeout, "must be above 0 [s]")
 
 
-def _driver_of(address: object) -> Any:
+def _maker_at(address: object) -> Maker:
     scheme = address.strip().partition("://")[0] if isinstance(address, str) and "://" in address else ""
     maker = find_scheme(scheme)
     if maker is None or not maker.capabilities.drives:
         maker = find_scheme(_DEFAULT_SCHEME)
     assert maker is not None
-    return import_module(f"rcilab.makers.{maker.name}.driver.{maker.scheme}_driver")
+    return maker

@@ -1,8 +1,8 @@
 """What a maker of robots has to bring, and the registry of all makers.
 
 A maker is a folder in `rcilab/makers` with a module `maker.py` that has a `MAKER`, and a folder `robots` with the data
-files of its arms. Nothing outside its folder names it. `MAKER` is cheap to import: what needs sockets, physics or the
-conditions of the interface is behind methods.
+files of its arms. Nothing outside its folder names it. `MAKER` is cheap to import: what needs sockets or physics is
+behind methods.
 """
 
 from __future__ import annotations
@@ -11,13 +11,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots import ROBOTS_BY_MAKER
+
+if TYPE_CHECKING:
+    from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
+    from rcilab.sim.controller_config import ControllerConfig
+    from rcilab.sim.maker_server import MakerServer
+    from rcilab.sim.virtual_arm import VirtualArm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +76,38 @@ class Maker(Protocol):
     def faults(self) -> type[FaultCode]:
         """Returns the faults that its controllers report: number, name, cause, remedy."""
         ...
+
+    def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
+        """Returns the virtual side of its wire for one of its arms; only where `capabilities.simulates`."""
+        ...
+
+    def parse_address(self, text: str) -> RobotAddress:
+        """Returns the parts of the address of one of its controllers; only where `capabilities.drives`.
+
+        Raises:
+            InvalidValueError: It is not a valid address; the message says which part is wrong.
+        """
+        ...
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
+        """Returns a connection to one of its controllers; see `rcilab.makers.driver.open_driver`."""
+        ...
+
+
+class PlanningOnly:
+    """The part of a maker whose arms can be computed with, but neither simulated nor driven."""
+
+    def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
+        """Refuses: there is no virtual controller."""
+        raise ModelError(f"{config.model} has no virtual controller")
+
+    def parse_address(self, text: str) -> RobotAddress:
+        """Refuses: there is no driver."""
+        raise ModelError(f"{text} cannot be driven")
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
+        """Refuses: there is no driver."""
+        raise ModelError(f"{address} cannot be driven")
 
 
 @cache

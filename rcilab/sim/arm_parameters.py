@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import Self
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
+from rcilab.robots import RobotDescription
 from rcilab.sim.filters import SAMPLING_RATE
 
 Floats = tuple[float, ...]
@@ -59,6 +61,18 @@ class ArmParameters:
     """Whether walls push the tool back into the active safety box wherever the arm is compliant."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits instead of violating them."""
+
+    @classmethod
+    def of(cls, arm: RobotDescription) -> Self:
+        """Returns what an arm has after power-up: the widest limits, the highest thresholds and stiffness."""
+        joint, cartesian = arm.limits.joint, arm.limits.cartesian
+        return cls(
+            joint_lower=tuple(joint.lower.tolist()),
+            joint_upper=tuple(joint.upper.tolist()),
+            collision_thresholds=tuple(joint.collision_threshold.tolist()),
+            joint_stiffness=tuple(joint.stiffness.tolist()),
+            cartesian_stiffness=(cartesian.translation_stiffness,) * 3 + (cartesian.rotation_stiffness,) * 3,
+        )
 
     def soft_limits(self, joint: JointLimits) -> JointLimits:
         """Returns the limits of an arm's joints with the soft limits as position bounds."""

@@ -6,18 +6,21 @@ import socket
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rcilab.sim.channels import Peer
+
 
 @dataclass(frozen=True, slots=True)
 class ClientConnected:
     """A client connected."""
 
-    address: str
+    peer: Peer
 
 
 @dataclass(frozen=True, slots=True)
 class ClientDisconnected:
     """The connection is over."""
 
+    peer: Peer
     reason: str
 
 
@@ -25,6 +28,7 @@ class ClientDisconnected:
 class FrameArrived:
     """A whole TCP frame."""
 
+    peer: Peer
     frame: bytes
 
 
@@ -46,7 +50,7 @@ class StrangerDetected:
 
 @dataclass(frozen=True, slots=True)
 class ClientRefused:
-    """A second client tried to connect."""
+    """One client more than a channel takes tried to connect."""
 
     address: str
     holder: str

@@ -9,25 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME, Clock
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
-from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
-from rcilab.model.robot_model import RobotModel
 from rcilab.sim.api import (
     AutoLimit,
     Done,
     Floor,
     GetStatus,
     Limits,
-    LimitTable,
     LoopBack,
     Mount,
     Network,
@@ -37,7 +32,6 @@ from rcilab.sim.api import (
     Refused,
     Release,
     RemoveBox,
-    SafetyButton,
     SetInput,
     StallClock,
     Walls,
@@ -47,8 +41,7 @@ from rcilab.sim.api import (
 )
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
-from rcilab.sim.jitter_buffer import JitterBuffer
-from rcilab.sim.plant import Plant
+from rcilab.sim.maker_server import SimulatedController
 
 _NOTHING = Push((0.0,) * 6)
 
@@ -60,89 +53,6 @@ class ServerCounters:
     missed: int
     bad_datagrams: int
     strangers: int
-
-
-class SimulatedController(Protocol):
-    """A controller of any maker, as its surroundings see it."""
-
-    ignored: int
-    """Commands that came while none was expected."""
-    limit_table: LimitTable
-    """Whose limits of the tool's motion apply."""
-
-    @property
-    def loop_back(self) -> bool:
-        """Whether every digital output is wired to the input of the same number."""
-        ...
-
-    @loop_back.setter
-    def loop_back(self, on: bool) -> None: ...
-
-    @property
-    def auto_limit(self) -> bool:
-        """Whether commanded joint angles are stopped inside the soft limits instead of raising a fault."""
-        ...
-
-    @auto_limit.setter
-    def auto_limit(self, on: bool) -> None: ...
-
-    @property
-    def model(self) -> RobotModel:
-        """The arm with its tool and load."""
-        ...
-
-    @property
-    def plant(self) -> Plant:
-        """What moves."""
-        ...
-
-    @property
-    def playout(self) -> JitterBuffer:
-        """The queue of commands."""
-        ...
-
-    @property
-    def cycle_number(self) -> int:
-        """The number of the last state."""
-        ...
-
-    @property
-    def q(self) -> JointVector:
-        """Measured joint angles, shape (n,), [rad]."""
-        ...
-
-    @property
-    def phase_name(self) -> str:
-        """What the robot is doing, such as "idle"."""
-        ...
-
-    @property
-    def fault_names(self) -> tuple[str, ...]:
-        """The faults that are set, as the maker names them."""
-        ...
-
-    @property
-    def reason(self) -> Remark:
-        """Why the last fault was raised."""
-        ...
-
-    @property
-    def safety_box(self) -> SafetyBox | None:
-        """The safety box that is configured."""
-        ...
-
-    @property
-    def button(self) -> SafetyButton:
-        """Which emergency stop is pressed."""
-        ...
-
-    def press_button(self, button: SafetyButton) -> None:
-        """Presses an emergency stop, or releases it."""
-        ...
-
-    def set_input(self, signal: int, level: bool) -> None:
-        """Sets the level of a digital input."""
-        ...
 
 
 class Environment:
@@ -248,7 +158,7 @@ class Environment:
             plant=self._plant.kind,
             cycle=controller.cycle_number,
             phase=controller.phase_name,
-            faults=controller.fault_names,
+            faults=tuple(fault.manual_name for fault in controller.faults),
             reason=controller.reason,
             button=controller.button,
             q=tuple(controller.q.tolist()),

@@ -7,60 +7,47 @@ millisecond waits for a command, however late it is, but not for one that is kno
 from __future__ import annotations
 
 import socket
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Callable, Sequence
 
 from rcilab.core.clock import Clock
 from rcilab.sim.api import Direction, NetworkFaults
-from rcilab.sim.arrivals import Arrival, ClientConnected, ClientDisconnected, DatagramArrived
+from rcilab.sim.arrivals import Arrival, ClientDisconnected, DatagramArrived
+from rcilab.sim.channels import Peer
+from rcilab.sim.endpoint import Endpoint
 from rcilab.sim.network_impairment import DelayedDatagrams, SlowStream
 
 
-class Endpoint(Protocol):
-    """The sockets: one TCP client at a time, and datagrams both ways."""
-
-    @property
-    def has_client(self) -> bool:
-        """Whether a client is connected."""
-        ...
-
-    def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
-        """Returns what has arrived; waits up to `timeout`, [s], for the first thing."""
-        ...
-
-    def send_state(self, datagram: bytes) -> None:
-        """Sends a state."""
-        ...
-
-    def send_frame(self, frame: bytes) -> None:
-        """Sends an answer."""
-        ...
-
-    def drop_client(self, reason: str) -> None:
-        """Ends the connection; the next `poll` reports it."""
-        ...
-
-
 class FaultyNetwork:
-    """Stands between a controller and its sockets. Owned by the thread that runs the controller.
+    """Stands between a controller and its sockets: the `Link` of a maker's server. Owned by the controller's thread.
 
     Attributes:
         has_lost: Whether the newest state, or a command since, is lost: this state may never be answered.
+        log: Takes a line for the operator, and never waits.
 
     Args:
         endpoint: The sockets.
         clock: What delays are measured with.
         commands: Faults towards the controller.
         states: Faults towards the client; they apply to TCP, too.
+        log: As the attribute.
     """
 
-    def __init__(self, endpoint: Endpoint, clock: Clock, commands: NetworkFaults, states: NetworkFaults) -> None:
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        clock: Clock,
+        commands: NetworkFaults,
+        states: NetworkFaults,
+        log: Callable[[str], None] = lambda _: None,
+    ) -> None:
         self._endpoint = endpoint
         self._clock = clock
+        self.log = log
         self._commands = DelayedDatagrams(commands, "commands")
         self._states = DelayedDatagrams(states, "states")
-        self._answers = SlowStream(states)
-        self._drop_reason: str | None = None
+        self._tcp_faults = states
+        self._answers: dict[Peer, SlowStream] = {}  # Of the clients that have been answered under faults.
+        self._drop_reasons: dict[Peer, str] = {}  # Of those that go once their answers are out.
         self.has_lost = False
 
     @property
@@ -74,7 +61,10 @@ class FaultyNetwork:
             self._commands.replace(faults)
         if direction != "commands":
             self._states.replace(faults)
-            self._answers.faults = faults
+            self._tcp_faults = faults
+            for answers in self._answers.values():
+                answers.faults = faults
+            self._answers = {peer: answers for peer, answers in self._answers.items() if not answers.is_clean}
 
     def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
         """Returns what has come through; see `Endpoint.poll`. Delayed data is sent meanwhile."""
@@ -85,53 +75,70 @@ class FaultyNetwork:
         while True:
             self._send_what_is_due()
             now = self._clock.now()
-            due = min(deadline, self._commands.next_due, self._states.next_due, self._answers.next_due)
+            answers = (stream.next_due for stream in self._answers.values())
+            due = min(deadline, self._commands.next_due, self._states.next_due, *answers)
             arrivals = self._let_through(self._endpoint.poll(due - now, extra_sockets))
             if arrivals or self.has_lost is not had_lost or self._clock.now() >= deadline:
                 self._send_what_is_due()
                 return arrivals
 
-    def send_state(self, datagram: bytes) -> None:
-        """Sends a state on its way."""
+    def send_datagram(self, datagram: bytes) -> None:
+        """Sends a datagram on its way."""
         if self._states.is_clean:
             self.has_lost = False
-            self._endpoint.send_state(datagram)
+            self._endpoint.send_datagram(datagram)
         else:
             self.has_lost = not self._states.put(datagram, self._clock.now())
             self._send_what_is_due()
 
-    def send_frame(self, frame: bytes) -> None:
+    def send_frame(self, peer: Peer, frame: bytes) -> None:
         """Sends an answer on its way."""
-        if self._answers.is_clean:
-            self._endpoint.send_frame(frame)
+        if self._is_tcp_clean:
+            self._endpoint.send_frame(peer, frame)
         else:
-            self._answers.put(frame, self._clock.now())
+            self._answers_to(peer).put(frame, self._clock.now())
             self._send_what_is_due()
 
-    def drop_client(self, reason: str) -> None:
-        """Ends the connection once its answers are out; the next `poll` reports it."""
-        if self._answers.is_clean:
-            self._endpoint.drop_client(reason)
+    def direct_datagrams(self, peer: Peer, port: int) -> bool:
+        """Has datagrams go to a port of this client's; returns False for a port that may not be."""
+        return self._endpoint.direct_datagrams(peer, port)
+
+    def drop(self, peer: Peer, reason: str) -> None:
+        """Ends a connection once its answers are out; the next `poll` reports it."""
+        if self._is_tcp_clean:
+            self._endpoint.drop(peer, reason)
         else:
-            self._drop_reason = reason
+            self._answers_to(peer)
+            self._drop_reasons[peer] = reason
             self._send_what_is_due()
 
     @property
     def is_clean(self) -> bool:
         """Whether there is no fault in effect."""
-        return self._commands.is_clean and self._states.is_clean and self._answers.is_clean
+        return self._commands.is_clean and self._states.is_clean and self._is_tcp_clean
+
+    @property
+    def _is_tcp_clean(self) -> bool:
+        is_spared = self._tcp_faults.spares_tcp
+        return is_spared and (not self._answers or all(stream.is_clean for stream in self._answers.values()))
+
+    def _answers_to(self, peer: Peer) -> SlowStream:
+        if peer not in self._answers:
+            self._answers[peer] = SlowStream(self._tcp_faults)
+        return self._answers[peer]
 
     def _send_what_is_due(self) -> None:
         now = self._clock.now()
         for datagram in self._states.take(now):
-            self._endpoint.send_state(datagram)
-        for piece in self._answers.take(now):
-            self._endpoint.send_frame(piece)
-        if self._answers.is_broken and self._endpoint.has_client:
-            self._endpoint.drop_client("lost its connection: a network fault")
-        elif self._drop_reason is not None and self._answers.next_due == float("inf"):
-            self._endpoint.drop_client(self._drop_reason)
-            self._drop_reason = None
+            self._endpoint.send_datagram(datagram)
+        for peer in self._endpoint.peers:
+            stream = self._answers_to(peer)
+            for piece in stream.take(now):
+                self._endpoint.send_frame(peer, piece)
+            if stream.is_broken:
+                self._endpoint.drop(peer, "lost its connection: a network fault")
+            elif peer in self._drop_reasons and stream.next_due == float("inf"):
+                self._endpoint.drop(peer, self._drop_reasons.pop(peer))
 
     def _let_through(self, arrivals: list[Arrival]) -> list[Arrival]:
         """Returns the arrivals without the datagrams that are not there yet, and with those that are now."""
@@ -141,8 +148,11 @@ class FaultyNetwork:
             if isinstance(arrival, DatagramArrived):
                 self.has_lost |= not self._commands.put(arrival.datagram, now)
                 continue
-            if isinstance(arrival, ClientConnected | ClientDisconnected):
-                self._answers.begin()
-                self._drop_reason = None
+            if isinstance(arrival, ClientDisconnected):
+                self._forget(arrival.peer)
             passed.append(arrival)
         return [*map(DatagramArrived, self._commands.take(now)), *passed]
+
+    def _forget(self, peer: Peer) -> None:
+        self._answers.pop(peer, None)
+        self._drop_reasons.pop(peer, None)

@@ -106,7 +106,7 @@ class DelayedDatagrams:
 
 
 class SlowStream:
-    """Answers over TCP on their way through a bad network. One connection at a time; `begin` for each.
+    """The answers of one TCP connection on their way through a bad network.
 
     Args:
         faults: What is wrong with it.
@@ -115,11 +115,6 @@ class SlowStream:
     def __init__(self, faults: NetworkFaults) -> None:
         self.faults = faults
         self._pieces: deque[tuple[float, bytes]] = deque()
-        self._sent = 0
-
-    def begin(self) -> None:
-        """Forgets the last connection."""
-        self._pieces.clear()
         self._sent = 0
 
     @property

@@ -82,7 +82,7 @@ class VirtualArm:
     Args:
         model: The arm.
         plant: What moves.
-        parameters: What the client has configured.
+        parameters: What is configured; None: what an arm has after power-up.
         prefill: Cycles between the first command of a motion and its play-out.
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
         lost_limit: Lost cycles in a row that end a motion; None never does.
@@ -92,7 +92,7 @@ class VirtualArm:
         self,
         model: RobotModel,
         plant: Plant,
-        parameters: ArmParameters,
+        parameters: ArmParameters | None = None,
         *,
         prefill: int = PREFILL,
         torque_prefill: int | None = None,
@@ -107,7 +107,7 @@ class VirtualArm:
         self.measured_state = MeasuredStateMonitor(model, measured)
         self.resting_law = ControlLaw.BRAKED
         self.is_monitored = False
-        self._parameters = parameters
+        self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
         self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
         self._actuator = Actuator(model, parameters)
         self._tau_c: list[float] | None = None

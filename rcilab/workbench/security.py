@@ -10,6 +10,7 @@ import resource
 import socket
 
 from rcilab.core.errors import UsageError
+from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.workbench.access import is_local, require_token
@@ -45,8 +46,6 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
     check_host(host, token)
     _require_files()
     if target != "virtual":
-        from rcilab.makers.rokae.driver.address import parse_address
-
         parse_address(target)
     return require_simulator(load_model(model))
 

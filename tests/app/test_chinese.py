@@ -27,7 +27,7 @@ from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
-from rcilab.makers.rokae.driver.address import RobotAddress
+from rcilab.makers.rokae.driver.address import RciAddress
 from rcilab.makers.rokae.driver.identify import dh_lengths, require_same_arm
 from rcilab.makers.rokae.driver.transport import SocketTransport
 from rcilab.makers.rokae.wire import RecoveryStatus, StartStatus
@@ -95,7 +95,7 @@ def stale() -> None:
 
 
 def robot_at_closed_port() -> None:
-    address = RobotAddress(host="127.0.0.1", port=closed_port())
+    address = RciAddress(host="127.0.0.1", port=closed_port())
     SocketTransport(address, 1024, 1.0)
 
 

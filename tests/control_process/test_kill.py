@@ -19,9 +19,9 @@ from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import ConnectionLostError
 from rcilab.execution import connect
-from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.server import ControllerServer
+from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.motion import plan_joint
+from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.ideal_plant import IdealPlant
 from tests.control_process.test_supervisor import (
     GOAL,
@@ -241,7 +241,7 @@ class RecordingPlant(IdealPlant):
 def recording_controller():
     """A controller in a thread of this process, so that it can be watched after its client has died."""
     plant = RecordingPlant(MODEL)
-    server = ControllerServer(ControllerConfig(model=MODEL.name, port=0), plant=plant, log=lambda line: None)
+    server = build_virtual_controller(ControllerConfig(model=MODEL.name, port=0), plant=plant, log=lambda line: None)
     thread = threading.Thread(target=server.run)
     thread.start()
     try:

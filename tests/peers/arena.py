@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rcilab.makers.rokae.controller.config import ControllerConfig
 from rcilab.makers.rokae.controller.rci_controller import RciController
-from rcilab.makers.rokae.controller.server import ControllerServer
+from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_affinity import one_core
+from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.plants import build_plant
 from tests.peers.robot import PATIENCE, Robot
 
@@ -38,8 +38,8 @@ class Arena:
         config = ControllerConfig(**{**settings, **options})
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
-        self.server = ControllerServer(config, plant=self.plant, log=self.lines.append)
-        self.cycle: RciController = self.server.cycle
+        self.server = build_virtual_controller(config, plant=self.plant, log=self.lines.append)
+        self.cycle: RciController = self.server.controller
         self.host, port = re.match(r"rci://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
         self.port = int(port)
         self._actions: deque[Callable[[RciController], object]] = deque()

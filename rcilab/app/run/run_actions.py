@@ -30,6 +30,7 @@ from rcilab.core.errors import (
     RcilabError,
     UsageError,
 )
+from rcilab.makers.driver import parse_address
 from rcilab.model.robot_model import load_model
 
 if TYPE_CHECKING:
@@ -157,8 +158,6 @@ class RunActions:
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
         if target != "virtual":
-            from rcilab.makers.rokae.driver.address import parse_address
-
             parse_address(target)
         if model.name == state.model.name and target == state.target and request.target is None:
             return

@@ -15,7 +15,7 @@ from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.errors import RcilabError
-from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.makers.driver import parse_address
 
 _ADDRESS = "address"
 """Names the trouble that what stands in the field is no address."""

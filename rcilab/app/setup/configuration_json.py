@@ -6,8 +6,7 @@ from typing import Any
 
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers.configuration import ForceControlFrame, RobotConfiguration, SoftJointLimits
-from rcilab.makers.rokae.wire import ForceFrame
+from rcilab.makers.configuration import ForceControlFrame, ForceFrame, RobotConfiguration, SoftJointLimits
 from rcilab.model.dynamics.payload import Payload
 
 

@@ -13,11 +13,11 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.makers.configuration import (
     SETUP_PARTS,
     ForceControlFrame,
+    ForceFrame,
     RobotConfiguration,
     SetupPart,
     SoftJointLimits,
 )
-from rcilab.makers.rokae.wire import ForceFrame
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.robots import describe_robot
 

@@ -21,12 +21,13 @@ from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
 from rcilab.diagnostics.bench.measure import Measurement, summarise
 from rcilab.diagnostics.host import probe_realtime
+from rcilab.makers.driver import parse_address
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.config import PLANT_KINDS, PlantKind
 from rcilab.makers.rokae.controller.rci_controller import RciController
-from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.model.robot_model import RobotModel, load_model
+from rcilab.sim.controller_config import PLANT_KINDS, PlantKind
 from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 _ROBOT = "xMatePro7"
 _DURATION = 5.0  # [s] of simulated motion.
@@ -140,7 +141,7 @@ def _line_commands(model: RobotModel, duration: float) -> Command:
 
 
 def _measure(name: str, model: RobotModel, plant: PlantKind, start: rci.StartMove, command: Command) -> Measurement:
-    cycle = RciController(model, build_plant(plant, model), mode_delay=0, prefill=0)
+    cycle = RciController(VirtualArm(model, build_plant(plant, model), prefill=0), mode_delay=0)
     cycle.handle(rci.SetMotorPower(1))
     resting = _times(cycle, lambda message_id, k: None, 1000)
     cycle.handle(start)

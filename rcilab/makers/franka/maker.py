@@ -6,10 +6,10 @@ from rcilab.core.condition import ConditionTable
 from rcilab.makers.franka.conditions import FCI_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots import ROBOTS
-from rcilab.makers.maker import Capabilities
+from rcilab.makers.maker import Capabilities, PlanningOnly
 
 
-class Franka:
+class Franka(PlanningOnly):
     """The maker of the Panda."""
 
     name = "franka"

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from rcilab.core.condition import ConditionTable
 from rcilab.makers.maker import Capabilities
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.robots import ROBOTS
+
+if TYPE_CHECKING:
+    from rcilab.makers.driver import ExpectedArm
+    from rcilab.makers.rokae.controller.rci_server import RciServer
+    from rcilab.makers.rokae.driver.address import RciAddress
+    from rcilab.makers.rokae.driver.rci_driver import RciDriver
+    from rcilab.sim.controller_config import ControllerConfig
+    from rcilab.sim.virtual_arm import VirtualArm
 
 
 class Rokae:
@@ -26,6 +36,24 @@ class Rokae:
     def faults(self) -> type[Fault]:
         """Returns the twenty faults of the RCI."""
         return Fault
+
+    def build_server(self, arm: VirtualArm, config: ControllerConfig) -> RciServer:
+        """Returns the virtual side of the RCI."""
+        from rcilab.makers.rokae.controller.rci_server import build_rci_server
+
+        return build_rci_server(arm, config)
+
+    def parse_address(self, text: str) -> RciAddress:
+        """Returns the parts of an address, rci://HOST:PORT."""
+        from rcilab.makers.rokae.driver.address import parse_address
+
+        return parse_address(text)
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> RciDriver:
+        """Returns a connection to an RCI controller."""
+        from rcilab.makers.rokae.driver.rci_driver import open_driver
+
+        return open_driver(address, timeout, expected)
 
 
 MAKER = Rokae()

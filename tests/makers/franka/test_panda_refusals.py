@@ -8,11 +8,11 @@ import rcilab
 from rcilab.control_process.supervisor import Supervisor
 from rcilab.core.errors import ModelError
 from rcilab.makers.maker import require_driver
-from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.server import ControllerServer
 from rcilab.makers.rokae.robots import ROBOTS
+from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES
+from rcilab.sim.controller_config import ControllerConfig
 
 PANDA = load_model("panda")
 REFUSED = pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*xMatePro3, xMatePro7, xMate3")
@@ -34,4 +34,4 @@ def test_a_panda_is_neither_simulated_nor_connected_nor_supervised():
 
 def test_the_virtual_controller_is_not_a_panda():
     with REFUSED:
-        ControllerServer(ControllerConfig(model="panda"))
+        build_virtual_controller(ControllerConfig(model="panda"))

@@ -30,7 +30,7 @@ from rcilab.makers.rokae.controller.request_handlers import (
     conclude,
     describe_refusal,
 )
-from rcilab.makers.rokae.controller.settings import apply_request, default_settings, guided_freedom
+from rcilab.makers.rokae.controller.settings import Settings, apply_request, guided_freedom
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.limit_tables import LimitTable, cartesian_limits
@@ -40,7 +40,6 @@ from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
-from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -86,28 +85,21 @@ class RciController:
         limit_table: Whose limits of the tool's motion apply, from the next motion on.
 
     Args:
-        model: The arm.
-        plant: What moves.
+        arm: What moves, as it is after power-up.
         mode_delay: Cycles from StartMove to the requested modes in the state.
-        prefill: Cycles between the first command of a motion and its play-out.
-        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
-        lost_limit: Lost cycles in a row that raise INSTABILITY_DETECTION; None never does.
         recovery_time: Cycles that an error recovery takes at least.
     """
 
     def __init__(
         self,
-        model: RobotModel,
-        plant: Plant,
+        arm: VirtualArm,
         *,
         mode_delay: int = MODE_DELAY,
-        prefill: int = PREFILL,
-        torque_prefill: int | None = None,
-        lost_limit: int | None = LOST_LIMIT,
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
+        model = arm.model
         self.limit_table: LimitTable = "manual"
-        self.settings = default_settings(model.description)
+        self.settings = Settings.of(model.description)
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
@@ -116,9 +108,8 @@ class RciController:
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
         self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
-        self._arm = VirtualArm(
-            model, plant, self.settings, prefill=prefill, torque_prefill=torque_prefill, lost_limit=lost_limit
-        )
+        self._arm = arm
+        arm.configure(self.settings)
         self._reporter = StateReporter(model, self.settings)
         self._requested = self._shown = _IDLE_MODES
         self._countdown = 0
@@ -156,11 +147,6 @@ class RciController:
     def phase_name(self) -> str:
         """What the robot is doing, such as "idle"."""
         return self.phase.name.lower()
-
-    @property
-    def fault_names(self) -> tuple[str, ...]:
-        """The faults that are set, as the manual names them."""
-        return tuple(fault.manual_name for fault in self.faults)
 
     @property
     def safety_box(self) -> SafetyBox | None:
@@ -202,6 +188,11 @@ class RciController:
     def is_starved(self) -> bool:
         """Whether a motion runs whose next command is not there."""
         return self.phase is Phase.MOVING and self.playout.is_starved
+
+    @property
+    def lacks_commands(self) -> bool:
+        """Whether a fault is set that a lack of commands raises."""
+        return Fault.INSTABILITY_DETECTION in self.faults
 
     @property
     def loop_back(self) -> bool:

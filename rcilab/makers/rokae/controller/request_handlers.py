@@ -20,8 +20,8 @@ from rcilab.makers.rokae.controller.state_machine import (
     When,
     transition,
 )
-from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.measured_state import MeasuredStateMonitor
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.virtual_arm import VirtualArm

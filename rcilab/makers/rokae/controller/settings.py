@@ -71,20 +71,8 @@ class Settings(ArmParameters):
 
     def rebooted(self, arm: RobotDescription) -> Settings:
         """Returns what is left after a reboot: the defaults, and what is wired or chosen outside of the controller."""
-        kept = replace(default_settings(arm), inputs=self.inputs, auto_limit=self.auto_limit)
+        kept = replace(Settings.of(arm), inputs=self.inputs, auto_limit=self.auto_limit)
         return kept.with_loop_back(self.loop_back)
-
-
-def default_settings(arm: RobotDescription) -> Settings:
-    """Returns the settings a controller wakes up with: the widest limits, the highest thresholds and stiffness."""
-    joint, cartesian = arm.limits.joint, arm.limits.cartesian
-    return Settings(
-        joint_lower=tuple(joint.lower.tolist()),
-        joint_upper=tuple(joint.upper.tolist()),
-        collision_thresholds=tuple(joint.collision_threshold.tolist()),
-        joint_stiffness=tuple(joint.stiffness.tolist()),
-        cartesian_stiffness=(cartesian.translation_stiffness,) * 3 + (cartesian.rotation_stiffness,) * 3,
-    )
 
 
 def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings:

@@ -20,7 +20,7 @@ _EXAMPLE = "rci://192.168.0.160:1337"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RobotAddress:
+class RciAddress:
     """A parsed `rci://HOST:PORT[?udp_port=N&client_port=M&world_port=W]`."""
 
     host: str
@@ -57,7 +57,7 @@ class RobotAddress:
         return f"rci://{self.host}:{self.port}" + ("?" + "&".join(options) if options else "")
 
 
-def parse_address(text: str) -> RobotAddress:
+def parse_address(text: str) -> RciAddress:
     """Returns the parts of a robot's address.
 
     Args:
@@ -92,7 +92,7 @@ def parse_address(text: str) -> RobotAddress:
                 "address", text, f"has the unknown option {name}; known: {', '.join(_KNOWN_OPTIONS)}"
             )
         options[name] = _port(text, name, value)
-    return RobotAddress(
+    return RciAddress(
         host=parts.hostname,
         port=DEFAULT_PORT if port is None else _port(text, "port", str(port)),
         udp_port=options.get("udp_port"),
@@ -111,7 +111,7 @@ class Route:
     local_udp: tuple[str, int]
 
 
-def choose_route(address: RobotAddress) -> Route:
+def choose_route(address: RciAddress) -> Route:
     """Returns which of our addresses to use towards a robot.
 
     The robot sends states to the address our TCP connection comes from, so both are bound to one specific address,

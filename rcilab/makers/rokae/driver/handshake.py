@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
 from rcilab.core.spatial import IDENTITY, as_pose, turn_between
-from rcilab.makers.rokae.driver.address import RobotAddress
+from rcilab.makers.rokae.driver.address import RciAddress
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.identify import Lengths, require_same_arm
@@ -34,7 +34,7 @@ def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, addres
     require_same_arm(dh, name, lengths, address)
 
 
-def await_first_state(link: RciConnection, place: RobotAddress, local: tuple[str, int], timeout: float) -> None:
+def await_first_state(link: RciConnection, place: RciAddress, local: tuple[str, int], timeout: float) -> None:
     """Returns once a state has arrived.
 
     Raises:

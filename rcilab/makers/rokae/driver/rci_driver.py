@@ -19,7 +19,7 @@ from rcilab.makers.driver import (
     RequestLock,
     SafetyStopReason,
 )
-from rcilab.makers.rokae.driver.address import RobotAddress, parse_address
+from rcilab.makers.rokae.driver.address import RciAddress, parse_address
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.controller_parameters import send_configuration
@@ -82,7 +82,7 @@ class RciDriver:
 
     scheme = "rci"
 
-    def __init__(self, connection: RciConnection, address: RobotAddress, arm_name: str) -> None:
+    def __init__(self, connection: RciConnection, address: RciAddress, arm_name: str) -> None:
         self.connection = connection
         self.name = connection.name
         self.n = connection.n

@@ -9,7 +9,7 @@ import time
 from typing import Protocol
 
 from rcilab.core.errors import ConnectionLostError, DecodeError
-from rcilab.makers.rokae.driver.address import RobotAddress, Route, choose_route
+from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import FrameReader
 
 RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
@@ -66,7 +66,7 @@ class SocketTransport:
         ConnectionLostError: The robot cannot be reached, or the port that states come to is taken.
     """
 
-    def __init__(self, address: RobotAddress, state_size: int, timeout: float) -> None:
+    def __init__(self, address: RciAddress, state_size: int, timeout: float) -> None:
         self.address = address
         self.foreign = 0
         """Datagrams dropped because of their size or sender."""
@@ -188,7 +188,7 @@ class SocketTransport:
         )
 
 
-def _bind_udp(address: RobotAddress, route: Route) -> socket.socket:
+def _bind_udp(address: RciAddress, route: Route) -> socket.socket:
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
@@ -208,7 +208,7 @@ def _bind_udp(address: RobotAddress, route: Route) -> socket.socket:
     return udp
 
 
-def _connect_tcp(address: RobotAddress, route: Route, timeout: float) -> socket.socket:
+def _connect_tcp(address: RciAddress, route: Route, timeout: float) -> socket.socket:
     tcp = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     start = time.monotonic()
     try:

@@ -8,7 +8,6 @@ from __future__ import annotations
 FILTER_OFF = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
 LOWEST_FREQUENCY = 0.1  # [Hz] Smallest cut-off frequency: a motion arrives some 20 s late. At 0 Hz nothing would pass.
 LIMIT_TOLERANCE = 1e-9  # [rad] By which soft limits may pass the arm's own: they are often converted from degrees.
-LOWEST_CLIENT_PORT = 1024  # Where states may be sent to: those below are other programs', and privileged.
 LONGEST_TOOL = 2.0  # [m] From the flange to the tool, the force-control frame or the load's centre of mass.
 FARTHEST_BOX = 10.0  # [m] From the base to the centre of the safety box, along each axis.
 LARGEST_BOX = 100.0  # [m] Edge of the safety box.

@@ -14,13 +14,15 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 
 class Hand:
     """Sends requests and commands to a cycle, one step a command, and keeps every state."""
 
     def __init__(self, model: RobotModel, plant: str = "ideal", **options: object) -> None:
-        self.cycle = RciController(model, build_plant(plant, model), mode_delay=3, **{"prefill": 0, **options})  # type: ignore[arg-type]
+        arm = VirtualArm(model, build_plant(plant, model), **{"prefill": 0, **options})  # type: ignore[arg-type]
+        self.cycle = RciController(arm, mode_delay=3)
         self.states: list[RobotState] = [self.cycle.state]
 
     @property

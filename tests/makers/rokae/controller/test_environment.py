@@ -9,16 +9,17 @@ from hypothesis import strategies as st
 
 from rcilab.core.clock import ManualClock
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.endpoint import Endpoint
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import load_model
 from rcilab.sim import api as world
 from rcilab.sim.api import NetworkFaults, WorldStatus
+from rcilab.sim.channels import TcpChannel, UdpChannel
 from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.endpoint import Endpoint
 from rcilab.sim.environment import Environment, ServerCounters
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 from tests.sim.api.test_world_lines import REQUESTS
 
 MODEL = load_model("xMatePro7")
@@ -29,9 +30,9 @@ class Place:
 
     def __init__(self, kind: str) -> None:
         self.clock = ManualClock()
-        self.cycle = RciController(MODEL, build_plant(kind, MODEL))
+        self.cycle = RciController(VirtualArm(MODEL, build_plant(kind, MODEL)))
         self.cycle.handle(rci.SetMotorPower(1))
-        self.endpoint = Endpoint(ControllerConfig(model=MODEL.name, port=0))
+        self.endpoint = Endpoint("127.0.0.2", [TcpChannel(protocol="RCI", port=0), UdpChannel()])
         network = FaultyNetwork(self.endpoint, self.clock, NetworkFaults(), NetworkFaults())
         self.stalls = StallSchedule()
         self.surroundings = Environment(self.cycle, network, self.stalls, self.clock, lambda: ServerCounters(3, 4, 5))

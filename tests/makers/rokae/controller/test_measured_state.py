@@ -14,6 +14,7 @@ from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.ideal_plant import IdealPlant
 from rcilab.sim.plant import Measurement, Setpoint
+from rcilab.sim.virtual_arm import VirtualArm
 from tests.makers.rokae.controller.conftest import Hand
 
 F = Fault
@@ -76,7 +77,7 @@ MEASURED = [
 def test_what_the_sensors_say_is_judged_in_that_cycle(model: RobotModel, mode, act, fault: Fault) -> None:
     hand = Hand(model)
     plant = SlippingPlant(model)
-    hand.cycle = RciController(model, plant, mode_delay=3, prefill=0)
+    hand.cycle = RciController(VirtualArm(model, plant, prefill=0), mode_delay=3)
     hand.states = [hand.cycle.state]
     hand.ask(rci.SetJointLimit(tuple(model.home + 0.1), tuple(model.home - 0.1)))
     hand.ask(hand.box(0.04))

@@ -21,12 +21,12 @@ import pytest
 from rcilab.core.errors import InvalidValueError, ModelError, UsageError
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.server import ControllerServer
 from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import plan_joint
 from rcilab.sim.api import Stall
+from rcilab.sim.controller_config import ControllerConfig
 
 PATIENCE = 10.0  # [s] A peer that waits longer than this has found a bug, or the machine has stopped.
 MODEL = load_model("xMatePro7")
@@ -39,7 +39,7 @@ class Running:
     def __init__(self, **options: object) -> None:
         self.lines: list[str] = []
         config = ControllerConfig(**{"model": "xMatePro7", "port": 0, "realtime": False, **options})  # type: ignore[arg-type]
-        self.server = ControllerServer(config, log=self.lines.append)
+        self.server = build_virtual_controller(config, log=self.lines.append)
         address = self.server.url.removeprefix("rci://").partition("?")[0]
         self.host, port = address.split(":")
         self.port = int(port)
@@ -182,7 +182,7 @@ def test_a_whole_motion_of_the_vendors_client(lockstep: Running) -> None:
         assert (state.motion_generator_mode, state.controller_mode, state.robot_mode) == (0, 5, 1)
         assert peer.ask(rci.SetMotorPower(0)) == 0
         assert peer.ask(rci.GetMotorState()) == rci.MotorStateResponse(0)
-    assert lockstep.server.cycle.playout.lost == 0
+    assert lockstep.server.controller.playout.lost == 0
 
 
 def test_every_request_is_answered_once_with_its_id_in_one_piece(lockstep: Running) -> None:
@@ -227,7 +227,7 @@ def test_ninety_commands_at_once_with_old_ids_are_the_motion_they_are(lockstep: 
             peer.send(state.message_id, row)
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
         assert np.array_equal(peer.receive_live_state().q, MOTION.goal)
-    assert lockstep.server.cycle.playout.lost == 0
+    assert lockstep.server.controller.playout.lost == 0
 
 
 def test_commands_that_answer_the_same_state_again_are_the_next_ones(lockstep: Running) -> None:
@@ -300,7 +300,7 @@ def test_garbage_on_tcp_closes_that_connection_with_one_line_and_nothing_else(lo
             garbage = garbage[:9] + b"\x01" + garbage[10:]  # SetMotorPower with two bytes.
         peer.tcp.sendall(garbage)
         assert closes(peer.tcp)
-        lockstep.wait_for_line("no RCI")
+        lockstep.wait_for_line("not valid RCI")
     assert len(lockstep.lines) == 1
     with Peer(lockstep) as peer:
         assert peer.ask(rci.SetMotorPower(1)) == 0
@@ -343,7 +343,7 @@ def test_a_second_client_is_refused_and_the_first_does_not_notice(lockstep: Runn
         peer.receive_state()
         with socket.create_connection(peer.controller, timeout=PATIENCE) as second:
             assert closes(second)
-        lockstep.wait_for_line("refused a second client from 127.0.0.1")
+        lockstep.wait_for_line("refused another client from 127.0.0.1")
         assert peer.ask(rci.SetMotorPower(1)) == 0
     assert len(lockstep.lines) == 1
 
@@ -401,7 +401,7 @@ def test_in_lock_step_a_client_may_stand_in_a_debugger() -> None:
             peer.receive_state()
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
         assert peer.receive_live_state().faults == ()
-        assert found.server.cycle.playout.lost == 0
+        assert found.server.controller.playout.lost == 0
 
 
 @pytest.mark.parametrize("thinking", [0.0, 0.003])
@@ -415,7 +415,7 @@ def test_in_lock_step_a_client_that_fell_behind_catches_up(thinking: float) -> N
             if not states:
                 states.append(peer.receive_state())
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
-    assert 1 <= found.server.cycle.playout.lost <= 25
+    assert 1 <= found.server.controller.playout.lost <= 25
 
 
 def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: Running) -> None:
@@ -428,7 +428,7 @@ def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: 
         for row in MOTION.q[40:]:
             state = peer.receive_newest_state()
             peer.send(state.message_id, row)
-            lag.append(len(lockstep.server.cycle.playout))
+            lag.append(len(lockstep.server.controller.playout))
         assert max(lag[20:]) <= 2
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
         state = peer.receive_live_state()
@@ -436,7 +436,7 @@ def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: 
         assert np.array_equal(state.q_c, MOTION.q[-1])
 
 
-def test_told_to_end_in_mid_motion_it_tells_the_client_with_an_error_bit() -> None:
+def test_ended_in_mid_motion_it_informs_the_client_with_an_error_bit() -> None:
     with running(lockstep=True) as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
         found.server.request_stop()
@@ -449,7 +449,7 @@ def test_told_to_end_in_mid_motion_it_tells_the_client_with_an_error_bit() -> No
         assert not found.thread.is_alive()
         assert stop_is_smooth(peer.seen)
         assert closes(peer.tcp)
-    assert any("told to end in mid-motion" in line for line in found.lines)
+    assert any("ended in mid-motion" in line for line in found.lines)
 
 
 def test_what_an_answer_says_is_in_every_state_after_it() -> None:
@@ -470,7 +470,7 @@ def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
     with Peer(lockstep) as peer:
         assert peer.ask(rci.StartMove(0, 1)) is rci.StartStatus.NOT_POSSIBLE
         assert peer.ask(rci.SetCollisionBehavior((math.nan,) * 7)) is rci.SettingStatus.INVALID_ARGUMENT
-        lockstep.server.cycle.reset(np.zeros(7))
+        lockstep.server.controller.reset(np.zeros(7))
         assert peer.ask(rci.SetMotorPower(1)) == 0
         assert peer.ask(rci.StartMove(1, 2)) is rci.StartStatus.SINGULAR_START_POSE
         assert peer.ask(rci.StartMove(0, 0)) is rci.StartStatus.NOT_POSSIBLE
@@ -547,7 +547,7 @@ def test_commands_sent_while_the_controller_stood_still_are_made_up_for() -> Non
     stall = Stall(duration=0.1, after=0.5)
     with running(lost_limit=None, mode_delay=0.005, prefill=10, stalls=(stall,)) as found, Peer(found) as peer:
         state = peer.start()
-        playout, q = found.server.cycle.playout, np.array(state.q_c)
+        playout, q = found.server.controller.playout, np.array(state.q_c)
         most = sent = 0
         peer.udp.settimeout(0.001)
         for _ in range(20_000):
@@ -577,21 +577,21 @@ def test_a_reboot_is_answered_and_then_ends_the_connection(lockstep: Running) ->
 
 def test_a_tcp_port_in_use_says_what_to_change(lockstep: Running) -> None:
     with pytest.raises(UsageError, match=rf"TCP port {lockstep.port} on 127.0.0.2 is in use.*--port N"):
-        ControllerServer(ControllerConfig(model="xMate3", port=lockstep.port))
+        build_virtual_controller(ControllerConfig(model="xMate3", port=lockstep.port))
 
 
 def test_a_udp_port_in_use_says_what_to_change(lockstep: Running) -> None:
     with pytest.raises(UsageError, match=rf"UDP port {lockstep.port} on 127.0.0.2 is in use.*--udp-port N"):
-        ControllerServer(ControllerConfig(model="xMate3", port=0, udp_port=lockstep.port))
+        build_virtual_controller(ControllerConfig(model="xMate3", port=0, udp_port=lockstep.port))
 
 
 def test_an_address_of_another_machine_is_refused() -> None:
     with pytest.raises(UsageError, match=r"192\.0\.2\.1 is not an address of this machine"):
-        ControllerServer(ControllerConfig(model="xMate3", port=0, host="192.0.2.1"))
+        build_virtual_controller(ControllerConfig(model="xMate3", port=0, host="192.0.2.1"))
 
 
 def test_the_url_names_a_udp_port_that_differs() -> None:
-    server = ControllerServer(ControllerConfig(model="xmate3", port=0, udp_port=0))
+    server = build_virtual_controller(ControllerConfig(model="xmate3", port=0, udp_port=0))
     try:
         assert f"?udp_port={server.url.rpartition('=')[2]}" in server.url
         assert server.description == f"listening {server.url} model=xMate3 plant=ideal"
@@ -601,7 +601,7 @@ def test_the_url_names_a_udp_port_that_differs() -> None:
 
 def test_an_unknown_arm_lists_the_known_ones() -> None:
     with pytest.raises(ModelError, match="xMatePro3, xMatePro7, xMate3, xMate7"):
-        ControllerServer(ControllerConfig(model="xMate9", port=0))
+        build_virtual_controller(ControllerConfig(model="xMate9", port=0))
 
 
 @pytest.mark.parametrize(

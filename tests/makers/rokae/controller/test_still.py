@@ -16,6 +16,7 @@ from rcilab.makers.rokae.faults import Fault
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 Act = Callable[[RciController, Random], None]
 
@@ -105,7 +106,9 @@ def lead(cycle: RciController, count: int, random: Random) -> None:
 @pytest.mark.parametrize("name", ["xMatePro7", "xMate3"])
 def test_whatever_happens_the_datagrams_are_those_of_a_controller_that_computes_each(name: str, plant: str):
     model = load_model(name)
-    quick, thorough = (RciController(model, build_plant(plant, model), mode_delay=5, prefill=2) for _ in range(2))
+    quick, thorough = (
+        RciController(VirtualArm(model, build_plant(plant, model), prefill=2), mode_delay=5) for _ in range(2)
+    )
     seed = len(name) + len(plant)
     random = Random(seed)
     still = 0

@@ -17,9 +17,9 @@ import pytest
 
 from rcilab.control_process.simulate import simulate
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.wire.bounds import LOWEST_CLIENT_PORT
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
+from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from tests.makers.rokae.controller.test_server import running
 
@@ -88,7 +88,7 @@ def test_connections_that_speak_no_rci_are_summed_up(sent):
                 with suppress(ConnectionResetError):
                     while link.recv(4096):
                         pass
-        found.wait_for_line("no RCI")
+        found.wait_for_line("not valid RCI")
     assert len(found.lines) == 1
 
 

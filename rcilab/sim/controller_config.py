@@ -1,4 +1,4 @@
-"""How a virtual controller is set up."""
+"""How a virtual controller is configured."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
 
 DEFAULT_HOST = "127.0.0.2"
-"""Loopback, but not the client's own address: the vendor's client binds UDP port 1337 of every address of its machine
-and would otherwise receive its own commands as states."""
+"""Loopback, but not the client's own address: a vendor's client may bind the UDP port of every address of its machine,
+as that of the RCI does, and would otherwise receive its own commands as states."""
 
-DEFAULT_PORT = 1337  # By convention of the manual (2.5).
 FEWEST_LOST, MOST_LOST = 10, 20  # Manual 4.6: the packet-loss threshold is usually 10 to 20.
 
 
@@ -33,8 +32,8 @@ class ControllerConfig:
     """Name of the arm, such as xMatePro7."""
     host: str = DEFAULT_HOST
     """Address to listen on."""
-    port: int = DEFAULT_PORT
-    """TCP port; 0 takes any free one."""
+    port: int | None = None
+    """TCP port; 0 takes any free one; None: the one that the maker's clients expect."""
     udp_port: int | None = None
     """UDP port for commands; None: the same number as the TCP port, as the vendor's client expects it; 0: any."""
     client_host: str | None = None

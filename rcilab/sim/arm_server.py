@@ -1,4 +1,4 @@
-"""The running controller: the cycle at 1 kHz or in lock-step, and its sockets. One thread; everything happens in it.
+"""The running controller of any maker: its clock, at 1 kHz or in lock-step, and its sockets. One thread for all.
 
 Free-running, a state is due every millisecond on a fixed grid; its cycle is computed a little before, so that it leaves
 in time. A cycle that this process itself missed is left out and counted: the simulated time slips, and the client does
@@ -20,16 +20,6 @@ from collections.abc import Callable
 from rcilab.core.clock import CYCLE_TIME, SystemClock
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.i18n.translator import Remark
-from rcilab.makers.maker import require_simulator
-from rcilab.makers.rokae.controller.config import ControllerConfig
-from rcilab.makers.rokae.controller.endpoint import Endpoint
-from rcilab.makers.rokae.controller.rci_controller import RciController
-from rcilab.makers.rokae.controller.request_queue import RequestQueue
-from rcilab.makers.rokae.controller.state_machine import Event, Phase
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.wire import COMMAND_SIZE, decode_command
-from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
 from rcilab.sim.arrivals import (
@@ -42,13 +32,15 @@ from rcilab.sim.arrivals import (
     FrameArrived,
     StrangerDetected,
 )
+from rcilab.sim.channels import Peer
 from rcilab.sim.clock_stalls import StallSchedule
+from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.cycle_timer import CycleTimer
+from rcilab.sim.endpoint import Endpoint
 from rcilab.sim.environment import Environment, ServerCounters
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
-from rcilab.sim.plant import Plant
-from rcilab.sim.plants import build_plant
+from rcilab.sim.maker_server import MakerServer
 from rcilab.sim.simulation_port import SimulationPort
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
@@ -58,54 +50,36 @@ COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
 CORRUPTED_TIMEOUT = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
-SHUTDOWN_NOTICE = 20  # [cycles] For which the states of an ended motion are still sent, with the error bit.
 SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
 GRACE = 2.0  # [s] For the arm to stop when the controller shall end.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
-_QUIET = (Phase.OFF, Phase.IDLE)
 _LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
 
 
-class ControllerServer:
+class ArmServer:
     """A virtual controller on its sockets. `run` in one thread; `request_stop` from anywhere, signal handlers too.
 
     Attributes:
-        cycle: The controller itself; owned by the thread that runs.
-        bad_datagrams: Datagrams that did not have the size of a command.
+        controller: The controller without its wire; owned by the thread that runs.
+        bad_datagrams: Datagrams of the client's that are not well formed.
 
     Args:
-        config: How it is set up.
-        plant: What moves; None: what the configuration says.
+        server: The maker's part: channels, codec, behaviour.
+        config: How it is configured.
         log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
 
     Raises:
-        ModelError: The configuration names no known arm, or one that does not speak the RCI.
         UsageError: An address or port cannot be used.
     """
 
     def __init__(
-        self,
-        config: ControllerConfig,
-        *,
-        plant: Plant | None = None,
-        log: Callable[[str], None] | None = None,
+        self, server: MakerServer, config: ControllerConfig, *, log: Callable[[str], None] | None = None
     ) -> None:
         self.config = config
-        model = require_simulator(load_model(config.model))
-        self._plant = plant if plant is not None else build_plant(config.plant, model)
-        self.cycle = RciController(
-            model,
-            self._plant,
-            mode_delay=config.mode_delay_cycles,
-            prefill=config.prefill_cycles,
-            torque_prefill=config.prefill,
-            lost_limit=config.lost_limit,
-        )
-        self.cycle.auto_limit = config.auto_limit
-        self.cycle.loop_back = config.loop_back
-        self.cycle.limit_table = config.limit_table
+        self.controller = server.controller
         self.bad_datagrams = 0
+        self._server = server
         self._has_timed_out = False
         self._lines: LogLines | None = None
         if log is None:
@@ -120,13 +94,14 @@ class ControllerServer:
         self._missed_before = 0
         self._logged_faults: tuple[FaultCode, ...] = ()
         self._rare_lines = SeldomLines(log, self._clock.now)
-        self._endpoint = Endpoint(config)
+        client = None if config.client_host is None else (config.client_host, config.client_port)
+        self._endpoint = Endpoint(config.host, server.channels, client)
         states_network = config.network if config.states_network is None else config.states_network
-        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network)
-        self._requests = RequestQueue(self.cycle, self._endpoint, self._network, log)
+        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network, log)
+        server.attach(self._network)
         self._stalls = StallSchedule()
         self._environment = Environment(
-            self.cycle,
+            self.controller,
             self._network,
             self._stalls,
             self._clock,
@@ -142,13 +117,13 @@ class ControllerServer:
     @property
     def url(self) -> str:
         """Where clients connect to."""
-        host, port, udp_port = self._endpoint.host, self._endpoint.port, self._endpoint.udp_port
-        return f"rci://{host}:{port}" + ("" if udp_port == port else f"?udp_port={udp_port}")
+        return f"{self._server.scheme}://{self._endpoint.host}:{self._endpoint.port}{self._endpoint.options}"
 
     @property
     def description(self) -> str:
-        """The line that says the controller is ready."""
-        return f"listening {self.url} model={self.cycle.model.name} plant={self._plant.kind}"
+        """The line that reports that the controller is ready."""
+        controller = self.controller
+        return f"listening {self.url} model={controller.model.name} plant={controller.plant.kind}"
 
     @property
     def world_address(self) -> str | None:
@@ -156,7 +131,7 @@ class ControllerServer:
         return None if self._simulation_port is None else "{}:{}".format(*self._simulation_port.address)
 
     def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
-        """Runs until `request_stop`, then brings the arm to rest and closes every socket.
+        """Runs until `request_stop`, then stops the arm and closes every socket.
 
         Args:
             on_ready: Called once, when the first state is out.
@@ -210,33 +185,24 @@ class ControllerServer:
                 self._stall(stall)
             if self._is_ending and last_moment is None:
                 last_moment = self._clock.now() + GRACE
-                notice_left = self._begin_shutdown()
+                notice_left = self._server.begin_shutdown()
             if last_moment is not None:
                 notice_left -= 1
-                if (not self.cycle.is_moving and notice_left < 0) or self._clock.now() > last_moment:
+                if (not self.controller.is_moving and notice_left < 0) or self._clock.now() > last_moment:
                     return
-            if self.config.lockstep and self.cycle.wants_commands:
+            if self.config.lockstep and self.controller.wants_commands:
                 self._await_command()
                 self._timer.restart(self._clock.now())
             else:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
                     self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
-                if self._timer.puts_off(self.cycle.is_starved):
+                if self._timer.puts_off(self.controller.is_starved):
                     continue
             has_served = self._step(self._timer.deadline)
             if not is_ready:
                 is_ready = True
                 on_ready()
-
-    def _begin_shutdown(self) -> int:
-        """Ends a motion in progress; returns for how many cycles its client is still sent states with the error bit."""
-        if self.cycle.phase is not Phase.MOVING:
-            self.cycle.on_event(Event.CLIENT_LOST)
-            return 0
-        self.cycle.reason = Remark("the controller was told to end in mid-motion", "told_to_end")
-        self.cycle.on_event(Event.FAULT, Fault.INSTABILITY_DETECTION)
-        return SHUTDOWN_NOTICE
 
     def _stall(self, duration: float) -> None:
         """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
@@ -256,29 +222,29 @@ class ControllerServer:
                 return
 
     def _await_command(self) -> None:
-        """Serves the sockets until a command is there or lost on its way, the motion is over or patience is.
+        """Serves the sockets until a command is there or lost on its way, or the motion or the waiting time is over.
 
         One that comes too late for its own cycle is not waited for any more, but shows that the client is back: it may
         then catch up.
         """
-        cycle = self.cycle
-        is_first = not cycle.playout.is_playing
-        late = cycle.playout.late
+        controller = self.controller
+        is_first = not controller.playout.is_playing
+        late = controller.playout.late
         deadline = self._clock.now() + self._command_timeout
         while True:
             remaining = min(deadline - self._clock.now(), _LOOK)
-            self._poll(0.0 if len(cycle.playout) else RESEND_TIME if is_first else remaining)
+            self._poll(0.0 if len(controller.playout) else RESEND_TIME if is_first else remaining)
             self._check_parent()
-            if len(cycle.playout) or not cycle.wants_commands or self._is_ending:
+            if len(controller.playout) or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
                 return
             if self._network.has_lost:
                 return
-            if self._has_timed_out and cycle.playout.late > late:
+            if self._has_timed_out and controller.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
             if is_first:
-                self._send_state()
+                self._server.send_states()
             elif self._clock.now() >= deadline:
                 self._has_timed_out = True
                 return
@@ -296,18 +262,17 @@ class ControllerServer:
     def _is_idle(self) -> bool:
         """Whether a cycle may be computed early and sockets be served until its state is due: one wait, not two.
 
-        A request may then show one state later, which matters to no arm at rest.
+        A request may then show one state later, which does not matter to an arm at standstill.
         """
-        cycle = self.cycle
-        is_quiet = cycle.phase in _QUIET and not self._requests.is_waiting and self._endpoint.has_client
-        return is_quiet and not (cycle.is_moving or self.config.lockstep)
+        is_quiet = self._server.is_quiet and self._endpoint.has_client
+        return is_quiet and not (self.controller.is_moving or self.config.lockstep)
 
     def _step(self, due: float) -> bool:
         """Advances by a cycle and sends its state when it is due, or at once when that time is over.
 
         Returns whether the sockets were served until then.
         """
-        was_moving = self.cycle.is_moving
+        was_moving = self.controller.is_moving
         is_idle = self._is_idle
         self._catch_up()
         self._advance()
@@ -315,10 +280,10 @@ class ControllerServer:
             self._await(due)
         else:
             self._clock.sleep_until(due)
-        self._send_state()
-        if self.cycle.is_moving is not was_moving and not self.config.lockstep:
+        self._server.send_states()
+        if self.controller.is_moving is not was_moving and not self.config.lockstep:
             self._log_slip()
-        self._requests.settle()
+        self._server.settle()
         self._check_parent()
         return is_idle
 
@@ -330,17 +295,17 @@ class ControllerServer:
 
     def _catch_up(self) -> None:
         """Advances by cycles without sending their states, when more commands wait than should."""
-        if not self.cycle.wants_commands:
+        if not self.controller.wants_commands:
             return
-        playout = self.cycle.playout
+        playout = self.controller.playout
         extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
         for _ in range(extra):
-            if self.cycle.wants_commands:
+            if self.controller.wants_commands:
                 self._advance(is_seen=False)
 
     def _log_slip(self) -> None:
         """Says how much longer than it should a motion took, when one has ended."""
-        if not self.cycle.is_moving and self.missed - self._missed_before >= SLIP:
+        if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
             self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
         self._missed_before = self.missed
@@ -348,40 +313,35 @@ class ControllerServer:
     def _advance(self, *, is_seen: bool = True) -> None:
         """Advances by one cycle."""
         if self.config.realtime and not self.config.lockstep:
-            self._cores.switch(self.cycle.is_moving)
-        state = self.cycle.step(is_seen=is_seen)
+            self._cores.switch(self.controller.is_moving)
+        self._server.step(is_seen=is_seen)
         self._environment.step()
-        if state.faults != self._logged_faults:
-            self._log_faults(state.faults)
+        faults = self.controller.faults
+        if faults is not self._logged_faults and faults != self._logged_faults:
+            self._log_faults(faults)
 
     def _log_faults(self, faults: tuple[FaultCode, ...]) -> None:
         """Logs why error bits were set: by a condition, at the simulation port, by a request."""
         self._logged_faults = faults
         if faults:
-            self._log(f"{name_faults(faults)}: {self.cycle.reason}; the arm stops")
-            if Fault.INSTABILITY_DETECTION in faults and self.cycle.playout.lost:
+            self._log(f"{name_faults(faults)}: {self.controller.reason}; the arm stops")
+            if self.controller.lacks_commands and self.controller.playout.lost:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
                 )
-
-    def _send_state(self) -> None:
-        self._network.send_state(self.cycle.datagram)
 
     def _take(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
             match arrival:
                 case DatagramArrived(datagram):
-                    if len(datagram) == COMMAND_SIZE:
-                        self.cycle.receive(decode_command(datagram, self.cycle.model.n))
-                    else:
-                        self.bad_datagrams += 1
-                case FrameArrived(frame):
-                    self._requests.take(frame)
-                case ClientConnected(address):
-                    self._warn_of_other_target(address)
-                    self._send_state()  # Before anything else: the vendor's client waits for it a few milliseconds.
-                case ClientDisconnected(reason):
-                    self._lose_client(reason)
+                    self.bad_datagrams += not self._server.receive_datagram(datagram)
+                case FrameArrived(peer, frame):
+                    self._server.receive(peer, frame)
+                case ClientConnected(peer):
+                    self._warn_of_other_target(peer.address)
+                    self._server.connect(peer)
+                case ClientDisconnected(peer, reason):
+                    self._lose_client(peer, reason)
                 case ExtraSocketsReady(sockets):
                     if self._simulation_port is not None:
                         self._simulation_port.serve(sockets)
@@ -390,7 +350,7 @@ class ControllerServer:
                     line = f"left out a UDP datagram from {address}, and will all others: {whose}"
                     self._rare_lines.write("stranger", line, "were left out")
                 case ClientRefused(address, holder):
-                    line = f"refused a second client from {address}: {holder} is connected; one at a time"
+                    line = f"refused another client from {address}: {holder} is connected"
                     self._rare_lines.write("refused", line, "were refused")
 
     def _warn_of_other_target(self, address: str) -> None:
@@ -402,11 +362,8 @@ class ControllerServer:
             )
             self._rare_lines.write("elsewhere", line, "connected")
 
-    def _lose_client(self, reason: str) -> None:
-        was_moving = self.cycle.phase in (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
-        self._requests.clear()
-        self.cycle.on_event(Event.CLIENT_LOST)
-        if was_moving:
+    def _lose_client(self, peer: Peer, reason: str) -> None:
+        if self._server.disconnect(peer):
             self._log(f"the client {reason} in mid-motion: the arm stops")
         elif reason != "closed the connection":
             self._rare_lines.write("left", f"the client {reason}", "clients were lost")

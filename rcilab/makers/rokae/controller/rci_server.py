@@ -1,0 +1,159 @@
+"""The virtual side of the RCI: one TCP client whose requests are handled in order, commands and states over UDP.
+
+An answer may have to wait, for the next state or until the arm stands still; then it holds up the requests behind it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from rcilab.core.errors import DecodeError
+from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.controller.rci_controller import RciController
+from rcilab.makers.rokae.controller.request_handlers import Reply
+from rcilab.makers.rokae.controller.state_machine import Event, Phase, When
+from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.wire import (
+    COMMAND_SIZE,
+    Connect,
+    FrameReader,
+    Request,
+    decode_command,
+    decode_request,
+    encode_response,
+)
+from rcilab.sim.channels import Link, Peer, TcpChannel, UdpChannel
+from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.virtual_arm import VirtualArm
+
+DEFAULT_PORT = 1337  # By convention of the manual (2.5).
+SHUTDOWN_NOTICE = 20  # [cycles] For which the states of an ended motion are still sent, with the error bit.
+_PROTOCOL = "RCI"
+_QUIET = (Phase.OFF, Phase.IDLE)
+_ACTIVE = (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
+
+
+def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
+    """Returns the RCI server of an arm as it is configured."""
+    controller = RciController(arm, mode_delay=config.mode_delay_cycles)
+    controller.auto_limit = config.auto_limit
+    controller.loop_back = config.loop_back
+    controller.limit_table = config.limit_table
+    port = DEFAULT_PORT if config.port is None else config.port
+    return RciServer(controller, port, config.udp_port, config.client_port)
+
+
+class RciServer:
+    """A `MakerServer` for the RCI.
+
+    Args:
+        controller: What grants or refuses requests and follows commands.
+        port: TCP port; 0 takes any free one.
+        udp_port: For commands; None: the same number, as the vendor's client expects it.
+        client_port: Where states go; None: the same number.
+    """
+
+    scheme = "rci"
+
+    def __init__(self, controller: RciController, port: int, udp_port: int | None, client_port: int | None) -> None:
+        self.controller = controller
+        self.channels = (
+            TcpChannel(protocol=_PROTOCOL, port=port, open_framer=FrameReader),
+            UdpChannel(port=udp_port, target_port=client_port),
+        )
+        self._n = controller.model.n
+        self._link: Link
+        self._peer: Peer | None = None
+        self._frames: deque[bytes] = deque()
+        self._pending: tuple[Request, int, Reply] | None = None
+        self._asked = 0  # Number of the last state before the request that waits.
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing moves and no answer waits."""
+        return self.controller.phase in _QUIET and self._pending is None
+
+    def attach(self, link: Link) -> None:
+        """Takes what it sends with."""
+        self._link = link
+
+    def connect(self, peer: Peer) -> None:
+        """Takes a client and sends a state before anything else: the vendor's waits for it a few milliseconds."""
+        self._peer = peer
+        self.send_states()
+
+    def disconnect(self, peer: Peer) -> bool:
+        """Stops the arm; returns whether it was moving."""
+        was_moving = self.controller.phase in _ACTIVE
+        self._peer = None
+        self._frames.clear()
+        self._pending = None
+        self.controller.on_event(Event.CLIENT_LOST)
+        return was_moving
+
+    def receive(self, peer: Peer, frame: bytes) -> None:
+        """Takes a request and handles it when it is its turn."""
+        self._frames.append(frame)
+        self._serve(peer)
+
+    def receive_datagram(self, datagram: bytes) -> bool:
+        """Takes a command; returns whether it has the size of one."""
+        if len(datagram) != COMMAND_SIZE:
+            return False
+        self.controller.receive(decode_command(datagram, self._n))
+        return True
+
+    def step(self, *, is_seen: bool = True) -> None:
+        """Advances by one cycle."""
+        self.controller.step(is_seen=is_seen)
+
+    def send_states(self) -> None:
+        """Sends the last state."""
+        self._link.send_datagram(self.controller.datagram)
+
+    def settle(self) -> None:
+        """Gives the answer that had to wait if it is due, and goes on to the requests behind it."""
+        if self._pending is not None and self._is_due(self._pending[2].when):
+            waited, self._pending = self._pending, None
+            assert self._peer is not None
+            self._answer(self._peer, *waited)
+            self._serve(self._peer)
+
+    def begin_shutdown(self) -> int:
+        """Ends a motion in progress; returns for how many cycles its client is still sent states with the error bit."""
+        if self.controller.phase is not Phase.MOVING:
+            self.controller.on_event(Event.CLIENT_LOST)
+            return 0
+        self.controller.reason = Remark("the controller was ended in mid-motion", "told_to_end")
+        self.controller.on_event(Event.FAULT, Fault.INSTABILITY_DETECTION)
+        return SHUTDOWN_NOTICE
+
+    def _is_due(self, when: When) -> bool:
+        is_shown = self.controller.state.message_id > self._asked
+        return is_shown and (when is When.SHOWN or self.controller.is_settled)
+
+    def _serve(self, peer: Peer) -> None:
+        """Handles requests in order, up to one whose answer has to wait."""
+        while self._frames and self._pending is None:
+            frame = self._frames.popleft()
+            try:
+                command_id, request = decode_request(frame)
+            except DecodeError as error:
+                self._frames.clear()
+                self._link.drop(peer, f"sent bytes that are not valid {_PROTOCOL}: {error}")
+                return
+            reply = self.controller.handle(request)
+            if reply.refusal:
+                self._link.log(reply.refusal)
+            if isinstance(request, Connect):
+                self._link.direct_datagrams(peer, request.udp_port)
+            # An answer is given when its effect shows: after a reply that waits, every state shows the new mode.
+            if reply.when is When.NOW:
+                self._answer(peer, request, command_id, reply)
+            else:
+                self._pending, self._asked = (request, command_id, reply), self.controller.state.message_id
+
+    def _answer(self, peer: Peer, request: Request, command_id: int, reply: Reply) -> None:
+        self._link.send_frame(peer, encode_response(request.code, command_id, self.controller.conclude(reply)))
+        if reply.ends_connection:
+            self._link.drop(peer, "asked for a reboot")

@@ -1,0 +1,40 @@
+"""Building the virtual controller of any arm: its maker comes from the model's name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rcilab.makers.maker import maker_of, require_simulator
+from rcilab.model.robot_model import load_model
+from rcilab.sim.arm_server import ArmServer
+from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.plant import Plant
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
+
+
+def build_virtual_controller(
+    config: ControllerConfig, *, plant: Plant | None = None, log: Callable[[str], None] | None = None
+) -> ArmServer:
+    """Returns a virtual controller with its sockets open; `run` makes it serve.
+
+    Args:
+        config: How it is configured.
+        plant: What moves; None: what the configuration names.
+        log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
+
+    Raises:
+        ModelError: The configuration names no known arm, or one without a virtual controller.
+        UsageError: An address or port cannot be used.
+    """
+    model = require_simulator(load_model(config.model))
+    maker = maker_of(model)
+    assert maker is not None  # A simulated arm has one.
+    arm = VirtualArm(
+        model,
+        build_plant(config.plant, model) if plant is None else plant,
+        prefill=config.prefill_cycles,
+        torque_prefill=config.prefill,
+        lost_limit=config.lost_limit,
+    )
+    return ArmServer(maker.build_server(arm, config), config, log=log)

@@ -1,0 +1,344 @@
+"""The sockets of a virtual controller: TCP channels and the UDP streams. Bytes in, bytes out, no meaning."""
+
+from __future__ import annotations
+
+import errno
+import select
+import socket
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rcilab.core.errors import DecodeError, UsageError
+from rcilab.sim.arrivals import (
+    Arrival,
+    ClientConnected,
+    ClientDisconnected,
+    ClientRefused,
+    DatagramArrived,
+    ExtraSocketsReady,
+    FrameArrived,
+    StrangerDetected,
+)
+from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpChannel, UdpChannel
+
+_LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
+_DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot hold up the cycle.
+_FRAME_BYTES_AT_ONCE = 4096
+_BACKLOG = 8  # [connections] That wait to be accepted.
+_ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Connection:
+    peer: Peer
+    framer: Framer
+
+
+class Endpoint:
+    """Owns every socket of a controller. Never blocks longer than the timeout.
+
+    Attributes:
+        host: Address that it listens on.
+        port: TCP port of the main channel.
+        strangers: Datagrams that were ignored because they did not come from the client.
+
+    Args:
+        host: Address to listen on.
+        channels: At least one of TCP, the main one first; at most one of UDP.
+        client: Host and port that states go to from power-up on, whoever connects; a port of None: the UDP channel's.
+            None: to the client that connects.
+
+    Raises:
+        UsageError: An address or port cannot be used; the message says what to change.
+    """
+
+    def __init__(self, host: str, channels: Sequence[Channel], client: tuple[str, int | None] | None = None) -> None:
+        self._listeners, self._datagrams = _open(_resolve(host), channels)
+        main = next(iter(self._listeners))
+        self.host, self.port = main.getsockname()
+        self._main = self._listeners[main]
+        udp = next((channel for channel in channels if isinstance(channel, UdpChannel)), None)
+        self._own_port = self.port if udp is None or udp.target_port is None else udp.target_port
+        self._state_port = self._own_port
+        self._fixed_target: tuple[str, int] | None = None
+        if client is not None:
+            self._fixed_target = (_resolve(client[0]), self._own_port if client[1] is None else client[1])
+        self._target = self._fixed_target
+        self._connections: dict[socket.socket, _Connection] = {}
+        self._sockets: dict[Peer, socket.socket] = {}
+        self._owner: Peer | None = None  # The client of the main channel whose datagrams count.
+        self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
+        self._has_named_stranger = False
+        self.strangers = 0
+        self._arrivals: deque[Arrival] = deque()
+        self._watched: list[socket.socket] = []
+        self._watch()
+
+    @property
+    def options(self) -> str:
+        """What an address has to say about the other ports, such as "?udp_port=1338"; "" for usual ones."""
+        found = [
+            (channel.name, listener.getsockname()[1], channel.usual_port)
+            for listener, channel in self._listeners.items()
+            if channel is not self._main
+        ]
+        if self._datagrams is not None:
+            sock, channel = self._datagrams
+            found.append((channel.name, sock.getsockname()[1], None))
+        words = [f"{name}={port}" for name, port, usual in found if port != (self.port if usual is None else usual)]
+        return "?" + "&".join(words) if words else ""
+
+    @property
+    def fixed_host(self) -> str | None:
+        """Where states go, whichever client connects; None: to the client that connects."""
+        return None if self._fixed_target is None else self._fixed_target[0]
+
+    @property
+    def has_client(self) -> bool:
+        """Whether a client is connected to the main channel."""
+        return any(peer.channel is self._main for peer in self._sockets)
+
+    @property
+    def peers(self) -> list[Peer]:
+        """The connected clients."""
+        return list(self._sockets)
+
+    def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
+        """Returns what has arrived; waits up to `timeout`, [s], for the first thing. Datagrams come before frames.
+
+        Args:
+            timeout: Longest wait, [s].
+            extra_sockets: Sockets of other parts to be watched, too.
+        """
+        watched = [*self._watched, *extra_sockets]
+        readable = select.select(watched, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
+        if not (readable or self._arrivals):
+            return []
+        extra: list[socket.socket] = []
+        for sock in readable:  # In the order in which they are watched.
+            if self._datagrams is not None and sock is self._datagrams[0]:
+                self._receive_datagrams(sock)
+            elif sock in self._connections:
+                self._receive_frames(sock)
+            elif sock in self._listeners:
+                self._accept(sock)
+            elif sock in extra_sockets:
+                extra.append(sock)
+        if extra:
+            self._arrivals.append(ExtraSocketsReady(extra))
+        arrivals = list(self._arrivals)
+        self._arrivals.clear()
+        return arrivals
+
+    def send_datagram(self, datagram: bytes) -> None:
+        """Sends a datagram to where they go; nowhere while that is unknown. One that cannot be sent is lost."""
+        if self._target is not None and self._datagrams is not None:
+            try:
+                self._datagrams[0].sendto(datagram, self._target)
+            except OSError:  # No route, no buffer: the client sees a missing state, as on any network.
+                return
+
+    def send_frame(self, peer: Peer, frame: bytes) -> None:
+        """Sends a frame with a single send call, as the clients of the RCI need it."""
+        sock = self._sockets.get(peer)
+        if sock is None:
+            return
+        try:
+            sent = sock.send(frame)
+        except OSError as error:
+            self.drop(peer, f"could not be answered ({error.strerror})")
+            return
+        if sent < len(frame):
+            self.drop(peer, "does not read its answers")
+
+    def drop(self, peer: Peer, reason: str) -> None:
+        """Ends a connection; the next `poll` reports it."""
+        sock = self._sockets.pop(peer, None)
+        if sock is None:
+            return
+        sock.close()
+        del self._connections[sock]
+        if peer is self._owner:
+            self._owner = None
+            self._state_port = self._own_port
+            self._target = self._fixed_target
+        self._watch()
+        self._arrivals.append(ClientDisconnected(peer, reason))
+
+    def direct_datagrams(self, peer: Peer, port: int) -> bool:
+        """Has datagrams go to a UDP port of this client's until it leaves; returns False for a port that may not be.
+
+        What `--client` says about the host holds all the same.
+        """
+        if not LOWEST_CLIENT_PORT <= port <= 65535 or peer not in self._sockets:
+            return False
+        if peer is not self._owner:
+            self._own(peer)
+        self._state_port = port
+        self._target = (peer.address if self.fixed_host is None else self.fixed_host, port)
+        return True
+
+    def close(self) -> None:
+        """Closes every socket."""
+        for sock in self._watched:
+            sock.close()
+        self._connections.clear()
+        self._sockets.clear()
+        self._watched = []
+
+    def _own(self, peer: Peer) -> None:
+        """Makes a client the one whose datagrams count."""
+        self._owner = peer
+        self._sender, self._has_named_stranger = None, False
+        if self._fixed_target is None and self._state_port:
+            self._target = (peer.address, self._state_port)
+
+    def _watch(self) -> None:
+        datagrams = () if self._datagrams is None else (self._datagrams[0],)
+        self._watched = [*datagrams, *self._connections, *self._listeners]
+
+    def _receive_datagrams(self, sock: socket.socket) -> None:
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                datagram, sender = sock.recvfrom(_LARGEST_DATAGRAM)
+            except OSError:  # Nothing more, or an error report that concerns an earlier send.
+                return
+            if sender == self._sender or self._accepts(sender):
+                self._arrivals.append(DatagramArrived(datagram))
+
+    def _accepts(self, sender: tuple[str, int]) -> bool:
+        """Returns whether a sender other than the last one is the client; others are counted, one is named."""
+        client = "" if self._owner is None else self._owner.address
+        if sender[0] in (client, self.fixed_host) and (self._sender is None or sender[1] == self._state_port):
+            self._sender = sender
+            return True
+        self.strangers += 1
+        if not self._has_named_stranger:
+            self._has_named_stranger = True
+            self._arrivals.append(StrangerDetected("{}:{}".format(*sender), client))
+        return False
+
+    def _receive_frames(self, sock: socket.socket) -> None:
+        connection = self._connections[sock]
+        try:
+            data = sock.recv(_FRAME_BYTES_AT_ONCE)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self.drop(connection.peer, f"connection broke ({error.strerror})")
+            return
+        if not data:
+            self.drop(connection.peer, "closed the connection")
+            return
+        try:
+            self._arrivals.extend(FrameArrived(connection.peer, frame) for frame in connection.framer.feed(data))
+        except DecodeError as error:
+            self.drop(connection.peer, f"sent bytes that are not valid {connection.peer.channel.protocol}: {error}")
+
+    def _accept(self, listener: socket.socket) -> None:
+        channel = self._listeners[listener]
+        try:
+            sock, (address, _) = listener.accept()
+        except OSError:  # It was gone before we looked.
+            return
+        holders = [peer for peer in self._sockets if peer.channel is channel]
+        if len(holders) >= channel.most_clients:
+            sock.close()
+            self._arrivals.append(ClientRefused(address, ", ".join(holder.address for holder in holders)))
+            return
+        sock.setblocking(False)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        peer = Peer(address, channel)
+        self._connections[sock] = _Connection(peer, channel.open_framer())
+        self._sockets[peer] = sock
+        self._watch()
+        if channel is self._main and self._owner is None and self._datagrams is not None:
+            self._own(peer)
+        self._arrivals.append(ClientConnected(peer))
+
+
+def _open(
+    address: str, channels: Sequence[Channel]
+) -> tuple[dict[socket.socket, TcpChannel], tuple[socket.socket, UdpChannel] | None]:
+    udp = next((channel for channel in channels if isinstance(channel, UdpChannel)), None)
+    main = next(channel for channel in channels if isinstance(channel, TcpChannel))
+    attempts = _ATTEMPTS if main.port == 0 and udp is not None and udp.port is None else 1
+    while True:
+        attempts -= 1
+        sockets: list[socket.socket] = []
+        try:
+            return _open_once(address, channels, sockets)
+        except UsageError:
+            for sock in sockets:
+                sock.close()
+            if attempts <= 0:
+                raise
+
+
+def _open_once(
+    address: str, channels: Sequence[Channel], sockets: list[socket.socket]
+) -> tuple[dict[socket.socket, TcpChannel], tuple[socket.socket, UdpChannel] | None]:
+    """Opens every channel; what is open is in `sockets`, also when one cannot be opened."""
+    listeners: dict[socket.socket, TcpChannel] = {}
+    datagrams: tuple[socket.socket, UdpChannel] | None = None
+    for channel in channels:
+        if isinstance(channel, TcpChannel):
+            sock = _bind(socket.SOCK_STREAM, address, channel.port, channel.option)
+            sockets.append(sock)
+            listeners[sock] = channel
+    main = next(iter(listeners))
+    for channel in channels:
+        if isinstance(channel, UdpChannel):
+            if channel.port is None:
+                sock = _bind(socket.SOCK_DGRAM, address, main.getsockname()[1], listeners[main].option)
+            else:
+                # SO_REUSEADDR below lets two sockets share a UDP port unseen; a number of its own must really be free.
+                _bind(socket.SOCK_DGRAM, address, channel.port, channel.option, shared=False).close()
+                sock = _bind(socket.SOCK_DGRAM, address, channel.port, channel.option)
+            sockets.append(sock)
+            datagrams = (sock, channel)
+    for listener in listeners:
+        listener.listen(_BACKLOG)
+    for sock in sockets:
+        sock.setblocking(False)
+    return listeners, datagrams
+
+
+def _bind(kind: socket.SocketKind, address: str, port: int, option: str, *, shared: bool = True) -> socket.socket:
+    sock = socket.socket(socket.AF_INET, kind)
+    # On UDP so that the vendor's client, which binds the same number on every address, can live on this machine too.
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(shared))
+    try:
+        sock.bind((address, port))
+    except OSError as error:
+        sock.close()
+        raise UsageError(_explain(error, kind, address, port, option)) from error
+    return sock
+
+
+def _explain(error: OSError, kind: socket.SocketKind, address: str, port: int, option: str) -> str:
+    name = "TCP" if kind is socket.SOCK_STREAM else "UDP"
+    if error.errno == errno.EADDRINUSE:
+        others = "controller" if kind is socket.SOCK_STREAM else "controller, or the client that took every address,"
+        return (
+            f"{name} port {port} on {address} is in use; stop the other {others} there, or choose another port "
+            f"with {option} N (0 takes any free one)"
+        )
+    if error.errno == errno.EADDRNOTAVAIL:
+        return (
+            f"{address} is not an address of this machine; choose one with --host, such as 127.0.0.2, or start the "
+            "controller where that address is: ip netns exec NAME rcilab controller …"
+        )
+    if error.errno == errno.EACCES:
+        return f"{name} port {port} needs privileges; choose one above 1023 with {option} N"
+    return f"{name} port {port} on {address} cannot be used: {error.strerror}; choose others with --host and {option}"
+
+
+def _resolve(host: str) -> str:
+    try:
+        return socket.gethostbyname(host)
+    except OSError as error:
+        raise UsageError(
+            f"{host!r} is not an address that can be resolved; use an IPv4 address such as 127.0.0.2"
+        ) from error
