@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import select
 import socket
+import struct
 import time
+from contextlib import suppress
 from typing import Protocol
 
 from rcilab.core.errors import ConnectionLostError, DecodeError
@@ -14,7 +17,9 @@ from rcilab.makers.rokae.wire import FrameReader
 
 RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
 _LARGEST = 2048  # [bytes] More than any datagram of the RCI.
+_DATAGRAMS_AT_ONCE = 512  # Read in one call: more than the buffer holds of states, and no flood keeps the caller.
 _MS = 1000.0
+_ATTACH_FILTER = 26  # SO_ATTACH_FILTER of Linux; `socket` has no name for it.
 
 
 class Transport(Protocol):
@@ -69,7 +74,8 @@ class SocketTransport:
     def __init__(self, address: RciAddress, state_size: int, timeout: float) -> None:
         self.address = address
         self.foreign = 0
-        """Datagrams dropped because of their size or sender."""
+        """Datagrams dropped because of their size or sender, without those that the kernel dropped."""
+        self._sender: tuple[str, int] | None = None  # Where states come from, once one has come.
         self._state_size = state_size
         route = choose_route(address)
         self._robot_host = route.robot_udp[0]
@@ -78,6 +84,7 @@ class SocketTransport:
         self._was_answered = False
         self._reader = FrameReader()
         self._udp = _bind_udp(address, route)
+        _accept_only_from(self._udp, self._robot_host)
         try:
             self._tcp = _connect_tcp(address, route, timeout)
         except BaseException:
@@ -127,21 +134,34 @@ class SocketTransport:
         return self._frames.pop(0)
 
     def receive_states(self) -> list[bytes]:
-        """Returns every state datagram that has arrived, oldest first; does not wait."""
+        """Returns the state datagrams that have arrived, oldest first; does not wait.
+
+        States count that come from the robot's address, and from the port that commands go to. From another port they
+        are taken at the first one's, until one comes from where commands go.
+        """
         states: list[bytes] = []
-        while True:
+        for _ in range(_DATAGRAMS_AT_ONCE):
             try:
                 datagram, sender = self._udp.recvfrom(_LARGEST)
             except (BlockingIOError, InterruptedError):
-                return states
+                break
             except ConnectionError:  # An earlier command met a closed port; its ICMP answer says nothing new.
                 continue
-            if len(datagram) == self._state_size and sender[0] == self._robot_host:
+            if len(datagram) == self._state_size and (sender == self._sender or self._accepts(sender)):
                 states.append(datagram)
             else:
                 self.foreign += 1
             if not self._states_ready.poll(0):  # A third of what an exception takes, and there is mostly just one.
-                return states
+                break
+        return states
+
+    def _accepts(self, sender: tuple[str, int]) -> bool:
+        """Returns whether a sender other than the last one is the robot."""
+        is_first = self._sender is None and sender[0] == self._robot_host
+        if is_first or sender == self._command_address:
+            self._sender = sender
+            return True
+        return False
 
     def send_command(self, datagram: bytes) -> None:
         """Sends one command datagram; a full or refusing network drops it, as the network may at any time."""
@@ -186,6 +206,21 @@ class SocketTransport:
         return ConnectionLostError(
             f"{self.address}: the connection is lost ({reason}); look whether the controller runs, and connect again"
         )
+
+
+def _accept_only_from(udp: socket.socket, host: str) -> None:
+    """Has the kernel drop datagrams of other senders: a flood of them would leave no room for states in the buffer.
+
+    A filter of classic BPF, struct sock_filter and sock_fprog. Where the kernel grants none, senders are checked when
+    their datagrams are read.
+    """
+    load_source = (0x20, 0, 0, (-0x100000 + 12) & 0xFFFFFFFF)  # BPF_LD | BPF_W | BPF_ABS, SKF_NET_OFF: the IP header's.
+    is_host = (0x15, 0, 1, int.from_bytes(socket.inet_aton(host), "big"))  # BPF_JMP | BPF_JEQ | BPF_K
+    keep, drop = (0x06, 0, 0, 0xFFFFFFFF), (0x06, 0, 0, 0)  # BPF_RET | BPF_K
+    program = b"".join(struct.pack("HBBI", *step) for step in (load_source, is_host, keep, drop))
+    buffer = ctypes.create_string_buffer(program)
+    with suppress(OSError):
+        udp.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, struct.pack("HP", 4, ctypes.addressof(buffer)))
 
 
 def _bind_udp(address: RciAddress, route: Route) -> socket.socket:

@@ -1,0 +1,75 @@
+"""Datagrams of strangers at the client: they neither count as states nor keep it from those of the robot."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from rcilab.makers.rokae.driver import transport as module
+from rcilab.makers.rokae.driver.address import parse_address
+from rcilab.makers.rokae.driver.transport import SocketTransport
+
+HOST, SIZE = "127.0.0.2", 1000
+
+
+@dataclass
+class Wire:
+    transport: SocketTransport
+    robot: socket.socket
+
+    def send(self, sender: socket.socket, content: bytes, count: int = 1) -> None:
+        for _ in range(count):
+            sender.sendto(content.ljust(SIZE, b"."), self.transport.local_address)
+
+    def received(self) -> list[bytes]:
+        return [state.rstrip(b".") for state in self.transport.receive_states()]
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with socket.create_server((HOST, 0)) as listener, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
+        port = listener.getsockname()[1]
+        robot.bind((HOST, port))
+        transport = SocketTransport(parse_address(f"rci://{HOST}:{port}"), SIZE, 10.0)
+        yield Wire(transport, robot)
+        transport.close()
+
+
+def sender(host: str) -> socket.socket:
+    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    bound.bind((host, 0))
+    return bound
+
+
+def test_a_flood_from_another_address_leaves_room_for_a_state(wire: Wire):
+    with sender("127.0.0.9") as stranger:
+        wire.send(stranger, b"stranger", 5000)
+    wire.send(wire.robot, b"state")
+    assert wire.received() == [b"state"]
+    assert wire.transport.foreign == 0, "the kernel dropped them"
+
+
+def test_the_robots_port_counts_and_no_other_once_it_is_known(wire: Wire):
+    with sender(HOST) as stranger:
+        wire.send(stranger, b"first")
+        wire.send(wire.robot, b"state")
+        wire.send(stranger, b"stranger")
+        wire.send(wire.robot, b"next")
+    assert wire.received() == [b"first", b"state", b"next"]
+    assert wire.transport.foreign == 1
+
+
+def test_a_robot_that_sends_from_another_port_is_received(wire: Wire):
+    with sender(HOST) as robot, sender(HOST) as stranger:
+        for sock in (robot, stranger, robot):
+            wire.send(sock, b"state")
+    assert wire.received() == [b"state", b"state"]
+
+
+def test_a_flood_from_the_robots_own_address_does_not_keep_the_caller(wire: Wire, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(module, "_DATAGRAMS_AT_ONCE", 8)
+    wire.send(wire.robot, b"state", 20)
+    assert [len(wire.received()) for _ in range(4)] == [8, 8, 4, 0]
