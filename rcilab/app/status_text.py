@@ -29,7 +29,7 @@ _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
 }  # fmt: skip
 """States that have a text of their own instead of that of their phase."""
-_LOST = ("lost.silent", "lost.unreachable", "lost.other_arm", "lost.rebooted")
+_LOST = ("lost.silent", "lost.unreachable", "lost.closed", "lost.other_arm", "lost.rebooted")
 
 
 class StartingError(UsageError):

@@ -172,6 +172,7 @@ def as_sendable(error: Exception) -> RcilabError:
         error = copy.copy(error)
         error.record = None
         error.__dict__.pop("stop", None)
+        error.__dict__.pop("run", None)
     try:
         if len(pickle.dumps(error)) <= MESSAGE_SIZE - _OVERHEAD:
             return error

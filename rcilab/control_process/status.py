@@ -54,6 +54,7 @@ MESSAGES: dict[str, str] = {
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
     "fault.pressed": "An emergency stop or the safety gate holds the arm: release it, then power on.",
     "lost.unreachable": "{error}",
+    "lost.closed": "{error}",
     "lost.rebooted": "{address} restarts; reconnect once it is up.",
     "lost.other_arm": "{error}",
     "lost.silent": "{address} has stopped sending states; reconnect tries again.",

@@ -584,7 +584,9 @@ class Supervisor(Closeable):
         A controller's death is known a little later than the end of its connection: hence more looks than one.
         """
         shown = self._reader.read_snapshot()
-        is_lost = shown.code == "lost.unreachable" and self._crash is None and self._connecting is not None
+        is_lost = (
+            shown.code in ("lost.unreachable", "lost.closed") and self._crash is None and self._connecting is not None
+        )
         self._lost_looks = self._lost_looks + 1 if is_lost else 0
         if self._lost_looks == _LOSS_LOOKS:
             self._note(shown.code, shown.message)

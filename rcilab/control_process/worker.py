@@ -235,8 +235,10 @@ class ControlProcess:
 
     def _lose(self, error: Exception) -> None:
         """Gives the connection up and says why."""
+        code = "lost.unreachable" if self._driver is None else "lost.closed"
+        if isinstance(error, ModelError):
+            code = "lost.other_arm"
         self._disconnect()
-        code = "lost.other_arm" if isinstance(error, ModelError) else "lost.unreachable"
         self._publisher.say("lost", code, error=str(error))
 
     def _connect(self, request: Connect) -> None:

@@ -152,14 +152,18 @@ class RecordedError(RcilabError):
 
     Attributes:
         record: The last cycles before the end, as recorded: a structured array, one row a cycle; or None.
+        run: The whole motion up to its end, an `rcilab.Run`: to be plotted, saved and replayed; None where none was
+            under way, or where it ran in another process.
     """
+
+    run: Any = None
 
     def __init__(self, message: str, record: Any = None) -> None:
         super().__init__(message)
         self.record = record
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz.
+        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz. `run.save` writes them all.
 
         Raises:
             UsageError: There is no record.

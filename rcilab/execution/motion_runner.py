@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import RecordedError
 from rcilab.core.state import Mode
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.filters import CommandFilter
@@ -137,7 +138,9 @@ class MotionRunner:
                     collision_thresholds=self._arm.collision_thresholds,
                 )
         except BaseException as error:
-            if self._listeners:
-                report(str(error) or type(error).__name__, error)
+            if self._listeners or isinstance(error, RecordedError):
+                run = report(str(error) or type(error).__name__, error)
+                if isinstance(error, RecordedError):
+                    error.run = run
             raise
         return report(stopped)

@@ -25,7 +25,7 @@ _REQUIREMENTS = frozenset(
 _PLACES = {"waypoint": "waypoint_error", "way": "way_error", "way_to_start": "way_error", "blend": "way_error"}
 """What is not about a target: a waypoint of a program, or the way to one; and where its words for what is in
 `_ADVISING` are."""
-_ADVISING = frozenset({"too_far", "too_close", "no_angles", "joint_beyond", "no_motion"})
+_ADVISING = frozenset({"too_far", "too_close", "no_angles", "joint_beyond", "joint_beyond_soft", "no_motion"})
 """Reasons whose words say what to do with the target."""
 _SHOWN = 40  # Characters of a value that is repeated.
 

@@ -59,6 +59,39 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
         raise PlanningError(f"{said}choose an angle between them, or {widen}").coded("range_soft", **facts)
 
 
+def limit_passed(limits: JointLimits, joint: int, angle: float, advice: str) -> PlanningError:
+    """Returns the error that says which bound a way of the tool passes: the joint's own, or the soft limit set there.
+
+    Args:
+        limits: Of each joint.
+        joint: Which one, counted from 1.
+        angle: Where it would be, [rad].
+        advice: What helps, for people.
+    """
+    said, facts = _crossed("pass", limits, joint, angle)
+    error = PlanningError(f"{said}; {advice}")
+    return error.coded("path_limit_soft", **facts) if "limit" in facts else error.coded("path_limit", **facts)
+
+
+def limit_touched(limits: JointLimits, joint: int, angle: float, advice: str = "") -> PlanningError:
+    """Returns the error that says which bound a planned motion touches; see `limit_passed`."""
+    said, facts = _crossed("touch", limits, joint, angle)
+    error = PlanningError(f"{said}; {advice}" if advice else said)
+    return error.coded("touches_soft", **facts) if "limit" in facts else error.coded("touches", **facts)
+
+
+def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[str, dict[str, str | int]]:
+    """Returns which bound is crossed and where, in words and as facts: with a limit where a soft one was set."""
+    low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
+    facts = {"joint": joint, **_in_degrees(angle=angle, low=low, high=high)}
+    soft = limits.soft_bound_passed(joint, angle)
+    if soft is None:
+        what = f"joint {joint} would {verb} its limit at {degrees(angle):.2f} deg"
+        return f"{what} ({degrees(low):.0f} to {degrees(high):.0f} deg)", facts
+    what = f"joint {joint} would {verb} the soft limit of {degrees(soft):.2f} deg that was set, at "
+    return f"{what}{degrees(angle):.2f} deg; widen it (set_joint_limit)", facts | _in_degrees(limit=soft)
+
+
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:
     """Returns the limits of a motion that starts at `q`: a joint that starts outside may lead back, not farther out.
 

@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import PlanningError, RcilabError, SingularError, UnreachableError
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.bounds import limit_passed
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path
 
@@ -57,11 +58,7 @@ def examine(
     if outside[:1] == [first]:
         angles = rows[first]
         i = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
-        angle, low, high = (math.degrees(a) for a in (angles[i], limits.lower[i], limits.upper[i]))
-        passed = PlanningError(
-            f"joint {i + 1} would pass its limit at {angle:.1f} deg ({low:.0f} to {high:.0f} deg); "
-            f"start from another branch{advice}"
-        ).coded("path_limit", joint=i + 1, angle=f"{angle:.1f}", low=f"{low:.0f}", high=f"{high:.0f}")
+        passed = limit_passed(limits, i + 1, float(angles[i]), f"start from another branch{advice}")
         return rows, Obstacle(first, passed, False)
     i = int(excess[first - 1].argmax())
     turn = abs(math.degrees(rows[first, i] - rows[first - 1, i]))

@@ -16,7 +16,7 @@ from rcilab.core.arrays import Array, JointPath, JointVector, as_number, make_re
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.bounds import LIMIT_MARGIN
+from rcilab.motion.bounds import LIMIT_MARGIN, limit_touched
 from rcilab.motion.hermite import quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
@@ -165,9 +165,7 @@ def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Arra
     outside = np.argwhere(~((limits.lower < rows) & (rows < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()
-        angle = math.degrees(rows[row, joint])
-        touched = PlanningError(f"joint {joint + 1} would touch its limit at {angle:.2f} deg")
-        raise refusal(path, float(shares[row]), touched.coded("touches", joint=joint + 1, angle=f"{angle:.2f}"))
+        raise refusal(path, float(shares[row]), limit_touched(limits, joint + 1, float(rows[row, joint])))
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:

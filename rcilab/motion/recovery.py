@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Vector3, as_vector
 from rcilab.core.errors import PlanningError
+from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, require_model
@@ -53,17 +54,7 @@ def plan_recovery(
     beyond = np.maximum(limits.lower - start, start - limits.upper)
     farthest = int(beyond.argmax())
     if beyond[farthest] > RECOVERY_RANGE:
-        raise PlanningError(
-            f"joint {farthest + 1}: {angle_text(float(start[farthest]))} is {degrees(beyond[farthest]):.2f}° outside "
-            f"its range, and plan_recovery leads back from {degrees(RECOVERY_RANGE):g}° at most; guide the arm back by "
-            "hand (start_drag), or widen a soft limit (set_joint_limit)"
-        ).coded(
-            "recovery_range",
-            joint=farthest + 1,
-            angle=f"{degrees(start[farthest]):.2f}",
-            beyond=f"{degrees(beyond[farthest]):.2f}",
-            most=f"{degrees(RECOVERY_RANGE):g}",
-        )
+        raise _too_far(limits, farthest + 1, float(start[farthest]), float(beyond[farthest]))
     if box is not None and beyond[farthest] < 0.0:
         T = model.forward(start)
         if box.active and box.excess(T.parts[1]) > 0.0:
@@ -73,6 +64,20 @@ def plan_recovery(
     opened = range_from(limits, start)
     arm = model.with_joint_limits(opened.lower, opened.upper)
     return plan_joint(arm, start, goal, speed=speed, law="torque_rate_limited")
+
+
+def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> PlanningError:
+    soft, most = limits.soft_bound_passed(joint, angle), f"{degrees(RECOVERY_RANGE):g}"
+    facts = {"joint": joint, "angle": f"{degrees(angle):.2f}", "beyond": f"{degrees(beyond):.2f}", "most": most}
+    where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
+    said = (
+        f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery leads back "
+        f"from {most}° at most; guide the arm back by hand (start_drag)"
+    )
+    if soft is None:
+        return PlanningError(said).coded("recovery_range", **facts)
+    said += ", or widen the soft limit (set_joint_limit)"
+    return PlanningError(said).coded("recovery_range_soft", **facts, limit=f"{degrees(soft):.2f}")
 
 
 def _nearest_inside(box: SafetyBox, position: Vector3) -> Vector3:

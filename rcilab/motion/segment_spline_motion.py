@@ -11,6 +11,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits, Limits
+from rcilab.motion.bounds import limit_touched
 from rcilab.motion.hermite import quintic
 from rcilab.motion.rows import blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
@@ -201,15 +202,12 @@ def _require_inside(chain: SegmentSpline, q: Array, law: TimeParametrization, li
     outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()
-        segment, angle = chain.segment_at(float(law.s[row])), f"{math.degrees(q[row, joint]):.2f}"
-        raise PlanningError(
-            f"{chain.place(float(law.s[row]))}: joint {joint + 1} would touch its limit at "
-            f"{angle} deg ({math.degrees(limits.lower[joint]):.0f} to "
-            f"{math.degrees(limits.upper[joint]):.0f} deg); a smaller blend radius stays closer to the waypoints",
-            waypoint=segment.number,
-        ).coded(
+        segment = chain.segment_at(float(law.s[row]))
+        advice = "a smaller blend radius stays closer to the waypoints"
+        touched = limit_touched(limits, joint + 1, float(q[row, joint]), advice)
+        raise PlanningError(f"{chain.place(float(law.s[row]))}: {touched}", waypoint=segment.number).coded(
             "waypoint",
             number=segment.number,
             kind=segment.waypoint.type,
-            reason=PlanningError("").coded("touches", joint=joint + 1, angle=angle),
+            reason=touched,
         )

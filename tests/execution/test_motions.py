@@ -16,6 +16,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import schedule
 from rcilab.motion.path import build_line
+from rcilab.recording.run import load_run
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.home
@@ -120,6 +121,12 @@ def test_a_jump_is_told_with_numbers_and_record_and_the_same_session_goes_on(rob
     with np.load(tmp_path / "flight.npz") as flight:
         assert len(flight["t"]) == len(error.record) > 30
         assert flight["faults"][-1] >> int(fault) & 1
+    error.run.save(tmp_path / "fault.rcirun")
+    saved = load_run(tmp_path / "fault.rcirun")
+    assert set(saved.faults) == set(error.faults)
+    assert saved.stopped == str(error)
+    assert saved.cycles["t"][0] == 0.0
+    assert np.array_equal(saved.q_c, error.run.q_c)
     assert set(robot.state.faults) == set(error.faults)
     robot.recover()
     robot.power_on()

@@ -7,9 +7,12 @@ import pytest
 
 from rcilab import SafetyBox, check, load_model, plan_recovery
 from rcilab.core.clearance import ClearanceLimit
-from rcilab.core.errors import PlanningError
+from rcilab.core.errors import PlanningError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.motion import Motion, plan_joint, plan_line
+from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import Text
+from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
+from rcilab.motion.bounds import limit_touched
 
 MODELS = ["xMate3", "xMatePro7", "Panda"]
 
@@ -19,6 +22,11 @@ def beyond(model, degrees, joint=0):
     q = model.home.copy()
     q[joint] = model.limits.joint.upper[joint] + np.radians(degrees)
     return q
+
+
+def in_both(error):
+    """Returns the words of an error, English and Chinese."""
+    return "\n".join(Text(language, "rcilab.app").say(tell(error)) for language in ("en", "zh"))
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -43,6 +51,61 @@ def test_the_range_of_a_soft_limit_counts():
     soft = model.with_joint_limits(model.home - 0.1, model.home + 0.1)
     motion = plan_recovery(soft, model.home + 0.2)
     assert motion.goal == pytest.approx(model.home + 0.1 - np.radians(1.0))
+
+
+def test_a_joint_too_far_beyond_a_soft_limit_is_told_that_limit_and_the_other_is_not():
+    model = load_model("xMate3")
+    soft = model.with_joint_limits(model.home - 0.1, model.home + 0.1)
+    with pytest.raises(
+        PlanningError, match=r"outside the soft limit of 5\.73° that was set.*set_joint_limit"
+    ) as caught:
+        plan_recovery(soft, model.home + 0.6)
+    assert caught.value.code == "recovery_range_soft"
+    assert "5.73°" in in_both(caught.value)
+    with pytest.raises(PlanningError) as caught:
+        plan_recovery(model, beyond(model, 20.1))
+    assert "soft" not in str(caught.value)
+    assert "软限位" not in in_both(caught.value)
+
+
+@pytest.mark.parametrize("law", ["jerk_limited", "torque_rate_limited", "s_profile"])
+def test_a_way_of_the_tool_past_a_soft_limit_is_told_that_limit(law):
+    model = load_model("xMatePro7")
+    T = model.forward(model.home)
+    goal = Pose(T.position + [-0.15, 0.1, -0.1], T.wxyz)
+    upper = model.limits.joint.upper.copy()
+    upper[3] = np.radians(78.0)
+    soft = model.with_joint_limits(model.limits.joint.lower, upper)
+    with pytest.raises(PlanningError, match=r"joint 4 would pass the soft limit of 78\.00 deg that was set") as caught:
+        plan_line(soft, model.home, goal, law=law)
+    assert in_both(caught.value).count("78.00°") >= 2
+    program = Program(model=model.name, start=model.home, waypoints=(Waypoint.line(goal),))
+    with pytest.raises(PlanningError, match=r"joint 4 would pass the soft limit of 78\.00 deg that was set"):
+        plan_program(soft, program, law=law)
+
+
+def test_a_pose_behind_a_soft_limit_is_told_that_limit():
+    model = load_model("xMatePro7")
+    T = model.forward(model.home)
+    lower = model.limits.joint.lower.copy()
+    lower[5] = np.radians(80.0)
+    soft = model.with_joint_limits(lower, model.limits.joint.upper)
+    with pytest.raises(
+        UnreachableError, match=r"joint 6 .* beyond the soft limit of 80\.00 deg that was set"
+    ) as caught:
+        soft.inverse(Pose(T.position + [-0.15, 0.1, -0.1], T.wxyz), psi=0.0)
+    assert in_both(caught.value).count("80.00°") == 2
+
+
+@pytest.mark.parametrize(("angle", "code"), [(1.0, "touches_soft"), (-3.2, "touches")])
+def test_a_planned_motion_that_touches_a_bound_is_told_which(angle, code):
+    model = load_model("xMatePro7")
+    upper = model.limits.joint.upper.copy()
+    upper[0] = 1.0
+    limits = model.with_joint_limits(model.limits.joint.lower, upper).limits.joint
+    touched = limit_touched(limits, 1, angle)
+    assert touched.code == code
+    assert ("57.30" in str(touched), in_both(touched).count("57.30°") >= 2) == (code == "touches_soft",) * 2
 
 
 def test_a_joint_too_far_outside_is_refused_with_the_bound():

@@ -50,14 +50,14 @@ class InverseSearch:
         if start is None and self.solver.redundancy:
             start = self.natural_psi(near)
         pose = self.solver.at(T_base_flange, near)
-        solutions = Solutions(pose.branches(start or 0.0), self._lower, self._upper, start)
+        solutions = Solutions(pose.branches(start or 0.0), self._lower, self._upper, start, self._joint)
         if len(solutions):
             return solutions
         if psi is not None or start is None:
             raise solutions.refusal()
         best = solutions
         for angle in self._other_arm_angles(T_base_flange, start):
-            solutions = Solutions(pose.branches(angle), self._lower, self._upper, angle)
+            solutions = Solutions(pose.branches(angle), self._lower, self._upper, angle, self._joint)
             if len(solutions):
                 return solutions
             best = min(best, solutions, key=_least_excess)

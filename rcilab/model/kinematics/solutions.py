@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.errors import UnreachableError
+from rcilab.core.limits import JointLimits
 
 _AT_LIMIT = 1e-3  # [rad] An excess of less than 0.1 deg is not worth a number.
 
@@ -38,12 +39,17 @@ class Solutions(Sequence[JointVector]):
     Iterating gives arrays of shape (n,), [rad]. `all` also holds the branches that a limit forbids.
     """
 
-    __slots__ = ("_all", "_branches", "_feasible", "_lower", "_upper", "psi")
+    __slots__ = ("_all", "_branches", "_feasible", "_limits", "_lower", "_upper", "psi")
 
     def __init__(
-        self, branches: Sequence[tuple[float, ...]], lower: list[float], upper: list[float], psi: float | None
+        self,
+        branches: Sequence[tuple[float, ...]],
+        lower: list[float],
+        upper: list[float],
+        psi: float | None,
+        limits: JointLimits,
     ) -> None:
-        self.psi = psi
+        self.psi, self._limits = psi, limits
         self._branches, self._lower, self._upper = branches, lower, upper
         self._all: tuple[Branch, ...] | None = None
         inside = [q for q in branches if _is_inside(q, lower, upper)]
@@ -101,18 +107,27 @@ class Solutions(Sequence[JointVector]):
         elif self.psi is not None:
             place += f" at arm angle {degrees(self.psi):.1f} deg"
             advice += " or change the arm angle"
-        beyond = f"{degrees(best.excess):.1f} deg beyond its limit"
+        soft = None if best.joint is None else self._limits.soft_bound_passed(joint, angle)
+        limit = "its limit" if soft is None else f"the soft limit of {degrees(soft):.2f} deg that was set"
+        beyond = f"{degrees(best.excess):.1f} deg beyond {limit}"
         if best.excess < _AT_LIMIT:
-            beyond = "right at its limit, and has to stay inside"
-        return UnreachableError(
+            beyond = f"right at {limit}, and has to stay inside"
+        error = UnreachableError(
             f"joint {joint} would have to be at {degrees(angle):.1f} deg, {beyond} "
-            f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}",
+            f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}"
+            f"{'' if soft is None else ', or widen the soft limit (set_joint_limit)'}",
             joint=joint,
             excess=best.excess,
-        ).coded(
-            "joint_beyond", joint=joint, angle=f"{degrees(angle):.1f}", low=f"{degrees(lower):.0f}",
-            high=f"{degrees(upper):.0f}",
-        )  # fmt: skip
+        )
+        facts = {
+            "joint": joint,
+            "angle": f"{degrees(angle):.1f}",
+            "low": f"{degrees(lower):.0f}",
+            "high": f"{degrees(upper):.0f}",
+        }
+        if soft is None:
+            return error.coded("joint_beyond", **facts)
+        return error.coded("joint_beyond_soft", **facts, limit=f"{degrees(soft):.2f}")
 
     def __repr__(self) -> str:
         rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)
