@@ -107,7 +107,7 @@ def test_a_controller_of_somebody_else_that_goes_while_the_arm_rests_is_lost():
             status = wait_for(lambda: s if (s := supervisor.status()).phase == "lost" else None)
             assert "closed the connection" in status.message
             incident = wait_for(lambda: supervisor.status().incident)
-            assert (incident.number, incident.code) == (1, "lost.unreachable")
+            assert (incident.number, incident.code) == (1, "lost.closed")
             with pytest.raises(ConnectionLostError, match="no robot at"):
                 supervisor.reconnect().wait(SOON)
             assert supervisor.status().worker_pid == before.worker_pid
