@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import Tone
 from rcilab.app.planning import PathKind, Plan, PlannableLaw
-from rcilab.app.run.drive_state import DriveState
+from rcilab.app.run.drive_state import DriveState, Plant
+from rcilab.app.run.world_state import WorldState
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message
@@ -41,6 +43,10 @@ class AppState:
     model: RobotModel
     target: str = "virtual"
     """"virtual" or an address, rci://HOST:PORT."""
+    plant: Plant = "ideal"
+    """What the virtual controller moves."""
+    world: WorldState = field(default_factory=WorldState)
+    """The virtual controller itself: its network, wiring and buttons."""
     drive: DriveState = field(default_factory=DriveState)
     goal: Goal
     plan: Plan | None = None
@@ -51,6 +57,10 @@ class AppState:
     recording: Recording | None = None
     last_run: Recording | None = None
     """The run that was made last, whatever was planned since: for its table and for export."""
+    record: bool = True
+    """Whether every cycle of a motion is written to a file as well."""
+    runs: Path | None = None
+    """Folder of these files; None: no file is written."""
     speed: float = 0.5
     law: PlannableLaw = "torque_rate_limited"
     way: PathKind = "joint"
@@ -64,6 +74,11 @@ class AppState:
     """The newest of each page and of all pages together, oldest first: what one is told takes no place of another's."""
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """What is wrong with typed numbers, by field."""
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether the robot is a virtual controller: nothing but numbers moves."""
+        return self.target == "virtual"
 
     @property
     def notice(self) -> Toast | None:

@@ -69,7 +69,7 @@ class Dispatcher:
         self._mode = ModeActions(store, session)
         self._where = TargetRobotActions(store, session, self.robot)
         self._world = WorldActions(store, session)
-        self._signals = SignalActions(store, session)
+        self._signals = SignalActions(store, session, self.robot.requests)
         self._push = PushActions(store, session)
         self._setup = SetupActions(store, session)
         self._jog = JogActions(store, session, self._goal)

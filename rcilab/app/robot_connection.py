@@ -1,4 +1,4 @@
-"""The robot side of the page: one supervisor at a time, exchanged without anybody waiting for it."""
+"""The robot that a control process of our own drives: one supervisor at a time, exchanged without waiting for it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from rcilab.app.status_text import StartingError
+from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.memory import memory_needed
 
 if TYPE_CHECKING:
-    from rcilab.control_process import Supervisor, SupervisorStatus
     from rcilab.makers.configuration import RobotConfiguration
     from rcilab.model.robot_model import RobotModel
 
@@ -32,7 +32,9 @@ class RobotConnection:
         self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
         self._generation = 0
         self._worker: threading.Thread | None = None
-        self._is_apart = False  # Nobody wants a connection.
+        self.name = ""
+        """The target: "virtual", or an address."""
+        self._is_apart = False  # No connection is wanted.
 
     def open(
         self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
@@ -46,7 +48,7 @@ class RobotConnection:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
-            self._is_apart = False
+            self._is_apart, self.name = False, target
             self._work(self._exchange, generation, previous, model, target, plant, setup)
 
     def disconnect(self) -> None:
@@ -75,11 +77,9 @@ class RobotConnection:
         shown = self._shown
         if shown is not None:
             return shown.status()
-        from rcilab.control_process import SupervisorStatus
-
         if self._worker is None or self._is_apart:
-            return SupervisorStatus()  # Nobody has asked for a connection.
-        return SupervisorStatus(phase="starting", code="starting", message="Starting the control process.")
+            return SupervisorStatus()  # No connection was asked for.
+        return SupervisorStatus(phase="starting", code="starting", target=self.name)
 
     @property
     def is_ready(self) -> bool:
@@ -99,6 +99,9 @@ class RobotConnection:
             raise StartingError("the control process is still starting; try again in a moment")
         return ready
 
+    def take_run(self) -> None:
+        """Returns None: a run is made of the cycles that are drained."""
+
     def stop(self) -> None:
         """Stops a motion. Callable from any thread, never waits: the fast lane of Stop and Esc."""
         current = self._current
@@ -115,7 +118,7 @@ class RobotConnection:
         return 0 if current is None else current.stops
 
     def heartbeat(self) -> None:
-        """Tells the control process that somebody is at the page; call it several times a second while it is so."""
+        """Reports an operator at the page; call it several times a second while there is one."""
         ready = self._ready
         if ready is not None:
             with suppress(RcilabError):  # Closed in the meantime.
@@ -157,8 +160,6 @@ class RobotConnection:
                 return
         try:
             with memory_needed():
-                from rcilab.control_process import Supervisor
-
                 supervisor = Supervisor(model, target, plant, setup=setup)
                 self._current = self._shown = supervisor
                 supervisor.start()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
@@ -14,8 +13,7 @@ from rcilab.app.control_lock import ControlLock
 from rcilab.app.jog.jog_state import JogState
 from rcilab.app.learn.learn_state import LearnState
 from rcilab.app.program.program_draft import ProgramState
-from rcilab.app.run.active_force import Plant, PushState
-from rcilab.app.run.world_state import WorldState
+from rcilab.app.run.active_force import PushState
 from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.app.state_store import StateStore
@@ -46,10 +44,7 @@ class RunsFolder:
 class UiState(AppState):
     """Everything that the operator has set on the page, and everything that was computed from it."""
 
-    plant: Plant = "ideal"
-    """What the virtual controller moves."""
     push: PushState = field(default_factory=PushState)
-    world: WorldState = field(default_factory=WorldState)
     typed_address: str = ""
     """The address that waits for a second yes."""
     reboot_asked: bool = False
@@ -62,10 +57,6 @@ class UiState(AppState):
     program: ProgramState = field(default_factory=ProgramState)
     check: CheckState = field(default_factory=CheckState)
     learn: LearnState = field(default_factory=LearnState)
-    record: bool = True
-    """Whether every cycle of a motion is written to a file as well."""
-    runs: Path | None = None
-    """Folder of these files; None: there is none."""
     folder: RunsFolder = RunsFolder()
     export: Export | None = None
     """What is being written for a page."""

@@ -72,6 +72,11 @@ class SimulationControl(Closeable):
         self._last_id = 0
         self._is_turned_away = False  # The last answer was to the connection and not to a request, and the last one.
 
+    @property
+    def address(self) -> str:
+        """Where the world port is, HOST:PORT."""
+        return f"{self._address[0]}:{self._address[1]}"
+
     def push(
         self,
         wrench: ArrayLike,

@@ -9,13 +9,14 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
+from rcilab.app.run.world_actions import SetWiring, WorldActions
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import RcilabError
 from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Text, message
-from rcilab.makers.configuration import SoftJointLimits
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.notebook.number_field import NumberField
-from rcilab.notebook.robot_side import RobotBackend
+from rcilab.notebook.signal_fields import SendRequest
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
@@ -30,16 +31,17 @@ class LimitFields:
     Args:
         state: What the parts share.
         text: Words.
-        robot: Returns the robot that is connected.
+        world: Sets auto_limit at a virtual controller.
+        send: Sends a request to the robot that is connected, by its name.
         button: Makes a button of the panel.
     """
 
     def __init__(
-        self, state: LabState, text: Text, robot: Callable[[], RobotBackend], button: Callable[..., Any]
+        self, state: LabState, text: Text, world: WorldActions, send: SendRequest, button: Callable[..., Any]
     ) -> None:
-        self._state, self._text, self._robot = state, text, robot
+        self._state, self._text, self._world, self._send = state, text, world, send
         self.fields: list[tuple[NumberField, NumberField]] = []
-        """Lower and upper end of every joint, once somebody has opened the group."""
+        """Lower and upper end of every joint, once the group was opened."""
         self._typed: list[list[float]] = []  # Lower ends and upper ends, [rad].
         self._shown: JointLimits | None = None
         self._asked: SoftJointLimits | None = None
@@ -77,11 +79,12 @@ class LimitFields:
         self.whole.disabled = not is_ready
         if not is_ready:
             self._forget()
-        robot = self._state.robot
-        self.auto.disabled = not is_ready or robot is None or not robot.is_virtual
+        now = self._state.now
+        is_virtual = self._state.robot is not None and now.is_virtual
+        self.auto.disabled = not is_ready or not is_virtual
         self._writing = True
         # A folder that was never opened needs no look at the controller.
-        self.auto.value = bool(self.fields) and robot is not None and robot.is_virtual and robot.auto_limit
+        self.auto.value = bool(self.fields) and is_virtual and now.world.auto_limit
         self._writing = False
         limits = self._state.model.limits.joint
         if self.fields and limits is not self._shown:
@@ -101,11 +104,11 @@ class LimitFields:
                 write(self.said, problem(self._text.say(message("setup.joint_ends", **ends))))
                 return
         self._asked = SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
-        robot = self._robot()
-        if robot.is_virtual:
+        now = self._state.now
+        if now.is_virtual:
             self._give()
             return
-        write(self.said, verdict("warn", "▲", self._text("softlimits.ask", address=robot.name)))
+        write(self.said, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
         self._answers.layout.display = None
 
     def _propose_whole(self) -> None:
@@ -115,8 +118,9 @@ class LimitFields:
     def _give(self) -> None:
         self._answers.layout.display = "none"
         write(self.said, "")
-        if self._asked is not None:
-            self._robot().set_joint_limit(self._asked)
+        asked = self._asked
+        if asked is not None:
+            self._send("limits", lambda robot: robot.set_up(RobotConfiguration(joints=asked)))
 
     def _forget(self) -> None:
         if self._answers.layout.display is None:
@@ -126,10 +130,8 @@ class LimitFields:
 
     def _on_auto(self, change: Any) -> None:
         if not self._writing:
-            try:
-                self._robot().set_auto_limit(bool(change["new"]))
-            except RcilabError as error:
-                write(self.said, problem(str(error)))
+            with self._state.lock:
+                self._world.set_wiring(SetWiring(name="auto_limit", on=bool(change["new"])))
 
     def _on_open(self, change: Any) -> None:
         """Makes the fields when they are wanted: fourteen of them would delay the cell."""

@@ -79,9 +79,8 @@ class ModeFields:
             self._shown = state.now.drive.control
             for part in self.fields:
                 self._fill(part)
-        robot = state.robot
         pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
-        self.send.layout.display = "none" if robot is None or robot.is_virtual else None
+        self.send.layout.display = "none" if state.robot is None or state.now.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"
         write(self._held, "" if status is None else self._tell_held(status, pending))
 
@@ -89,7 +88,7 @@ class ModeFields:
         state, text = self._state, self._text
         if state.now.drive.refusal is not None:
             return problem(text("ready.control_refused", error=text.say(state.now.drive.refusal)))
-        known = state.session is None and state.robot is not None and state.robot.is_virtual
+        known = state.session is None and state.robot is not None and state.now.is_virtual
         own = standard_control(state.model.limits) if known else ControllerParameters()
         rows = held_rows(state.now.drive.mode, status.setup.control, own, text)
         told = soft(text("control.held")) + table([], [list(row) for row in rows])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from rcilab.app.run.robot_requests import Outcome
+from rcilab.app.session_connection import BusyError
 from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ModelError, RcilabError
 from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
-from rcilab.notebook.robot_side import BusyError, Outcome
 from rcilab.notebook.style import head, table, verdict
 
 
@@ -29,7 +30,7 @@ def tell_trouble(status: SupervisorStatus | None, text: Text) -> str:
 def tell_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
     """Returns why something was not done."""
     if isinstance(error, BusyError):
-        return message("robot.busy", what=message(f"what.{error.under_way}"))
+        return message("robot.busy", what=message(f"what.{error.in_progress}"))
     if isinstance(error, ModelError) and model.name not in driven_robots():
         return message("robot.no_rci", model=model.name)
     return tell_error(error, status)

@@ -1,4 +1,4 @@
-"""Run: which robot, power, mode, Execute and Stop, how well the milliseconds are kept, and what came of it."""
+"""Run: which robot, power, mode, Execute and Stop, the timing, and how a motion ended."""
 
 from __future__ import annotations
 
@@ -8,33 +8,40 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.connection import Robot
+from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.mode_actions import ModeActions
 from rcilab.app.run.plan_readiness import ask_to_move
+from rcilab.app.run.robot_requests import Outcome, RobotRequests
+from rcilab.app.run.world_actions import WorldActions
+from rcilab.app.session_connection import SessionConnection
 from rcilab.app.status_text import StartingError
-from rcilab.control_process import SupervisorStatus
+from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import PlanningError, RcilabError
+from rcilab.makers.driver import normalise_address
+from rcilab.makers.maker import require_driver
 from rcilab.notebook.browser_heartbeat import kernel_heart
+from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.part import Part
 from rcilab.notebook.ready import obstacle
-from rcilab.notebook.robot_side import Outcome, RobotBackend, SupervisedRobot
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
-from rcilab.notebook.session_robot import SessionRobot
 from rcilab.notebook.signal_fields import SignalFields
 from rcilab.notebook.speed_fields import SpeedFields
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import PHASE_TONES, block, problem, soft, verdict, write
 from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
+from rcilab.recording.run import Run
 
 _LOOK = 0.1  # [s] Between two looks at the robot.
 _TARGETS = ("ideal", "mujoco", "address")
 
 
 class _Connection:
-    """The robot of a lab, as the features of the application ask it.
+    """The robot of a lab, which the features of the application ask.
 
     Args:
         state: What the parts share.
@@ -47,25 +54,29 @@ class _Connection:
         """Returns its status; "closed" while none is connected."""
         return self._state.status or SupervisorStatus()
 
-    def supervisor(self) -> RobotBackend:
-        """Returns the robot.
+    def supervisor(self) -> Robot:
+        """Returns what takes requests.
 
         Raises:
-            StartingError: None is connected.
+            StartingError: No robot is connected.
         """
         robot = self._state.robot
         if robot is None:
             raise StartingError("no robot is connected")
-        return robot
+        return robot.supervisor()
+
+    def take_run(self) -> Run | None:
+        """Returns the last run of `execute` if the robot recorded it itself."""
+        return None if self._state.robot is None else self._state.robot.take_run()
 
 
 class RunPanel(Part):
     """Everything that moves a robot is here, and nothing on it moves one by a drag.
 
     With a model it connects to a virtual controller of its own, or to an address; a control process outside of the
-    kernel keeps the milliseconds. With a session it uses that one. Modes and parameters are those of the page. A robot
-    that is not virtual is moved, or told other parameters, only after the question has been answered. A motion is
-    brought to rest when the page is gone, the kernel is interrupted, restarted or dead, or the cell is run again.
+    kernel runs the 1 kHz loop. With a session it uses that one. Modes and parameters are those of the page. A robot
+    that is not virtual is moved, or gets other parameters, only after the question has been answered. A motion is
+    stopped when the page is gone, the kernel is interrupted, restarted or dead, or the cell is run again.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -90,9 +101,11 @@ class RunPanel(Part):
         )  # fmt: skip
         self.connect = self._button("run.connect", self._on_connect, icon="plug", own=True)
         self.disconnect = self._button("run.disconnect", self._on_disconnect, own=True)
-        self.power_on = self._button("run.power_on", lambda: self._robot.power(True), icon="power-off")
-        self.power_off = self._button("run.power_off", lambda: self._robot.power(False))
-        self.recover = self._button("run.recover", lambda: self._robot.recover())
+        self.power_on = self._button(
+            "run.power_on", lambda: self._send("power_on", lambda robot: robot.power_on()), icon="power-off"
+        )
+        self.power_off = self._button("run.power_off", lambda: self._send("power_off", lambda robot: robot.power_off()))
+        self.recover = self._button("run.recover", self._on_recover)
         self.execute = self._button("run.execute", self._on_execute, icon="play", style="success")
         self.stop = self._button("run.stop", self.halt, icon="stop", style="danger")
         self.stop.add_class("rl-stop")
@@ -105,13 +118,15 @@ class RunPanel(Part):
         self._said, self._where, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
         self._was_cells = False
-        self._running = 0.0  # [s] Planned duration of the motion under way.
+        self._running = 0.0  # [s] Planned duration of the motion in progress.
         connection = _Connection(self.state)
+        self._requests = RobotRequests(self.state.store, connection)
+        self._world = WorldActions(self.state.store, connection)
         self._mode_actions = ModeActions(self.state.store, connection, keeps_rest=self.state.session is not None)
         self.pace = SpeedFields(self.state, text, self._mode_actions)
         self.modes = ModeFields(self.state, text, self._mode_actions)
-        self.signals = SignalFields(text, lambda: self._robot, self._button)
-        self.limits = LimitFields(self.state, text, lambda: self._robot, self._button)
+        self.signals = SignalFields(text, self._send, self._button)
+        self.limits = LimitFields(self.state, text, self._world, self._send, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
@@ -135,24 +150,32 @@ class RunPanel(Part):
         ], min_width="360px")  # fmt: skip
         self.target.observe(lambda _: self._show(), names="value")
         if self.state.session is not None:
-            self._take(SessionRobot(self.state.session))
+            self._take(SessionConnection(self.state.session))
         self._ends.append(self.state.hear("plan", self._on_plan))
         self._ends.append(self.state.hear("goal", self._show))
         self.hear("robot", self._show)
 
     def halt(self) -> None:
-        """Brings the robot to rest; from any thread, without waiting."""
+        """Stops the robot; from any thread, without waiting."""
         self.state.halt()
 
     def end(self) -> None:
-        """Brings a motion to rest and ends the processes that were started here."""
+        """Stops a motion and ends the processes that were started here."""
         self._release()
 
-    @property
-    def _robot(self) -> RobotBackend:
+    def _send(self, what: str, ask: Callable[[Robot], PendingRequest]) -> None:
         robot = self.state.robot
         assert robot is not None  # The buttons that ask it are disabled without one.
-        return robot
+        with self.state.lock:
+            self._requests.add(what, ask(robot.supervisor()))
+
+    def _on_recover(self) -> None:
+        """Clears the faults; where the connection is lost, makes a new one."""
+        robot, status = self.state.robot, self.state.status
+        if isinstance(robot, RobotConnection) and status is not None and status.phase in ("lost", "crashed"):
+            self._requests.add("recover", robot.supervisor().reconnect())
+        else:
+            self._send("recover", lambda robot: robot.recover())
 
     def _on_connect(self) -> None:
         choice = str(self.target.value)
@@ -162,17 +185,26 @@ class RunPanel(Part):
             return
         target, plant = (typed, "ideal") if choice == "address" else (VIRTUAL, choice)
         self._release()
-        self._take(SupervisedRobot(self.model, target, plant))
+        require_driver(self.model)
+        robot = RobotConnection(self._on_failure)
+        robot.open(self.model, target if target == VIRTUAL else normalise_address(target), plant)
+        self.state.store.update(plant=plant)
+        self._take(robot)
         self.state.tell("robot")
+
+    def _on_failure(self, error: RcilabError) -> None:
+        """Shows why there is no connection; called in the thread that makes it."""
+        self._take_in(Outcome(what="connect", error=error))
 
     def _on_disconnect(self) -> None:
         self._release()
         self.state.tell("robot")
 
-    def _take(self, robot: RobotBackend) -> None:
+    def _take(self, robot: RobotConnection | SessionConnection) -> None:
+        is_virtual = robot.is_virtual if isinstance(robot, SessionConnection) else robot.name == VIRTUAL
         with self.state.lock:
             self._mode_actions.forget()
-            self.state.store.update(target=VIRTUAL if robot.is_virtual else robot.name)
+            self.state.store.update(target=VIRTUAL if is_virtual else robot.name)
             self.state.set_drive(refusal=None)
         self.state.robot = robot
         self._ending.clear()
@@ -189,22 +221,40 @@ class RunPanel(Part):
             last = robot.status().q_c
             if last is not None:
                 self.state.leave_arm(last)
+            self._world.close()
+            self._requests.forget()
             robot.close()
             self.state.free_joints()
 
-    def _watch(self, robot: RobotBackend) -> None:
-        """The watching thread: shows the robot, says that somebody is here, stops when nobody is any more."""
+    def _watch(self, robot: RobotConnection | SessionConnection) -> None:
+        """Shows the robot, reports an operator at the page, and stops the robot when the page is gone."""
         while not self._ending.wait(_LOOK):
             self._heart.beat()
             if self._heart.is_gone:
-                robot.leave_alone()
+                if isinstance(robot, SessionConnection):
+                    robot.stop(LEFT_ALONE)
+                else:
+                    robot.stop()
             elif self._heart.was_seen:
-                robot.beat()
-            for outcome in robot.outcomes():
+                robot.heartbeat()
+            with self.state.lock:
+                outcomes = self._requests.collect()
+            if isinstance(robot, SessionConnection):
+                outcomes += [Outcome(what="cell", run=run, error=error) for run, error in robot.take_cell_runs()]
+            for outcome in outcomes:
                 self._take_in(outcome)
+            self._follow_world(robot.status())
             with self.state.lock:
                 self._mode_actions.tick(robot.status())
             self.state.tell("robot")
+
+    def _follow_world(self, status: SupervisorStatus) -> None:
+        with self.state.lock:
+            before = self.state.now.notice
+            self._world.tick(status)
+            notice = self.state.now.notice
+        if notice is not None and notice is not before:
+            write(self._outcome, problem(self.text.say(notice.text)))
 
     def _take_in(self, outcome: Outcome) -> None:
         if outcome.what == "limits":
@@ -226,11 +276,11 @@ class RunPanel(Part):
         if reason is not None:
             write(self._said, problem(self.text.say(reason)))
             return
-        if self._robot.is_virtual:
+        if self.state.now.is_virtual:
             self._move()
             return
         assert plan is not None  # Without one there is an obstacle.
-        question = ask_to_move(plan, self._robot.name)
+        question = ask_to_move(plan, self.state.now.target)
         write(self._question, verdict("warn", "▲", self.text.say(question)))
         self._answers.layout.display = None
 
@@ -243,7 +293,8 @@ class RunPanel(Part):
             write(self._outcome, "")
             self._running = plan.motion.duration
             try:
-                self._robot.execute(plan, self.state.now.drive.pace)
+                with self.state.lock:
+                    self._requests.execute(plan)
             except PlanningError as error:
                 write(self._outcome, problem(self.text.say(tell_refusal(error, self.state.model, self.state.status))))
 
@@ -259,20 +310,25 @@ class RunPanel(Part):
         self._choice.layout.display = "none" if status is not None else None
         self.address.layout.display = None if self.target.value == "address" else "none"
         self.connect.layout.display = "none" if status is not None else None
-        is_own = isinstance(state.robot, SupervisedRobot)
+        is_own = isinstance(state.robot, RobotConnection)
         self.disconnect.layout.display = None if is_own else "none"
         reason = obstacle(state)
         self.execute.disabled = reason is not None
         powered = None if status is None else status.powered
         is_pressed = status is not None and status.is_pressed
-        self.power_on.disabled = is_moving or powered is not False or is_pressed
-        self.power_off.disabled = is_moving or powered is not True
+        is_ready = phase in ("idle", "fault")
+        self.power_on.disabled = not is_ready or powered is not False or is_pressed
+        self.power_off.disabled = not is_ready or powered is not True
         self.recover.disabled = phase not in ("fault", "lost", "crashed") or is_pressed
-        name = "" if state.robot is None else text("run.at", name=self._name_robot(state.robot))
+        name = (
+            ""
+            if state.robot is None
+            else text("run.at", name=text("run.virtual") if state.robot.name == VIRTUAL else state.robot.name)
+        )
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))
         told = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
-        is_cells = isinstance(state.robot, SessionRobot) and state.robot.is_cells
+        is_cells = isinstance(state.robot, SessionConnection) and state.robot.is_cells
         if is_cells and not self._was_cells:
             write(self._outcome, "")
         self._was_cells = is_cells
@@ -293,13 +349,10 @@ class RunPanel(Part):
         self.signals.show(status)
         write(self._health, "" if status is None else health_html(status, text))
 
-    def _name_robot(self, robot: RobotBackend) -> str:
-        return self.text("run.virtual") if robot.name == VIRTUAL else robot.name
-
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
         place = None if status is None or not is_moving else status.motion_place
         robot = self.state.robot
-        whole = robot.planned if isinstance(robot, SessionRobot) else self._running
+        whole = robot.planned if isinstance(robot, SessionConnection) else self._running
         self.progress.layout.visibility = "hidden" if place is None or not whole else "visible"
         if place is not None and whole:
             self.progress.value = min(max(place / whole, 0.0), 1.0)

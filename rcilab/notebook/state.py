@@ -34,11 +34,12 @@ from rcilab.model.robot_model import RobotModel, require_model
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.demo_motion import DemoMotion
+    from rcilab.app.robot_connection import RobotConnection
+    from rcilab.app.session_connection import SessionConnection
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
     from rcilab.motion.motion import Motion
     from rcilab.notebook.cell_run import CellRun
-    from rcilab.notebook.robot_side import RobotBackend
     from rcilab.recording.run import Run
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
@@ -62,7 +63,7 @@ class LabState:
         self._own_limits = model.limits.joint  # Without what a controller was told here.
         self.session = session
         self.lock = threading.RLock()
-        self.robot: RobotBackend | None = None
+        self.robot: RobotConnection | SessionConnection | None = None
         self._rest: JointVector = readonly_copy(model.home)  # Where the arm is as long as no robot reports it.
         self.store: StateStore[AppState] = StateStore(AppState(model=model, goal=goal_at(model, self._rest)))
         self.goals = GoalActions(self.store, _Arm(self), plans_at_once=False)

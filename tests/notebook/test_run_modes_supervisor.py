@@ -12,14 +12,15 @@ import rcilab
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.run.mode_parameters import PARTS_OF_MODE
+from rcilab.app.session_connection import BusyError
 from rcilab.control_process import PendingRequest, SupervisorStatus
+from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.rokae.driver.controller_parameters import standard_control
 from rcilab.notebook import robot_words
-from rcilab.notebook.robot_side import BusyError, Outcome
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> 
 class Real:
     """A robot that is not virtual, as RunPanel sees it."""
 
-    name, is_virtual = "rci://192.168.0.160:1337", False
+    name, paced = "rci://192.168.0.160:1337", None
 
     def __init__(self) -> None:
         self.told: list[ControllerParameters] = []
@@ -109,12 +110,14 @@ class Real:
         self.told.append(setup.control)
         return PendingRequest("control")
 
-    def outcomes(self) -> list[Outcome]:
-        return []
+    def supervisor(self) -> Real:
+        return self
 
-    def execute(self, plan: Any, pace: float = 1.0) -> None: ...
+    def drain(self) -> Any:
+        return np.zeros(0, cycle_dtype(PRO7.n))
+
     def stop(self) -> None: ...
-    def beat(self) -> None: ...
+    def heartbeat(self) -> None: ...
     def close(self) -> None: ...
 
 

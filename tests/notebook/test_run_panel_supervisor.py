@@ -14,11 +14,11 @@ import rcilab
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.control_process import PendingRequest, SupervisorStatus
+from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
-from rcilab.notebook.robot_side import Outcome
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
 class Real:
     """A robot that is not virtual, as RunPanel sees it."""
 
-    name, is_virtual = "rci://192.168.0.160:1337", False
+    name, paced = "rci://192.168.0.160:1337", None
 
     def __init__(self, q: Any, **how: Any) -> None:
         self.executed: list[Any] = []
@@ -198,8 +198,9 @@ class Real:
     def status(self) -> Any:
         return self._status
 
-    def execute(self, plan: Any, pace: float = 1.0) -> None:
-        self.executed.append(plan)
+    def execute(self, motion: Any, certificate: Any, mode: str, **how: Any) -> PendingRequest:
+        self.executed.append(motion)
+        return PendingRequest("execute")
 
     def set_pace(self, pace: float) -> PendingRequest:
         self.paces.append(pace)
@@ -210,11 +211,14 @@ class Real:
     def pause(self) -> PendingRequest:
         return self.set_pace(0.0)
 
-    def outcomes(self) -> list[Outcome]:
-        return []
+    def supervisor(self) -> Real:
+        return self
+
+    def drain(self) -> Any:
+        return np.zeros(0, cycle_dtype(PRO7.n))
 
     def stop(self) -> None: ...
-    def beat(self) -> None: ...
+    def heartbeat(self) -> None: ...
     def close(self) -> None: ...
 
 
@@ -297,7 +301,7 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         with pytest.raises(RcilabError, match="joint 1"):
             panel.state.pose(PRO7.home + np.eye(7)[0])
         limits.auto.value = True
-        wait_for(lambda: panel.state.robot.auto_limit, what="auto_limit")
+        wait_for(lambda: panel.state.now.world.auto_limit, what="auto_limit")
         if is_own:
             host, _, port = panel.state.robot.status().world_address.partition(":")
             world = stack.enter_context(SimulationControl(host, int(port)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-Plant = Literal["ideal", "mujoco"]
-
-PLANTS: tuple[Plant, ...] = ("ideal", "mujoco")
 STRONGEST = 60.0  # [N] A choice: what one hand does without effort.
 SPRING = 200.0  # [N/m] between the grabbed point and the mouse: 0.3 m of pull is all the force there is; a choice.
 TOOL = 0  # Where a link's number stands: the tool.

@@ -14,9 +14,11 @@ from rcilab.makers.rokae.driver.controller_parameters import control_ranges, sta
 if TYPE_CHECKING:
     from rcilab.app.app_state import AppState
     from rcilab.app.state_store import StateStore
-    from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
+
+Plant = Literal["ideal", "mujoco"]
+PLANTS: tuple[Plant, ...] = ("ideal", "mujoco")
 
 Destination = Literal["preview", "ideal", "mujoco", "address"]
 
@@ -69,7 +71,7 @@ def parameter_obstacle(state: AppState, status: SupervisorStatus) -> Message | N
     return control_obstacle(state.drive.control, status.setup.control, state.drive.refusal, address)
 
 
-def destination(state: UiState, status: SupervisorStatus) -> Destination:
+def destination(state: AppState, status: SupervisorStatus) -> Destination:
     """Returns where motions go just now."""
     if status.phase == "closed":
         return "preview"

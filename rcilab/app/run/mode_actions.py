@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 from rcilab.app.app_state import AppState
+from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
@@ -58,34 +59,6 @@ class SetControl(Request):
     value: float
 
 
-class MotionRobot(Protocol):
-    """What takes parameters, and another speed during a motion. No method waits for the robot."""
-
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Sends tool, load, limits or parameters."""
-        ...
-
-    def set_pace(self, pace: float) -> PendingRequest:
-        """Runs the motion in progress at part of its planned speed."""
-        ...
-
-    def pause(self) -> PendingRequest:
-        """Holds the motion in progress."""
-        ...
-
-
-class MotionConnection(Protocol):
-    """The robot of the moment."""
-
-    def status(self) -> SupervisorStatus:
-        """Returns its status."""
-        ...
-
-    def supervisor(self) -> MotionRobot:
-        """Returns what takes requests."""
-        ...
-
-
 class ModeActions:
     """Mode, parameters, pause, speed override. A virtual controller gets them at once, another one at a second press.
 
@@ -96,7 +69,7 @@ class ModeActions:
             standard ones with the first that is changed.
     """
 
-    def __init__(self, store: StateStore[AppState], session: MotionConnection, *, keeps_rest: bool = False) -> None:
+    def __init__(self, store: StateStore[AppState], session: Connection, *, keeps_rest: bool = False) -> None:
         self._store, self._session, self._keeps_rest = store, session, keeps_rest
         self._was_running = False
         self._post = ConfigurationSender(session, self._refuse)

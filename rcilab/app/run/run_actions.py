@@ -1,4 +1,4 @@
-"""What happens when somebody drives the robot. Owned by the conductor's thread; it never waits for the robot."""
+"""Drives the robot at the operator's requests. Owned by the dispatcher's thread; it never waits for the robot."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from rcilab.app.goal.goal import Goal, goal_at
 from rcilab.app.goal.target_status import Tone
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.active_force import PLANTS, TOOL, is_guided
+from rcilab.app.run.active_force import TOOL, is_guided
+from rcilab.app.run.drive_state import PLANTS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle
-from rcilab.app.run.run_recorder import RunRecorder
+from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
 from rcilab.app.status_text import StartingError, tell_error, tell_incident
 from rcilab.app.store import Store, UiState
@@ -36,12 +37,11 @@ from rcilab.model.robot_model import load_model
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
     from rcilab.makers.configuration import RobotConfiguration, SetupPart
-    from rcilab.motion.speed_scaling import SpeedScaledMotion
 
-_SECOND_THOUGHT = 10.0  # [s] A choice: a second press that comes later asks anew.
+_CONFIRM_TIMEOUT = 10.0  # [s] A second press that comes later asks again.
 TROUBLE = "robot"
 """Names what is said while the robot side cannot move: see `Store.settle`."""
-_POWER_PAUSE = 2.0  # [s] A choice: between two attempts to switch the virtual arm on.
+_POWER_PAUSE = 2.0  # [s] Between two attempts to switch the virtual arm on.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,16 +69,12 @@ class RunActions:
 
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
-        self._tickets: list[tuple[str, PendingRequest]] = []
-        self._keeper = RunRecorder(store)
-        self._recording = False
-        self._stopped: str | None = None  # Why the recorded motion did not reach its end.
-        self._is_left_alone = False  # That is because no page answered.
+        self.requests = RobotRequests(store, session)
         self._placed = False  # The goal stands where the arm was first seen.
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._power_asked = float("-inf")
-        self._arrival: Message | None = None  # What to say at the end of the motion under way.
-        self._untouched: Goal | None = store.state.goal  # The goal that nobody has posed yet.
+        self._arrival: Message | None = None  # What to say at the end of the motion in progress.
+        self._untouched: Goal | None = store.state.goal  # The goal as long as it is not posed.
         self._setups: dict[str, SetupState] = {}  # Of the arms that were chosen before, by name.
         self._incident = 0
         self._trouble = ""  # The code of the incident that has not ended yet.
@@ -124,9 +120,9 @@ class RunActions:
             "guide": partial(self._guide, request.stops),
             "unguide": supervisor.stop_guiding,
         }[request.what]
-        ticket = act()
-        if ticket is not None:
-            self._tickets.append((request.what, ticket))
+        sent = act()
+        if sent is not None:
+            self.requests.add(request.what, sent)
 
     def _guide(self, stops: int | None) -> PendingRequest | None:
         """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
@@ -135,9 +131,9 @@ class RunActions:
         if unset is not None:
             self._store.say("warn", unset)
             return None
-        if state.target != "virtual" and now - self._asked_to_guide > _SECOND_THOUGHT:
+        if state.target != "virtual" and now - self._asked_to_guide > _CONFIRM_TIMEOUT:
             self._asked_to_guide = now
-            self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_SECOND_THOUGHT:.0f}"))
+            self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_CONFIRM_TIMEOUT:.0f}"))
             return None
         self._asked_to_guide = -math.inf
         space, kind = state.push.way.split(".")
@@ -172,17 +168,13 @@ class RunActions:
             self._store.say("warn", message("plant.address", address=state.target))
             return
         self._store.update(plant=plant, playing=False, **_unasked(state))
-        self._powered, self._power_asked = False, float("-inf")
-        self._end_recording()
-        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
+        self._forget_robot()
         self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def disconnect(self) -> None:
         """Lets go of the controller, and ends our own; goal and plan stay, for the preview."""
         state = self._store.state
-        self._end_recording()
-        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
-        self._powered, self._power_asked = False, float("-inf")
+        self._forget_robot()
         self._session.disconnect()
         self._store.update(asked=None, playing=False, **_unasked(state))
 
@@ -190,9 +182,7 @@ class RunActions:
         """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
         state = self._store.state
         model = state.model if state.model.name == name else load_model(name)
-        self._powered, self._power_asked = False, float("-inf")
-        self._end_recording()
-        self._tickets, self._incident, self._phase, self._trouble = [], 0, "", ""
+        self._forget_robot()
         changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
         if model is not state.model:
             self._store.forget()
@@ -210,6 +200,11 @@ class RunActions:
         self._session.open(model, target, state.plant, _own_setup(state, target))
         self._store.update(place=0.0, playing=False, **changes)
 
+    def _forget_robot(self) -> None:
+        self.requests.forget()
+        self._incident, self._phase, self._trouble = 0, "", ""
+        self._powered, self._power_asked = False, float("-inf")
+
     def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
         """Takes note of the set-up that an arm had before it was exchanged for another."""
         fresh = SetupState()
@@ -225,12 +220,13 @@ class RunActions:
         return setup
 
     def watch(self) -> str | None:
-        """Looks at the supervisor: finished tickets, new incidents, recorded cycles, the arm's first pose.
+        """Looks at the supervisor: finished requests, new incidents, recorded cycles, the arm's first pose.
 
         Returns:
-            "rested" when the arm has just come to rest, "placed" when it was seen for the first time, else None.
+            "rested" when the arm has just stopped, "placed" when it was seen for the first time, else None.
         """
-        self._collect_tickets()
+        for outcome in self.requests.collect():
+            self._report(outcome)
         status = self._session.status()  # After them: where a motion has ended, it says so too.
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
@@ -246,7 +242,6 @@ class RunActions:
             self._settle()
         before, self._phase = self._phase, status.phase
         self._follow(status)
-        self._record(status)
         if not self._placed and status.q_c is not None:
             self._placed = True
             if self._store.state.goal is self._untouched:
@@ -282,10 +277,10 @@ class RunActions:
         if status.powered:
             self._powered = True
             return
-        if time.monotonic() - self._power_asked < _POWER_PAUSE or any(what == "power_on" for what, _ in self._tickets):
+        if time.monotonic() - self._power_asked < _POWER_PAUSE or self.requests.is_pending("power_on"):
             return
         with suppress(StartingError):  # The next look will find it there.
-            self._tickets.append(("power_on", self._session.supervisor().power_on()))
+            self.requests.add("power_on", self._session.supervisor().power_on())
             self._power_asked = time.monotonic()
 
     def _execute(self, *, is_agreed: bool, stops: int | None) -> None:
@@ -297,42 +292,31 @@ class RunActions:
         if reason is not None:
             self._store.say("warn", reason)
             return
-        certificate = None if state.plan is None else state.plan.report.certificate
-        if state.plan is None or certificate is None:
+        if state.plan is None:
             return
         if state.target != "virtual" and not (is_agreed and state.asked is state.plan.motion):
             self._store.update(asked=state.plan.motion)
             return
-        supervisor = self._session.supervisor()
-        supervisor.drain()
         try:
-            ticket = supervisor.execute(state.plan.motion, certificate, mode, pace=state.drive.pace, stops=stops)
+            self.requests.execute(state.plan, stops=stops)
         except (CertificateError, PlanningError, UsageError) as error:
             self._store.say("warn", tell_error(error))
             return
         self._arrival = state.plan.short
-        self._keeper.begin(state.plan)
-        self._recording, self._stopped, self._is_left_alone = True, None, False
-        self._tickets.append(("execute", ticket))
-        self._store.update(recording=None, last_run=None, playing=False, asked=None)
 
-    def _collect_tickets(self) -> None:
-        waiting = []
-        for what, ticket in self._tickets:
-            if not ticket.done:
-                waiting.append((what, ticket))
-            elif ticket.error is not None:
-                self._stopped = str(ticket.error) if what == "execute" else self._stopped
-                if what == "execute" and isinstance(ticket.error, ControlError) and self._reached is None:
-                    self._reached = 0.0  # It had begun, and nobody saw it on its way.
-                trouble = TROUBLE if _is_trouble(ticket.error) else ""
-                self._store.say(*self._tell_failure(what, ticket.error), trouble=trouble)
-            elif what == "power_on":
-                self._powered = True
-            elif what == "execute":
-                self._reached = math.inf  # Even if it was too short to be seen on its way.
-                self._tell_arrival()
-        self._tickets = waiting
+    def _report(self, outcome: Outcome) -> None:
+        if outcome.error is not None:
+            if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
+                self._reached = 0.0  # It had begun, and was not seen on its way.
+            trouble = TROUBLE if _is_trouble(outcome.error) else ""
+            self._store.say(*self._tell_failure(outcome, outcome.error), trouble=trouble)
+        elif outcome.what == "power_on":
+            self._powered = True
+        elif outcome.what == "reboot":
+            self._store.say("warn", message("signals.rebooted"))
+        elif outcome.what == "execute":
+            self._reached = math.inf  # Even if it was too short to be seen on its way.
+            self._tell_arrival()
 
     def _tell_arrival(self) -> None:
         if self._arrival is not None:
@@ -340,43 +324,16 @@ class RunActions:
         else:
             self._store.say("good", message("notice.arrived"))
 
-    def _tell_failure(self, what: str, error: RcilabError) -> tuple[Tone, Message]:
+    def _tell_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
         if _is_trouble(error):
             return "bad", tell_error(error, self._session.status())
-        if isinstance(error, ControlError) and what == "execute":
-            self._is_left_alone = self._session.status().code == "idle.operator"
-            return "warn", message("notice.operator" if self._is_left_alone else _stopped(self._store.state))
-        return "bad", message("notice.refused", what=message(f"drive.{what}"), error=tell_error(error))
-
-    def _record(self, status: SupervisorStatus) -> None:
-        try:
-            rows = self._session.supervisor().drain()
-        except RcilabError:
-            return
-        if not self._recording:
-            return
-        self._keeper.add(rows, self._paced())
-        if not is_moving(status) and not any(what == "execute" for what, _ in self._tickets):
-            self._end_recording()
-
-    def _end_recording(self) -> None:
-        self._recording = False
-        self._keeper.finish(self._stopped, self._paced(), is_left_alone=self._is_left_alone)
-
-    def _paced(self) -> SpeedScaledMotion | None:
-        """Returns how the motion under way, or the last one, is run; None as planned."""
-        with suppress(RcilabError):  # Its supervisor has gone.
-            paced = self._session.supervisor().paced
-            return paced if paced is not None and paced.changed else None
-        return None
+        if isinstance(error, ControlError) and outcome.what == "execute":
+            return "warn", message("notice.operator" if outcome.is_left_alone else _stopped(self._store.state))
+        return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=tell_error(error))
 
     def close(self) -> None:
         """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""
-        if self._recording:
-            self._record(self._session.status())
-        if self._recording:
-            self._stopped = "the workbench was closed"
-            self._end_recording()
+        self.requests.close("the workbench was closed")
 
 
 def _is_trouble(error: RcilabError) -> bool:

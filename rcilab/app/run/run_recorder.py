@@ -1,4 +1,4 @@
-"""Keeps what became of the last motion: for the plots while it happens, as a run once the arm stands still."""
+"""Records the last motion: for the plots while it runs, as a run once the arm has stopped."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.app.run.recording import Recording
-from rcilab.app.store import Store
-from rcilab.app.text import message
+from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.error_messages import tell
+from rcilab.i18n.translator import message
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
+from rcilab.recording.run_file import ENDING, RunFile
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
+    from rcilab.app.app_state import AppState
     from rcilab.app.planning import Plan
-    from rcilab.app.store import UiState
+    from rcilab.app.state_store import StateStore
     from rcilab.motion.speed_scaling import SpeedScaledMotion
-    from rcilab.recording.run_file import RunFile
 
 
 class RunRecorder:
-    """Owned by the conductor's thread.
+    """Owned by the thread that changes the state.
 
     Args:
         store: Where the recording is shown.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: StateStore[AppState]) -> None:
         self._store = store
         self._live: LiveRecording | None = None
         self._file = ""
@@ -46,7 +47,7 @@ class RunRecorder:
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
     def add(self, rows: NDArray[np.void], paced: SpeedScaledMotion | None = None) -> None:
-        """Adds cycles and shows them; `paced`: how the plan is run, where its pace was changed."""
+        """Adds cycles and shows them; `paced`: how the plan is run, where its speed override was changed."""
         if self._live is None:
             return
         before = self._live.cycles
@@ -59,22 +60,27 @@ class RunRecorder:
             self._store.update(recording=as_recording(cycles, self._live.delay, paced))
 
     def finish(
-        self, stopped: str | None, paced: SpeedScaledMotion | None = None, *, is_left_alone: bool = False
+        self,
+        stopped: str | None,
+        paced: SpeedScaledMotion | None = None,
+        *,
+        is_left_alone: bool = False,
+        run: Run | None = None,
     ) -> None:
         """Ends the recording; from here on it can be exported.
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
-            paced: How the plan was run, where its pace was changed.
+            paced: How the plan was run, where its speed override was changed.
             is_left_alone: Whether that is because no page answered.
+            run: As the robot has recorded it itself; None: it is made of the cycles that were added.
         """
         if self._live is None:
             return
         live, self._live = self._live, None
         plan = None if paced is None else paced.as_motion()
-        run: Run | None = None
         try:
-            run = live.finish(stopped, plan)
+            run = run or live.finish(stopped, plan)
         except InvalidValueError as error:
             self._complain(error)
             run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
@@ -82,13 +88,10 @@ class RunRecorder:
             recording = replace(whole_recording(run, self._file, paced), is_left_alone=is_left_alone)
             self._store.update(recording=recording, last_run=recording)
 
-    def _open(self, state: UiState, plan: Plan, setup: Setup) -> RunFile | None:
+    def _open(self, state: AppState, plan: Plan, setup: Setup) -> RunFile | None:
         self._file = ""
         if state.runs is None or not state.record:
             return None
-        from rcilab.core.cycle_log import cycle_dtype
-        from rcilab.recording.run_file import ENDING, RunFile
-
         stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(setup.started_ns * 1e-9))
         path = state.runs / f"{stamp}-{setup.started_ns // 1_000_000 % 1000:03d}-{state.model.name}{ENDING}"
         try:

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.status_text import tell_error
+from rcilab.app.run.robot_requests import RobotRequests
 from rcilab.app.store import Store
-from rcilab.app.text import message
 
 if TYPE_CHECKING:
-    from rcilab.control_process import PendingRequest, SupervisorStatus
+    from rcilab.control_process import SupervisorStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,11 +30,10 @@ class PressSignals(Request):
 
 
 class SignalActions:
-    """Owned by the conductor's thread; it never waits for the controller."""
+    """Owned by the dispatcher's thread; it never waits for the controller."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
-        self._tickets: list[tuple[str, PendingRequest]] = []
+    def __init__(self, store: Store, session: RobotConnection, requests: RobotRequests) -> None:
+        self._store, self._session, self._requests = store, session, requests
 
     @property
     def handlers(self) -> Handlers:
@@ -47,30 +45,19 @@ class SignalActions:
 
     def set_output(self, request: SetOutput) -> None:
         """Sets a digital output."""
-        ticket = self._session.supervisor().set_output(request.signal, request.level)
-        self._tickets.append(("output", ticket))
+        self._requests.add("output", self._session.supervisor().set_output(request.signal, request.level))
 
     def press(self, request: PressSignals) -> None:
         """Reads the inputs; restarts the controller when that was confirmed."""
         if request.what == "read":
-            self._tickets.append(("inputs", self._session.supervisor().read_inputs()))
+            self._requests.add("inputs", self._session.supervisor().read_inputs())
             return
         was_asked = self._store.state.reboot_asked
         self._store.update(reboot_asked=request.what == "reboot")
         if request.what == "confirm" and was_asked:
-            self._tickets.append(("reboot", self._session.supervisor().reboot()))
+            self._requests.add("reboot", self._session.supervisor().reboot())
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Looks at the answers; a question about a restart ends with the connection."""
+        """Withdraws the question about a restart when the connection ends."""
         if self._store.state.reboot_asked and status.phase not in ("idle", "fault"):
             self._store.update(reboot_asked=False)
-        waiting = []
-        for what, ticket in self._tickets:
-            if not ticket.done:
-                waiting.append((what, ticket))
-            elif ticket.error is not None:
-                refused = message("notice.refused", what=message(f"drive.{what}"), error=tell_error(ticket.error))
-                self._store.say("bad", refused)
-            elif what == "reboot":
-                self._store.say("warn", message("signals.rebooted"))
-        self._tickets = waiting

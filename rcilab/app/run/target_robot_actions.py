@@ -7,8 +7,7 @@ from typing import Literal, cast
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.active_force import Plant
-from rcilab.app.run.drive_state import DESTINATIONS
+from rcilab.app.run.drive_state import DESTINATIONS, Plant
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
 from rcilab.app.status_text import tell_error

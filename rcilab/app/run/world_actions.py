@@ -1,4 +1,4 @@
-"""What happens when somebody spoils the network of our own controller or presses its safety buttons."""
+"""Disturbs the network of our own controller, presses its safety buttons and wires its outputs."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
+from rcilab.app.app_state import AppState
+from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import no_push
 from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
+from rcilab.app.state_store import StateStore
 from rcilab.app.status_text import tell_error
-from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
+from rcilab.i18n.translator import message
 from rcilab.sim.api import DIRECTIONS, AutoLimit, Direction, LoopBack, Network, NetworkFaults, Press
 
 if TYPE_CHECKING:
@@ -51,16 +52,16 @@ class PressSafety(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetWiring(Request):
-    """Has our own controller's outputs wired to its inputs, or commands led to rest inside the soft limits."""
+    """Wires our own controller's outputs to its inputs, or makes it stop commands inside the soft limits."""
 
     name: Literal["loop_back", "auto_limit"]
     on: bool
 
 
 class WorldActions:
-    """Owned by the conductor's thread; it never waits for the controller."""
+    """Owned by the thread that changes the state; it never waits for the controller."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
+    def __init__(self, store: StateStore[AppState], session: Connection) -> None:
         self._store, self._session = store, session
         self._watch: SimulationStatusPoller | None = None
         self._address: str | None = None
@@ -101,7 +102,7 @@ class WorldActions:
             self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
 
     def set_wiring(self, request: SetWiring) -> None:
-        """Wires outputs to inputs, or has commands led to rest at the soft limits; or takes that back."""
+        """Wires outputs to inputs, or stops commands at the soft limits; or ends that."""
         watch = self._require_watch()
         if watch is None or request.name not in _WIRING:
             return

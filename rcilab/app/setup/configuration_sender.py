@@ -1,10 +1,11 @@
-"""Telling the controller of tool, load, box and parameters: one letter at a time, and nobody waits for its answer."""
+"""Sends tool, load, box and parameters to the controller: one request at a time, without waiting for its answer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
+from rcilab.app.connection import Connection
 from rcilab.app.status_text import StartingError, tell_error
 from rcilab.app.text import Message
 from rcilab.core.errors import RcilabError
@@ -14,44 +15,28 @@ if TYPE_CHECKING:
     from rcilab.makers.configuration import RobotConfiguration
 
 
-class ConfigurableRobot(Protocol):
-    """What takes a configuration."""
-
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Sends it, without waiting for the answer."""
-        ...
-
-
-class ConfigurationTarget(Protocol):
-    """The robot of the moment."""
-
-    def supervisor(self) -> ConfigurableRobot:
-        """Returns what takes requests."""
-        ...
-
-
 class ConfigurationSender:
-    """Owned by the conductor's thread.
+    """Owned by the thread that changes the state.
 
     Args:
-        session: The robot side.
-        refuse: Takes why the controller did not take a letter.
+        session: The robot.
+        refuse: Takes why the controller refused a request.
     """
 
-    def __init__(self, session: ConfigurationTarget, refuse: Callable[[Message], None]) -> None:
+    def __init__(self, session: Connection, refuse: Callable[[Message], None]) -> None:
         self._session, self._refuse = session, refuse
-        self._ticket: PendingRequest | None = None
+        self._request: PendingRequest | None = None
 
     @property
     def is_underway(self) -> bool:
         """Whether an answer is awaited; nothing else is sent until it was collected."""
-        return self._ticket is not None
+        return self._request is not None
 
     def send(self, setup: RobotConfiguration) -> None:
-        """Sends a letter; a control process that is still starting gets none."""
-        assert self._ticket is None
+        """Sends a request; none while the control process is still starting."""
+        assert self._request is None
         try:
-            self._ticket = self._session.supervisor().set_up(setup)
+            self._request = self._session.supervisor().set_up(setup)
         except StartingError:
             return
         except RcilabError as error:
@@ -59,13 +44,13 @@ class ConfigurationSender:
 
     def collect(self) -> None:
         """Looks whether there is an answer."""
-        ticket = self._ticket
-        if ticket is None or not ticket.done:
+        request = self._request
+        if request is None or not request.done:
             return
-        self._ticket = None
-        if ticket.error is not None:
-            self._refuse(tell_error(ticket.error))
+        self._request = None
+        if request.error is not None:
+            self._refuse(tell_error(request.error))
 
     def forget(self) -> None:
-        """Awaits no answer any more: another arm was chosen."""
-        self._ticket = None
+        """Drops the request: another arm was chosen."""
+        self._request = None

@@ -1,4 +1,4 @@
-"""A session that the notebook has already, as one of the robots that its parts ask."""
+"""The robot that a session drives in this process, asked as `RobotConnection` is."""
 
 from __future__ import annotations
 
@@ -7,28 +7,44 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import PendingRequest, SupervisorStatus
+from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
-from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import SIGNALS
-from rcilab.notebook.browser_watchdog import LEFT_ALONE
-from rcilab.notebook.robot_side import BusyError, Outcome
 
 if TYPE_CHECKING:
-    from rcilab.app.planning import Plan
+    from rcilab.conformance.certificate import Certificate
+    from rcilab.core.state import Mode
     from rcilab.execution.motion_progress import MotionProgress
     from rcilab.execution.session import RobotSession
+    from rcilab.motion.motion import Motion
     from rcilab.recording.run import Run
 
 _FRESH = 0.04  # [s] A state that is younger is not asked for again.
 _LOST_LOOK = 1.0  # [s] Between two looks at a connection that is lost.
 _WAIT = 0.2  # [s] For a state that was asked for.
-_POWER_LOOK = 1.0  # [s] Between two questions after motor power; the state does not tell it.
+_POWER_LOOK = 1.0  # [s] Between two queries of motor power; the state does not have it.
 
 
-class SessionRobot:
-    """A session that the notebook has: its motions run in the kernel. The session stays open when this ends.
+class BusyError(UsageError):
+    """Something was asked of a robot while another request was in progress.
+
+    Attributes:
+        in_progress: Name of that request.
+    """
+
+    def __init__(self, what: str, in_progress: str) -> None:
+        super().__init__(f"no {what} now: {in_progress} is still in progress; stop it, or wait")
+        self.in_progress = in_progress
+
+
+class SessionConnection:
+    """A session: its motions run in this process. It stays open when this ends.
 
     Args:
         session: From `connect` or `simulate`.
@@ -40,22 +56,22 @@ class SessionRobot:
         self.is_virtual = _has_world(session)
         self._worker: threading.Thread | None = None
         self._what = ""
-        self._done: list[Outcome] = []
-        self._way: MotionProgress | None = None  # Of the running or last motion.
-        self._run: Run | None = None  # What came of the last one that was started here.
+        self._cell_runs: list[tuple[Run, RcilabError | None]] = []
+        self._no_cycles: NDArray[np.void] = np.zeros(0, cycle_dtype(session.model.n))
+        self._progress: MotionProgress | None = None  # Of the running or last motion.
+        self._run: Run | None = None  # Of the last motion that was started here.
         self._is_cells = False
-        self._remove_listener = session.on_run(self._hear_run)
+        self._remove_listener = session.on_run(self._on_run)
         self._powered: bool | None = None
-        self._held = RobotConfiguration()  # What it was told from here.
+        self._held = RobotConfiguration()  # What was sent from here.
         self._inputs: tuple[bool, ...] | None = None
         self._outputs: tuple[bool | None, ...] = (None,) * len(SIGNALS)  # What was set from here.
-        self.auto_limit = False
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
 
     def status(self) -> SupervisorStatus:
-        """Returns how it stands, by a state of this moment; by the last one while another cell moves the arm."""
+        """Returns its status, from a state of this moment; from the last one while another cell moves the arm."""
         age = time.monotonic() - self._looked
         if age > (_LOST_LOOK if self._last.phase == "lost" else _FRESH):
             self._last = self._look()
@@ -69,8 +85,8 @@ class SessionRobot:
 
     @property
     def planned(self) -> float:
-        """Where the plan of the running or last motion ends, [s]; 0 where nobody knows."""
-        return 0.0 if self._way is None else self._way.planned
+        """Where the plan of the running or last motion ends, [s]; 0 where that is unknown."""
+        return 0.0 if self._progress is None else self._progress.planned
 
     def _look(self) -> SupervisorStatus:
         if self._session.is_closed:
@@ -80,8 +96,8 @@ class SessionRobot:
         is_moving = way is not None or is_ours or self._session.is_moving
         self._is_cells = is_moving and not is_ours
         if self._is_cells and way is None:
-            self._way = None  # Nobody knows how far a callback is.
-        self._way = way = way or self._way
+            self._progress = None  # How far a callback is, is unknown.
+        self._progress = way = way or self._progress
         try:
             state = self._session.state if is_moving else self._session.receive_state(_WAIT, max_age=_FRESH)
             if not is_moving:
@@ -97,6 +113,7 @@ class SessionRobot:
             code="moving.held" if is_held else phase,
             target=self.name,
             address=self.name,
+            world_address=self._session.world.address if self.is_virtual else None,
             q=state.q,
             q_c=state.q_c,
             dq=state.dq,
@@ -110,25 +127,66 @@ class SessionRobot:
             setup=self._held,
             inputs=self._inputs,
             outputs=self._outputs,
-            **_tell_way(way),
+            **_describe_progress(way),
         )
 
-    def power(self, on: bool) -> None:
-        """Switches motor power."""
-        self._do("power_on" if on else "power_off", self._session.power_on if on else self._session.power_off)
+    def supervisor(self) -> SessionConnection:
+        """Returns this object: it takes the requests itself."""
+        return self
 
-    def recover(self) -> None:
+    @property
+    def paced(self) -> None:
+        """None: the run of a session holds the motion as it was run."""
+
+    def drain(self) -> NDArray[np.void]:
+        """Returns no cycles: a session records its runs itself."""
+        return self._no_cycles
+
+    def take_run(self) -> Run | None:
+        """Returns the run of the last `execute`; None where the arm did not move."""
+        run, self._run = self._run, None
+        return run
+
+    def take_cell_runs(self) -> list[tuple[Run, RcilabError | None]]:
+        """Returns what cells have run since the last call, and why it did not reach its end."""
+        runs, self._cell_runs = self._cell_runs, []
+        return runs
+
+    def power_on(self) -> PendingRequest:
+        """Switches motor power on."""
+        return self._do("power_on", self._session.power_on)
+
+    def power_off(self) -> PendingRequest:
+        """Switches motor power off."""
+        return self._do("power_off", self._session.power_off)
+
+    def recover(self) -> PendingRequest:
         """Clears the controller's faults."""
-        self._do("recover", self._session.recover)
+        return self._do("recover", self._session.recover)
 
-    def execute(self, plan: Plan, pace: float = 1.0) -> None:
-        """Streams a checked motion in a thread of the kernel."""
-        certificate = plan.report.require().certificate
-        go, self._way = self._session.execute, None
-        self._do("execute", lambda: go(plan.motion, certificate, mode=plan.mode, pace=pace))
+    def execute(
+        self,
+        motion: Motion,
+        certificate: Certificate,
+        mode: Mode = "joint_position",
+        *,
+        pace: float = 1.0,
+        stops: int | None = None,
+    ) -> PendingRequest:
+        """Streams a checked motion in a thread of the kernel.
+
+        Args:
+            motion: The motion.
+            certificate: From `check(motion, model, mode=mode).certificate`.
+            mode: How the arm is commanded.
+            pace: Speed override, 0.1 to 1.
+            stops: Not counted here.
+        """
+        self._progress = None
+        return self._do("execute", lambda: self._session.execute(motion, certificate, mode=mode, pace=pace))
 
     def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Sends parameters of the modes to the controller."""
+        """Sends limits or parameters to the controller."""
         if self._is_busy and self.is_virtual:
             raise StartingError(f"{self._what} is in progress; try again in a moment")
 
@@ -139,47 +197,26 @@ class SessionRobot:
 
         return self._do("control", send)
 
-    def set_joint_limit(self, joints: SoftJointLimits) -> None:
-        """Tells the controller soft limits of the joint angles."""
+    def set_output(self, signal: int, level: bool) -> PendingRequest:
+        """Sets a digital output, and reads the inputs."""
 
-        def tell() -> None:
-            self._session.configure(RobotConfiguration(joints=joints))
-            self._held = self._held.updated(RobotConfiguration(joints=joints))
-
-        self._do("limits", tell)
-
-    def set_auto_limit(self, on: bool) -> None:
-        """Has the virtual controller lead commands to a standstill inside the soft limits, or not."""
-
-        def tell() -> None:
-            self._session.world.set_auto_limit(on)
-            self.auto_limit = on
-
-        self._do("auto_limit", tell)
-
-    def set_output(self, signal: int, level: bool) -> None:
-        """Sets a digital output."""
-
-        def tell() -> None:
+        def send() -> None:
             self._session.rci.set_do(signal, level)
             self._outputs = (*self._outputs[:signal], level, *self._outputs[signal + 1 :])
             self._read()
 
-        self._do("output", tell)
+        return self._do("output", send)
 
-    def read_inputs(self) -> None:
+    def read_inputs(self) -> PendingRequest:
         """Reads the digital inputs."""
-        self._do("inputs", self._read)
+        return self._do("inputs", self._read)
 
-    def reboot(self) -> None:
+    def reboot(self) -> PendingRequest:
         """Restarts the controller, which closes the session."""
-        self._do("reboot", self._session.rci.reboot)
-
-    def _read(self) -> None:
-        self._inputs = tuple(self._session.rci.get_di(signal) for signal in SIGNALS)
+        return self._do("reboot", self._session.rci.reboot)
 
     def set_pace(self, pace: float) -> PendingRequest:
-        """Runs the motion in progress at part of its planned speed."""
+        """Sets the speed override of the motion in progress."""
         self._session.set_pace(pace)
         return _settled("pace")
 
@@ -188,29 +225,23 @@ class SessionRobot:
         self._session.pause()
         return _settled("pause")
 
-    def stop(self) -> None:
-        """Brings a running motion to rest, also one that a cell has started."""
-        self._session.stop()
+    def stop(self, reason: str | None = None) -> None:
+        """Stops a motion in progress, also one that a cell has started; from any thread, without waiting."""
+        self._session.stop(*(() if reason is None else (reason,)))
 
-    def beat(self) -> None:
-        """Does nothing: who looks after a session stops it by himself."""
-
-    def leave_alone(self) -> None:
-        """Brings a running motion to rest, whoever has started it."""
-        self._session.stop(LEFT_ALONE)
-
-    def outcomes(self) -> list[Outcome]:
-        """Returns what has ended since the last call."""
-        done, self._done = self._done, []
-        return done
+    def heartbeat(self) -> None:
+        """Does nothing: who looks after a session stops it itself."""
 
     def close(self) -> None:
-        """Brings to rest what was started here; the session stays."""
+        """Stops what was started here; the session stays open."""
         self._remove_listener()
         worker = self._worker
         if worker is not None and worker.is_alive():
             self._session.stop()
             worker.join()
+
+    def _read(self) -> None:
+        self._inputs = tuple(self._session.rci.get_di(signal) for signal in SIGNALS)
 
     @property
     def _is_busy(self) -> bool:
@@ -228,8 +259,6 @@ class SessionRobot:
             except RcilabError as failure:
                 error = failure
             self._power_seen = float("-inf")
-            if what != "control":  # Its sender looks at the request itself.
-                self._done.append(Outcome(what=what, run=self._run, error=error))
             request.settle(error)
 
         self._what, self._run = what, None
@@ -237,27 +266,17 @@ class SessionRobot:
         self._worker.start()
         return request
 
-    def _hear_run(self, run: Run, error: BaseException | None) -> None:
-        """In the thread that ran it, which does not wait for what is made of it."""
+    def _on_run(self, run: Run, error: BaseException | None) -> None:
+        """Keeps a run; called in the thread that ran it."""
         if threading.current_thread() is self._worker:
             self._run = run
         elif len(run.cycles):
-            self._done.append(Outcome(what="cell", run=run, error=error if isinstance(error, RcilabError) else None))
+            self._cell_runs.append((run, error if isinstance(error, RcilabError) else None))
 
     def _ask_power(self) -> None:
         if time.monotonic() - self._power_seen > _POWER_LOOK and not self._is_busy:
             self._powered = self._session.is_powered()
-            if self.is_virtual:
-                self._ask_auto_limit()
             self._power_seen = time.monotonic()
-
-    def _ask_auto_limit(self) -> None:
-        try:
-            said = self._session.world.status().auto_limit
-        except ConnectionLostError:  # Its world port may be gone while the arm is there.
-            return
-        if said is not None and not self._is_busy:
-            self.auto_limit = said
 
 
 def _settled(what: str) -> PendingRequest:
@@ -266,7 +285,7 @@ def _settled(what: str) -> PendingRequest:
     return request
 
 
-def _tell_way(way: MotionProgress | None) -> dict[str, Any]:
+def _describe_progress(way: MotionProgress | None) -> dict[str, Any]:
     if way is None:
         return {}
     names = {"motion_time": way.time, "motion_duration": way.duration, "motion_place": way.place}

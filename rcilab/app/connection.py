@@ -1,0 +1,98 @@
+"""What the application asks of a robot, whether a control process or a session drives it. Nothing here waits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rcilab.conformance.certificate import Certificate
+    from rcilab.control_process import PendingRequest, SupervisorStatus
+    from rcilab.core.state import Mode
+    from rcilab.makers.configuration import RobotConfiguration
+    from rcilab.motion.motion import Motion
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
+    from rcilab.recording.run import Run
+
+
+class Robot(Protocol):
+    """Takes requests. `rcilab.control_process.Supervisor` is one."""
+
+    @property
+    def paced(self) -> SpeedScaledMotion | None:
+        """The motion in progress, or the last one, with its speed override; None where the run itself holds it."""
+        ...
+
+    def power_on(self) -> PendingRequest:
+        """Switches motor power on."""
+        ...
+
+    def power_off(self) -> PendingRequest:
+        """Switches motor power off."""
+        ...
+
+    def recover(self) -> PendingRequest:
+        """Clears the controller's faults."""
+        ...
+
+    def execute(
+        self,
+        motion: Motion,
+        certificate: Certificate,
+        mode: Mode = "joint_position",
+        *,
+        pace: float = 1.0,
+        stops: int | None = None,
+    ) -> PendingRequest:
+        """Streams a checked motion; see `rcilab.control_process.Supervisor.execute`."""
+        ...
+
+    def set_pace(self, pace: float) -> PendingRequest:
+        """Sets the speed override of the motion in progress."""
+        ...
+
+    def pause(self) -> PendingRequest:
+        """Holds the motion in progress."""
+        ...
+
+    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+        """Sends tool, load, limits or parameters; the status has what the controller acknowledged."""
+        ...
+
+    def set_output(self, signal: int, level: bool) -> PendingRequest:
+        """Sets a digital output, 0 to 5, and reads the inputs; the status has both."""
+        ...
+
+    def read_inputs(self) -> PendingRequest:
+        """Reads the digital inputs; the status has them."""
+        ...
+
+    def reboot(self) -> PendingRequest:
+        """Restarts the controller; the connection ends with it."""
+        ...
+
+    def drain(self) -> NDArray[np.void]:
+        """Returns the cycles since the last call, where the robot does not record a run itself."""
+        ...
+
+
+class Connection(Protocol):
+    """The robot of the moment."""
+
+    def status(self) -> SupervisorStatus:
+        """Returns its status."""
+        ...
+
+    def supervisor(self) -> Robot:
+        """Returns what takes requests.
+
+        Raises:
+            StartingError: It is not there yet.
+        """
+        ...
+
+    def take_run(self) -> Run | None:
+        """Returns the last run of `execute` if the robot recorded it itself; None: it is made of drained cycles."""
+        ...

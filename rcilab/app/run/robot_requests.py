@@ -1,0 +1,129 @@
+"""Requests to the robot that await an answer, and the recording of the motion that one of them executes."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rcilab.app.run.run_recorder import RunRecorder
+from rcilab.core.errors import ControlError, RcilabError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from rcilab.app.app_state import AppState
+    from rcilab.app.connection import Connection
+    from rcilab.app.planning import Plan
+    from rcilab.app.state_store import StateStore
+    from rcilab.control_process import PendingRequest
+    from rcilab.motion.speed_scaling import SpeedScaledMotion
+    from rcilab.recording.run import Run
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome:
+    """How a request ended."""
+
+    what: str
+    """Name of the request, such as "execute", "power_on" or "reboot"."""
+    error: RcilabError | None = None
+    run: Run | None = None
+    """Of "execute", where the arm moved."""
+    is_left_alone: bool = False
+    """Whether the motion was stopped because no page answered."""
+
+    @property
+    def record(self) -> NDArray[np.void] | None:
+        """The last cycles, from the flight recorder; None where nothing moved."""
+        record = getattr(self.error, "record", None)
+        return record if record is not None else None if self.run is None else self.run.cycles
+
+
+class RobotRequests:
+    """Used by one thread, or under a lock; it never waits for the robot.
+
+    Args:
+        store: Where the recording is shown.
+        connection: The robot.
+    """
+
+    def __init__(self, store: StateStore[AppState], connection: Connection) -> None:
+        self._store, self._connection = store, connection
+        self._pending: list[tuple[str, PendingRequest]] = []
+        self._recorder = RunRecorder(store)
+
+    def add(self, what: str, request: PendingRequest) -> None:
+        """Adds a request whose end `collect` reports."""
+        self._pending.append((what, request))
+
+    def is_pending(self, what: str) -> bool:
+        """Returns whether a request of this name awaits its answer."""
+        return any(name == what for name, _ in self._pending)
+
+    def execute(self, plan: Plan, *, stops: int | None = None) -> None:
+        """Executes a checked plan with the speed override of the state, and records it.
+
+        Args:
+            plan: What `check` passed.
+            stops: How often the robot had been stopped when the operator wanted this; None: they want it now.
+
+        Raises:
+            CertificateError: The plan does not fit where the arm is, or what it carries.
+            ConformanceError: The plan did not pass.
+            PlanningError: With this speed override it would break a condition.
+            UsageError: The arm moves, or was stopped in the meantime.
+        """
+        certificate = plan.report.require().certificate
+        assert certificate is not None  # A report that is ok has one.
+        robot, pace = self._connection.supervisor(), self._store.state.drive.pace
+        robot.drain()
+        self.add("execute", robot.execute(plan.motion, certificate, plan.mode, pace=pace, stops=stops))
+        self._recorder.begin(plan)
+        self._store.update(recording=None, last_run=None, playing=False, asked=None)
+
+    def collect(self) -> list[Outcome]:
+        """Returns how requests ended since the last call, and records the motion; call it several times a second."""
+        ended: list[tuple[str, PendingRequest]] = []
+        waiting: list[tuple[str, PendingRequest]] = []
+        for entry in self._pending:
+            (ended if entry[1].done else waiting).append(entry)
+        self._pending = waiting
+        self._record()
+        return [self._outcome(what, request.error) for what, request in ended]
+
+    def forget(self, stopped: str | None = None) -> None:
+        """Ends the recording and drops what awaits an answer: the robot goes.
+
+        Args:
+            stopped: Why the motion did not reach its end.
+        """
+        self._pending = []
+        self._recorder.finish(stopped, self._paced())
+
+    def close(self, stopped: str) -> None:
+        """Ends the recording with the cycles of this moment; see `forget`."""
+        self._record()
+        self.forget(stopped)
+
+    def _outcome(self, what: str, error: RcilabError | None) -> Outcome:
+        if what != "execute":
+            return Outcome(what=what, error=error)
+        is_stopped = isinstance(error, ControlError) and not error.faults
+        is_left_alone = is_stopped and self._connection.status().code == "idle.operator"
+        stopped = None if error is None else str(error)
+        self._recorder.finish(stopped, self._paced(), is_left_alone=is_left_alone, run=self._connection.take_run())
+        last = self._store.state.last_run
+        return Outcome(what=what, error=error, run=None if last is None else last.run, is_left_alone=is_left_alone)
+
+    def _record(self) -> None:
+        with suppress(RcilabError):  # The robot has gone.
+            self._recorder.add(self._connection.supervisor().drain(), self._paced())
+
+    def _paced(self) -> SpeedScaledMotion | None:
+        """Returns how the motion in progress, or the last one, is run; None as planned."""
+        with suppress(RcilabError):
+            paced = self._connection.supervisor().paced
+            return paced if paced is not None and paced.changed else None
+        return None
