@@ -153,15 +153,14 @@ def find_outside(model: RobotModel, q: JointVector) -> int | None:
 def _outside(place: str, limits: JointLimits, joint: int, angle: float) -> Message:
     soft = limits.soft_bound_passed(joint, angle)
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
-    told = {name: f"{np.degrees(value):.1f}" for name, value in (("angle", angle), ("low", low), ("high", high))}
     if soft is not None:
         code = "plan.start_soft" if place == "start" else "plan.at_soft"
-        return message(code, joint=joint, angle=told["angle"], limit=f"{np.degrees(soft):.1f}")
+        return message(code, joint=joint, angle=angle, limit=soft)
     if place == "start":
         return message("plan.start_limit", joint=joint)
     if low <= angle <= high:
         return message("plan.at_limit", joint=joint)
-    return message("plan.beyond_limit", joint=joint, **told)
+    return message("plan.beyond_limit", joint=joint, angle=angle, low=low, high=high)
 
 
 def _go(

@@ -18,9 +18,6 @@ _PAGE = "rcilab.app"
 class Text(text.Text):
     """The catalogue of the page in one language.
 
-    A value that stands before °, deg or mm in the catalogue is given in degrees or millimetres and shown in the units
-    of the page, as is the name {in_deg} or {in_mm}.
-
     Args:
         language: Which.
         units: What angles and lengths are shown in.
@@ -30,16 +27,7 @@ class Text(text.Text):
     """
 
     def __init__(self, language: str, units: Units = USUAL) -> None:
-        super().__init__(language, _PAGE)
-        self.units = units
-        self._entries = {code: units.adapt(entry) for code, entry in self._entries.items()}
-
-    def __call__(self, code: str, **values: object) -> str:
-        """Returns the words for a key; the key itself when the catalogues lack it (a test keeps them complete)."""
-        if not values:
-            return self._entries.get(code, code)
-        said = self._embedded(self._entries.get(code, ""), values)
-        return super().__call__(code, **self.units.values(said))
+        super().__init__(language, _PAGE, units)
 
     def _explain(self, said: Explains) -> str:
         return said.explain(self.language, self.units)

@@ -62,7 +62,7 @@ def advise(
     if condition.signal == "torque":
         return _softer(condition, motion)
     if condition.order == 0 and condition.signal == "joint" and soft is not None:
-        return Phrase("advice.range_soft", limit=f"{degrees(soft):.2f}")
+        return Phrase("advice.range_soft", limit=soft)
     if condition.order == 0:
         return Phrase(_WAYS.get(condition.signal, "advice.range"))
     if row <= condition.order and off_start:

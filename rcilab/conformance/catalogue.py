@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from rcilab.i18n import catalogue
 from rcilab.i18n.locale import Language, require_language
+from rcilab.i18n.units import USUAL, Units
 from rcilab.robots import ROBOTS_BY_MAKER
 
 __all__ = ["Language", "Phrase", "load_catalogue", "say"]
@@ -22,25 +23,30 @@ class Phrase(str):
     """
 
     key: str
-    values: Mapping[str, str]
+    values: Mapping[str, object]
 
-    def __new__(cls, key: str, **values: str) -> Phrase:  # noqa: D102  # The class says it.
+    def __new__(cls, key: str, **values: object) -> Phrase:  # noqa: D102  # The class says it.
         phrase = super().__new__(cls, say("en", key, **values))
         phrase.key, phrase.values = key, MappingProxyType(values)
         return phrase
 
-    def text(self, language: Language) -> str:
-        """Returns the words in a language."""
-        return say(language, self.key, **self.values)
+    def text(self, language: Language, units: Units = USUAL) -> str:
+        """Returns the text in a language, with angles and lengths in these units."""
+        return fill(language, self.key, self.values, units)
 
 
-def say(language: Language, key: str, **values: str) -> str:
+def say(language: Language, key: str, **values: object) -> str:
     """Returns a sentence in a language, filled with values.
 
     Raises:
         InvalidValueError: There is no catalogue for this language; the message lists those that exist.
     """
-    return load_catalogue(require_language(language))[key].format(**values)
+    return fill(language, key, values, USUAL)
+
+
+def fill(language: Language, key: str, values: Mapping[str, object], units: Units) -> str:
+    """Returns the same with angles and lengths in these units."""
+    return units.fill(load_catalogue(require_language(language))[key], values)
 
 
 @lru_cache

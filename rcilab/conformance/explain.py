@@ -11,7 +11,7 @@ from rcilab.conformance.advice import amount, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
-from rcilab.i18n.units import Units
+from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report, Violation
@@ -72,9 +72,9 @@ def explain_violation(violation: Violation, language: Language = "en", units: Un
     row, voice = violation.condition, _Voice(language, units)
     stop = voice.say("stop")
     sentences = (_fact(violation, voice) + _when(violation, voice) + stop, _fault(row, voice))
-    advice = violation.advice.text(language) if isinstance(violation.advice, Phrase) else violation.advice
-    if units is not None:
-        advice = units.restate(advice)
+    advice = violation.advice
+    if isinstance(advice, Phrase):
+        advice = advice.text(language, units or USUAL)
     return voice.join(*sentences, voice.say("remedy", advice=advice))
 
 

@@ -45,10 +45,10 @@ class LimitViolation(NamedTuple):
         if row.is_clearance:
             return Remark(self.text)
         if row.signal == "position":
-            return Remark(self.text, "outside_box", condition=row.id, away=f"{1e3 * self.value:.4g}")
+            return Remark(self.text, "outside_box", condition=row.id, away=self.value)
         if row.signal in ("frame", "elbow_sign"):
             return Remark(self.text, "broken", condition=row.id)
-        amounts = {"value": f"{self.value:.6g} {row.unit}", "bound": f"{self.bound:.6g} {row.unit}"}
+        amounts = {"value": self.value, "bound": self.bound, "unit": row.unit}
         if self.axis and row.is_per_joint:
             return Remark(self.text, "joint_passes", condition=row.id, joint=self.axis, **amounts)
         return Remark(self.text, "passes", condition=row.id, **amounts)

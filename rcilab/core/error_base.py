@@ -29,7 +29,7 @@ class RcilabError(Exception):
 
     Attributes:
         code: Names what went wrong, for faces that say it in their own words and language; "" where nothing does.
-        facts: What fills these words, by name: numbers as text, angles in degrees, lengths in millimetres; or errors.
+        facts: What fills these words, by name: numbers in SI, text, or errors.
     """
 
     code: str = ""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import reduce
+from typing import Any
 
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.i18n.translator import Finished, Message, Remark, message
+from rcilab.i18n.translator import Amount, Finished, Message, Remark, message
 
 _NAMES = frozenset({"status", "kind", "condition"})
 """Facts that are names with words of their own: the answer to a command, the type of a waypoint, a condition."""
-_AMOUNTS = frozenset({"value", "bound"})
-"""Facts of remarks that come with their unit, in SI."""
 _REQUIREMENTS = frozenset(
     {
         "span", "least", "rounds", "missing", "missing_beside", "unknown", "axes", "turns", "no_unit", "beyond",
@@ -47,8 +46,12 @@ def tell_note(note: str) -> Message | Finished:
     if len(note.parts) != 1:
         told = [tell_note(part) for part in note.parts] or [Finished(note)]
         return reduce(_both, reversed(told))
-    facts = {name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()}
-    facts |= {name: Finished(str(facts[name])) for name in _AMOUNTS & facts.keys()}
+    facts: dict[str, Any] = {
+        name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()
+    }
+    if "unit" in facts:
+        value, bound, unit = float(facts["value"]), float(facts["bound"]), str(facts.pop("unit"))
+        facts |= {"value": Amount(value, bound, unit), "bound": Amount(bound, value, unit)}
     return message(f"remark.{note.code}", **_named(facts))
 
 

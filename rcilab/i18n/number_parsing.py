@@ -68,7 +68,7 @@ def parse_number(
         return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
     value *= _UNITS.get(unit, {}).get(behind, 1.0)
     if (soft_low and value < low) or (soft_high and value > high):
-        limit = _short(low if value < low else high)
+        limit = math.radians(low if value < low else high)
         return Parsed(None, message("parse.range_soft", typed=shown, bounds=_bounds(low, high, unit), limit=limit))
     if not low <= value <= high:
         return Parsed(None, message("parse.range", typed=shown, bounds=_bounds(low, high, unit)))
@@ -76,8 +76,10 @@ def parse_number(
 
 
 def _bounds(low: float, high: float, unit: str) -> Message:
-    code = f"parse.bounds.{unit}" if unit in _UNITS else "parse.bounds"
-    return message(code, low=_short(low), high=_short(high), unit=unit)
+    if unit not in _UNITS:
+        return message("parse.bounds", low=_short(low), high=_short(high), unit=unit)
+    scale = math.pi / 180.0 if unit == "deg" else 1e-3
+    return message(f"parse.bounds.{unit}", low=scale * low, high=scale * high)
 
 
 @dataclass(frozen=True)

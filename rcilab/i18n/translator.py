@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -9,7 +10,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import Language, require_language
-from rcilab.i18n.units import USUAL, Units
+from rcilab.i18n.units import SI, USUAL, Units
 
 _STOPS = (".", "。")
 
@@ -25,14 +26,27 @@ class Explains(Protocol):
 
 @dataclass(frozen=True)
 class Finished:
-    """A sentence that came finished: it stays in its language, and its numbers are said in the units of the face."""
+    """An English sentence of the library that has no text in the catalogues; it stays as it is."""
 
     sentence: str
-    """Angles and lengths in it with their units, in SI or not."""
 
     def explain(self, language: Language, units: Units | None = None) -> str:
         """Returns the sentence."""
-        return self.sentence if units is None else units.restate(self.sentence)
+        return self.sentence
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A value of a condition beside the one it is compared with, both of an SI unit."""
+
+    value: float
+    other: float
+    unit: str
+
+    def explain(self, language: Language, units: Units | None = None) -> str:
+        """Returns it with its unit and as few digits as show that it differs from the other; without units in SI."""
+        shown = units or SI
+        return shown.with_unit(shown.numbers(self.unit, self.value, self.other)[0], self.unit)
 
 
 class Remark(str):
@@ -41,8 +55,7 @@ class Remark(str):
     Args:
         sentence: In English.
         code: Names what it says; its words are `remark.CODE` of the catalogues.
-        facts: What fills them: numbers as text, angles in degrees and lengths in millimetres; "value" and "bound" in
-            any unit, which stands behind; or remarks.
+        facts: What fills them: numbers in SI, with a "unit" for "value" and "bound"; text; or remarks.
     """
 
     code: str
@@ -67,7 +80,7 @@ class Remark(str):
 
     def as_dict(self) -> dict[str, object]:
         """Returns it as JSON has it; `from_dict` makes it anew."""
-        facts = {name: fact.as_dict() if isinstance(fact, Remark) else fact for name, fact in self.facts.items()}
+        facts = {name: _as_json(fact) for name, fact in self.facts.items()}
         return {"said": str(self), "code": self.code, "facts": facts}
 
     @classmethod
@@ -104,6 +117,13 @@ def message(code: str, **values: object) -> Message:
     return Message(code, MappingProxyType(values))
 
 
+def _as_json(fact: object) -> object:
+    """Returns a fact as JSON has it, which knows neither infinity nor nan."""
+    if isinstance(fact, Remark):
+        return fact.as_dict()
+    return str(fact) if isinstance(fact, float) and not math.isfinite(fact) else fact
+
+
 class Text:
     """The catalogue of one language, called with a key.
 
@@ -113,21 +133,22 @@ class Text:
 
     Args:
         language: "en" or "zh".
-        package: Whose own words there are beside the shared ones, such as rcilab.app.
+        package: The package with the texts of this user interface beside the shared ones, such as rcilab.app.
+        units: What angles and lengths are shown in.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str, package: str) -> None:
+    def __init__(self, language: str, package: str, units: Units = USUAL) -> None:
         self.language: Language = require_language(language)
-        self.units: Units = USUAL
+        self.units = units
         self._entries = load_ui_catalogue(package, self.language)
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
         entry = self._entries.get(code)
-        return code if entry is None else entry.format(**self._embedded(entry, values)) if values else entry
+        return code if entry is None else self.units.fill(entry, self._embedded(entry, values))
 
     def has(self, code: str) -> bool:
         """Returns whether the catalogue knows a key."""

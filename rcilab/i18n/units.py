@@ -1,8 +1,8 @@
 """In which units angles and lengths are shown and typed: the one place that converts them for people.
 
-Everything behind the page counts in degrees and millimetres where a person reads or types (fields, messages), and in
-rad and m elsewhere. What is chosen in Settings is applied last, when words are made, and first, when a number is read.
-What comes as a finished sentence (of a controller, of the gallery) is restated number by number.
+Values of messages are in SI. A variable of a catalogue says its unit, its digits and nothing else: `{angle:rad.1f}` is
+12.3° or 0.215 rad. `{deg:2.9}` and `{mm/s:250}` are numbers that stand in the text itself. Fields are written and
+typed in degrees and millimetres.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Literal, cast
 
 from rcilab.i18n.rounding import fixed
 
@@ -23,18 +25,13 @@ LENGTHS: tuple[LengthUnit, ...] = ("mm", "m")
 
 _MORE_DIGITS = {"rad": 2, "m": 3}
 """Digits behind the point that the larger unit needs to say as much."""
-_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-_N = r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?"
-_BOTH = re.compile(rf"({_N}) rad \({_N}°\)")
-"""An angle in both units, as reports write it."""
-_QUANTITY = re.compile(
-    rf"(?P<first>(?:(?<=between )|(?<=from )){_N}(?= (?:and|to) {_N}\s?(?P<ahead>°|deg\b|rad\b|mm\b|m\b)))"
-    rf"|(?<![\w.^-])(?P<numbers>{_N}|[\[(]{_N}(?:,? +{_N})+[\])])\s?"
-    r"(?P<unit>°|deg|rad|mm|m)(?P<rate>(?:/s(?:[²³]|\^[23])?)?)(?![\w/²³^°])"
-)
-"""In a finished sentence: a number, or some in brackets, and the unit behind; or the first of two before a unit."""
-_SPOKEN = re.compile(r"(\{\w+\}|\d+(?:\.\d+)?)\s?(°|deg\b|mm\b)((?:/s[²³]?)?)")
-"""In a catalogue: a place to fill, or a number, and the unit behind it."""
+_FIXED = {
+    "deg": ("rad", math.pi / 180.0),
+    "mm": ("m", 1e-3),
+    "deg/s": ("rad/s", math.pi / 180.0),
+    "mm/s": ("m/s", 1e-3),
+}
+"""Variables of the catalogues for numbers of the text itself: SI unit, and how many of it one is."""
 
 
 @dataclass(frozen=True)
@@ -46,20 +43,19 @@ class Unit:
     factor: float
     """How many of it one degree, or one millimetre, is."""
 
-    def restate(self, said: str) -> str:
-        """Returns words with every number in them taken over from degrees or millimetres."""
-        return said if self.factor == 1.0 else _NUMBER.sub(self._restate, said)
+    def convert(self, number: str) -> str:
+        """Returns the text of a number in degrees or millimetres in this unit; any other text stays."""
+        if self.factor == 1.0:
+            return number
+        try:
+            value = float(number)
+        except ValueError:
+            return number
+        return fixed(self.factor * value, len(number.partition(".")[2]) + _MORE_DIGITS[self.name])
 
     def complete(self, typed: str) -> str:
         """Returns what was typed with this unit behind it, unless it is the usual one or another was typed."""
         return typed if self.factor == 1.0 or not typed.strip()[-1:].isdigit() else f"{typed.strip()} {self.name}"
-
-    def _restate(self, found: re.Match[str]) -> str:
-        said = found.group()
-        value = self.factor * float(said)
-        if "e" in said:
-            return f"{value:.3g}"
-        return fixed(value, len(said.partition(".")[2]) + _MORE_DIGITS[self.name])
 
 
 @dataclass(frozen=True)
@@ -124,60 +120,44 @@ class Units:
         """Returns what `numbers` has made of an SI unit, and its unit on the page behind."""
         return _with_unit(numbers, self.from_si(unit)[1])
 
-    def restate(self, said: str) -> str:
-        """Returns a finished sentence of the library with its angles and lengths in these units.
+    def fill(self, entry: str, values: Mapping[str, object] = MappingProxyType({})) -> str:
+        """Returns an entry of a catalogue with its variables filled; numbers of an angle or a length are in SI."""
+        if "{" not in entry:
+            return entry
+        return entry.format(**{**_names(self), **{name: _Value(value, self) for name, value in values.items()}})
 
-        The library counts in SI, and sometimes says an angle in degrees beside; numbers keep their digits.
+    def format(self, value: object, spec: str) -> str:
+        """Returns a number with its unit, or several.
+
+        Args:
+            value: In the SI unit, or a sequence of numbers; two in a sequence of pairs are the ends of a range.
+            spec: Unit, point and digits, such as "rad.1f", "m/s.3g" or "m.1z", which has at most so many; they count
+                in degrees and millimetres, radians and metres get more. A "#" at the end leaves the unit out.
         """
-        return _QUANTITY.sub(self._restate, _BOTH.sub(r"\1 rad", said))
+        unit, _, form = spec.partition(".")
+        numbers = self._digits(value, unit, form.rstrip("#"))
+        return numbers if form.endswith("#") else _with_unit(numbers, self.from_si(unit)[1])
 
-    def adapt(self, entry: str) -> str:
-        """Returns an entry of a catalogue whose places to fill will be shown in these units.
-
-        A catalogue writes a place to fill, or a number, and then °, deg or mm; or {in_deg}, {in_mm} for the bare name.
-        """
-        if "°" in entry or "mm" in entry or "deg" in entry:
-            named = entry.replace("{in_deg}", self.angle).replace("{in_mm}", self.length)
-            return named if self == USUAL else _SPOKEN.sub(self._adapt, named)
-        return entry
-
-    def values(self, values: Mapping[str, object]) -> Mapping[str, object]:
-        """Returns values that fill such an entry."""
-        return values if self == USUAL else {name: _Value(value, self) for name, value in values.items()}
+    def _digits(self, value: object, unit: str, form: str, between: str = ", ") -> str:
+        if isinstance(value, (tuple, list)):
+            return between.join(self._digits(one, unit, form, "…") for one in value)
+        number, (usual, _), (factor, _) = float(cast(float, value)), USUAL.from_si(unit), self.from_si(unit)
+        text = _in_form(usual * number, form)
+        if factor == usual or not math.isfinite(number):
+            return text
+        if "e" in text:
+            return f"{factor * number:.3g}"
+        return fixed(factor * number, len(text.partition(".")[2]) + _MORE_DIGITS[unit.partition("/")[0]])
 
     def _shown(self, value: float, usual: str, digits: int) -> str:
         unit = self.unit(usual)
         return _with_unit(fixed(unit.factor * value, digits + _MORE_DIGITS.get(unit.name, 0)), _sign(unit))
 
-    def _restate(self, found: re.Match[str]) -> str:
-        unit = found["ahead"] or found["unit"]
-        factor, usual = _TO_USUAL[unit]
-        to = self.unit(usual)
-        if _sign(to) == unit:
-            return found.group()
-        scale = factor * to.factor
-        if found["first"]:
-            return _rescale(found["first"], scale)
-        numbers = _NUMBER.sub(lambda number: _rescale(number.group(), scale), found["numbers"])
-        rate = found["rate"].replace("^2", "²").replace("^3", "³")
-        return _with_unit(numbers, _sign(to) + rate)
-
-    def _adapt(self, found: re.Match[str]) -> str:
-        said, usual, rate = found.groups()
-        unit = self.unit(usual)
-        if unit.factor == 1.0:
-            return found.group()
-        shown = said[:-1] + ":" + unit.name + "}" if said.startswith("{") else unit.restate(said)
-        return f"{shown} {unit.name}{rate}"
-
 
 USUAL = Units()
 """Degrees and millimetres."""
+SI = Units(angle="rad", length="m")
 
-_TO_USUAL = {
-    "rad": (math.degrees(1.0), "deg"), "deg": (1.0, "deg"), "°": (1.0, "deg"), "m": (1000.0, "mm"), "mm": (1.0, "mm"),
-}  # fmt: skip
-"""How many degrees or millimetres one of these is."""
 _EXPONENT = re.compile(r"(\d[\d.]*)e([+-]\d+)")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LARGE = 1e7
@@ -199,9 +179,12 @@ def _as_power(found: re.Match[str]) -> str:
     return f"10{power}" if float(found[1]) == 1.0 else f"{found[1]}·10{power}"
 
 
-def _rescale(said: str, scale: float) -> str:
-    digits = len(said.partition("e")[0].replace(".", "").lstrip("-0"))
-    return plain_number(scale * float(said), max(digits, 3))
+def _in_form(value: float, form: str) -> str:
+    digits, kind = int(form[:-1]), form[-1]
+    if kind == "g":
+        return f"{value + 0.0:.{digits}g}"
+    text = fixed(value, digits)
+    return text.rstrip("0").rstrip(".") if kind == "z" and digits else text
 
 
 def _sign(unit: Unit) -> str:
@@ -214,9 +197,31 @@ def _with_unit(text: str, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Value:
+    """A value of a message: `{name:rad.1f}` formats a number in the units of the user; text stays as it is."""
+
     value: object
     units: Units
 
     def __format__(self, spec: str) -> str:
-        said = str(self.value)
-        return self.units.unit({"rad": "deg", "m": "mm"}[spec]).restate(said) if spec else said
+        if spec[:1] not in ("r", "m"):
+            return format(self.value, spec)
+        return self.value if isinstance(self.value, str) else self.units.format(self.value, spec)
+
+
+@dataclass(frozen=True, slots=True)
+class _FixedNumber:
+    """A number that stands in the text itself: `{deg:2.9}`."""
+
+    unit: str
+    scale: float
+    units: Units
+
+    def __format__(self, spec: str) -> str:
+        return self.units.format(self.scale * float(spec), f"{self.unit}.{len(spec.partition('.')[2])}f")
+
+
+@lru_cache
+def _names(units: Units) -> Mapping[str, object]:
+    """Returns the variables that every text has."""
+    fixed_numbers = {name: _FixedNumber(unit, scale, units) for name, (unit, scale) in _FIXED.items()}
+    return MappingProxyType({"in_deg": units.angle, "in_mm": units.length, **fixed_numbers})

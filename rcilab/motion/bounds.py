@@ -41,7 +41,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
     if outside.size:
         i = int(outside[0])
         angle, low, high = float(q[i]), float(limits.lower[i]), float(limits.upper[i])
-        facts = {"joint": i + 1, **_in_degrees(angle=angle, low=low, high=high)}
+        facts = {"joint": i + 1, "angle": angle, "low": low, "high": high}
         said = (
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
@@ -52,7 +52,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
         if soft is None:
             raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
         said += f"{degrees(soft):.2f}° is the soft limit that was set; "
-        facts |= _in_degrees(limit=soft)
+        facts["limit"] = soft
         widen = "widen the soft limit (set_joint_limit)"
         if what == "start":
             raise PlanningError(f"{said}where the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
@@ -80,16 +80,16 @@ def limit_touched(limits: JointLimits, joint: int, angle: float, advice: str = "
     return error.coded("touches_soft", **facts) if "limit" in facts else error.coded("touches", **facts)
 
 
-def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[str, dict[str, str | int]]:
+def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[str, dict[str, float]]:
     """Returns which bound is crossed and where, in words and as facts: with a limit where a soft one was set."""
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
-    facts = {"joint": joint, **_in_degrees(angle=angle, low=low, high=high)}
+    facts: dict[str, float] = {"joint": joint, "angle": angle, "low": low, "high": high}
     soft = limits.soft_bound_passed(joint, angle)
     if soft is None:
         what = f"joint {joint} would {verb} its limit at {degrees(angle):.2f} deg"
         return f"{what} ({degrees(low):.0f} to {degrees(high):.0f} deg)", facts
     what = f"joint {joint} would {verb} the soft limit of {degrees(soft):.2f} deg that was set, at "
-    return f"{what}{degrees(angle):.2f} deg; widen it (set_joint_limit)", facts | _in_degrees(limit=soft)
+    return f"{what}{degrees(angle):.2f} deg; widen it (set_joint_limit)", facts | {"limit": soft}
 
 
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:
@@ -112,7 +112,3 @@ def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointL
 def angle_text(value: float) -> str:
     """Returns an angle, [rad], as errors have it: in degrees, and as it was given."""
     return f"{degrees(value):.2f}° ({value:.4f} rad)"
-
-
-def _in_degrees(**angles: float) -> dict[str, str]:
-    return {name: f"{degrees(angle):.2f}" for name, angle in angles.items()}

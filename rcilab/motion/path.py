@@ -234,7 +234,7 @@ def build_circle(
         raise PlanningError(
             f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
             f"choose the centre at its height along the axis: {_shown(middle + height * normal)}"
-        ).coded("circle_plane", height=f"{1e3 * abs(height):.2f}")
+        ).coded("circle_plane", height=abs(float(height)))
     first = start.position - (middle + height * normal)
     circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)
     turned = middle + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)

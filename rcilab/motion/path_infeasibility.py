@@ -65,7 +65,7 @@ def examine(
     jump = PlanningError(
         f"joint {i + 1} would have to jump by {turn:.1f} deg {span}, because a singularity is in the way; lead the "
         f"tool around it, go there in joint space{advice}"
-    ).coded("path_singular", joint=i + 1, turn=f"{turn:.1f}")
+    ).coded("path_singular", joint=i + 1, turn=math.radians(turn))
     return rows, Obstacle(first, jump, True)
 
 
@@ -83,4 +83,4 @@ def refusal(path: Path, share: float, reason: RcilabError, when: str = "") -> Pl
         f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
         f"({when}{100.0 * share:.1f} % of the way, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
         share=share,
-    ).coded("path", share=f"{100.0 * share:.1f}", place=", ".join(f"{1e3 * at:.0f}" for at in (x, y, z)), reason=reason)
+    ).coded("path", share=f"{100.0 * share:.1f}", place=(float(x), float(y), float(z)), reason=reason)

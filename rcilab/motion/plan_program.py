@@ -174,7 +174,7 @@ def _require_stops(program: Program) -> None:
             raise PlanningError(
                 f"{label(number, waypoint)}: blend {1e3 * waypoint.blend:g} mm, but by the S profile the tool stops at "
                 "every waypoint; set blend to 0, or choose another law: law='torque_rate_limited'"
-            ).coded("s_profile_blend", waypoint=number, blend=f"{1e3 * waypoint.blend:g}")
+            ).coded("s_profile_blend", waypoint=number, blend=waypoint.blend)
 
 
 def _runs(segments: list[Segment], stops_at: Callable[[Segment, Segment], bool]) -> list[list[Segment]]:
@@ -210,9 +210,8 @@ def _is_quicker_to_stop(
     except PlanningError:  # What the blend cannot do; what the ways cannot do, is told when they are planned.
         is_quicker = True
     if is_quicker:
-        degrees = f"{math.degrees(angle):.0f}"
-        said = f"{before.label}: no blend, as the way turns by {degrees} deg there: to stop is quicker"
-        notes.append(Remark(said, "sharp", number=before.number, angle=degrees))
+        said = f"{before.label}: no blend, as the way turns by {math.degrees(angle):.0f} deg there: to stop is quicker"
+        notes.append(Remark(said, "sharp", number=before.number, angle=angle))
     return is_quicker
 
 
@@ -253,8 +252,7 @@ def _plan_run(
                     f"{before.label}: blend radius {1e3 * asked:.1f} mm shortened to {1e3 * blend.radius:.1f} mm: a "
                     "blend takes at most half of the ways before and after it"
                 )
-                radii = {"asked": f"{1e3 * asked:.1f}", "radius": f"{1e3 * blend.radius:.1f}"}
-                notes.append(Remark(said, "blend", number=before.number, **radii))
+                notes.append(Remark(said, "blend", number=before.number, asked=asked, radius=blend.radius))
         chain, last = build_chain(model, run, blends, scale), run[-1]
 
         def blended(arm: RobotModel) -> _Curve:

@@ -68,7 +68,7 @@ def plan_recovery(
 
 def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> PlanningError:
     soft, most = limits.soft_bound_passed(joint, angle), f"{degrees(RECOVERY_RANGE):g}"
-    facts = {"joint": joint, "angle": f"{degrees(angle):.2f}", "beyond": f"{degrees(beyond):.2f}", "most": most}
+    facts = {"joint": joint, "angle": angle, "beyond": beyond, "most": RECOVERY_RANGE}
     where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
     said = (
         f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery leads back "
@@ -77,7 +77,7 @@ def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> Pl
     if soft is None:
         return PlanningError(said).coded("recovery_range", **facts)
     said += ", or widen the soft limit (set_joint_limit)"
-    return PlanningError(said).coded("recovery_range_soft", **facts, limit=f"{degrees(soft):.2f}")
+    return PlanningError(said).coded("recovery_range_soft", **facts, limit=soft)
 
 
 def _nearest_inside(box: SafetyBox, position: Vector3) -> Vector3:

@@ -294,7 +294,7 @@ def _refusal(piece: _Piece, T: Array, reason: RcilabError) -> PlanningError:
     x, y, z = T[:3, 3].tolist()
     where = f"with the tool at {x:.3f}, {y:.3f}, {z:.3f} m"
     facts: dict[str, object] = {"number": piece.segment.number, "kind": piece.segment.waypoint.type, "reason": reason}
-    facts["place"] = ", ".join(f"{1e3 * at:.0f}" for at in (x, y, z))
+    facts["place"] = (float(x), float(y), float(z))
     if piece.blend is None:
         return PlanningError(
             f"{piece.segment.label}: cannot be followed {where}: {reason}", waypoint=piece.segment.number

@@ -100,8 +100,7 @@ class LimitFields:
     def _propose(self, lower: list[float], upper: list[float]) -> None:
         for low, high in zip(lower, upper, strict=True):
             if not low < high:
-                ends = {"low": f"{math.degrees(low):.1f}", "high": f"{math.degrees(high):.1f}"}
-                write(self.said, problem(self._text.say(message("setup.joint_ends", **ends))))
+                write(self.said, problem(self._text.say(message("setup.joint_ends", low=low, high=high))))
                 return
         self._asked = SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
         now = self._state.now

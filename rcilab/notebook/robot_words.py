@@ -80,6 +80,6 @@ def outcome_html(
     if run is not None and run.stopped:
         return stopped
     if run is not None and len(run.q):
-        largest = float(np.degrees(np.abs(np.nan_to_num(run.error)).max()))
-        return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=f"{largest:.3f}"))
+        largest = float(np.abs(np.nan_to_num(run.error)).max())
+        return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=largest))
     return ""

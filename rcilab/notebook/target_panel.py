@@ -152,9 +152,8 @@ class TargetPanel(Part):
         joints = telling_joints(np.asarray(list(solutions)))
         for number, q in enumerate(solutions):
             least = margin(self.model, q)
-            away = math.degrees(float(np.abs(q - here).max()))
-            way = text("target.way", number=number + 1, margin=f"{math.degrees(least.angle):.1f}", joint=least.joint,
-                       away=f"{away:.1f}")  # fmt: skip
+            away = float(np.abs(q - here).max())
+            way = text("target.way", number=number + 1, margin=least.angle, joint=least.joint, away=away)
             rows.append(" · ".join([way, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
             if float(np.abs(np.angle(np.exp(1j * (q - goal.q)))).max()) < 1e-6:
                 chosen = number

@@ -111,4 +111,4 @@ class MeasuredStateMonitor:
         joint = max(beyond, key=lambda i: abs(torques[i]) / max(thresholds[i], _LEAST))
         torque, threshold = torques[joint], thresholds[joint]
         said = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
-        return Remark(said, "collision", joint=joint + 1, value=f"{torque:.3g} N m", bound=f"{threshold:g} N m")
+        return Remark(said, "collision", joint=joint + 1, value=torque, bound=threshold, unit="N m")

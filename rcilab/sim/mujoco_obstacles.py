@@ -96,13 +96,13 @@ class Obstacles:
         ways = {axis: self._way_out(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()}
         self._model.geom_pos[index] = position
         axis = min(ways, key=lambda axis: ways[axis])
-        millimetres = {"depth": f"{1e3 * depth:.0f}", "way": f"{math.ceil(1e3 * ways[axis])}"}
+        way = 1e-3 * math.ceil(1e3 * ways[axis])  # [m]
         problem = (
-            f"would overlap {link} of the arm by {millimetres['depth']} mm; place it {millimetres['way']} mm farther "
+            f"would overlap {link} of the arm by {1e3 * depth:.0f} mm; place it {1e3 * way:.0f} mm farther "
             f"along {axis}, or move the arm first"
         )
         raise InvalidValueError("box", name, problem).coded(
-            "box_overlap", name=name, link=link, axis=axis, **millimetres
+            "box_overlap", name=name, link=link, axis=axis, depth=float(depth), way=way
         )
 
     def _deepest(self, box: int, data: Any) -> tuple[float, str]:

@@ -108,7 +108,7 @@ class NumberField:
             self._typed, self._answer = None, None
             self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
             return
-        said = self._unit.restate(text)
+        said = self._unit.convert(text)
         if problem is None and not self._stands(said) and self._handle.value != said:
             self._handle.value = said
 

@@ -206,7 +206,7 @@ REASONS: dict[str, Remark] = {
     "a tool outside": LimitViolation(RCI_CONDITIONS.find("cartesian.position"), 0, 0.02, 1e-3).remark,
     "no pose": LimitViolation(RCI_CONDITIONS.find("cartesian.frame"), 0, 2.0, 1.0).remark,
     "two at once": describe_breaches([LimitViolation(RCI_CONDITIONS.find("joint.jerk"), 1, 9e3, 8e3)] * 2),
-    "lost commands": lost_motion(Remark("x", "thrown", joint=2, value="9 rad/s^2", bound="8 rad/s^2"))
+    "lost commands": lost_motion(Remark("x", "thrown", joint=2, value=9.0, bound=8.0, unit="rad/s^2"))
     .violations[0]
     .remark,
 }
@@ -244,7 +244,7 @@ def test_exports_say_what_is_missing_in_chinese():
     assert re.search(r"[\u4e00-\u9fff]", said)
 
 
-def test_what_has_no_words_keeps_its_english_in_the_units_of_the_page():
+def test_what_has_no_text_in_the_catalogues_keeps_its_english_sentence():
     said = tell_error(CertificateError("x")), tell_error(RcilabError("joint 1 is at 0.35 rad"))
     assert Text("zh").say(said[0]).startswith("未执行")
-    assert Text("zh").say(said[1]) == "joint 1 is at 20.1°。"
+    assert Text("zh").say(said[1]) == "joint 1 is at 0.35 rad。"

@@ -46,7 +46,7 @@ def test_every_code_has_words_and_whatever_fills_them():
 
 
 def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
-    reason = UnreachableError("out of reach", distance=0.02).coded("too_far", distance="20.0")
+    reason = UnreachableError("out of reach", distance=0.02).coded("too_far", distance=0.02)
     place = "900, 0, 300"
     for language, target, waypoint in (("en", "target", "waypoint"), ("zh", "目标", "路点")):
         text = Text(language, "rcilab.app")
@@ -95,11 +95,11 @@ def test_the_english_sentence_stays_and_facts_come_along():
 
 
 def test_a_note_keeps_its_words_in_a_file_of_its_own():
-    note = Remark("line 2: blend shortened", "blend", number=2, asked="50.0", radius="10.0")
+    note = Remark("line 2: blend shortened", "blend", number=2, asked=0.05, radius=0.01)
     back = pickle.loads(pickle.dumps(note))
     said = tell_note(back)
     assert isinstance(said, Message)
-    assert said.values["radius"] == "10.0"
+    assert said.values["radius"] == pytest.approx(0.01)
     assert set(said.values) == {
         name for _, name, _, _ in Formatter().parse(load_catalogue("rcilab.i18n", "en")[said.code]) if name
     }

@@ -247,7 +247,7 @@ def test_a_box_that_the_arm_stands_in_is_refused_with_the_depth_and_the_way_out(
     facts = caught.value.facts
     assert facts["axis"] == "+x"
     home = load_model("xMatePro7").home
-    plant.place_box("wall", size, Pose(inside + np.array([1e-3 * float(facts["way"]), 0.0, 0.0])))
+    plant.place_box("wall", size, Pose(inside + np.array([float(facts["way"]), 0.0, 0.0])))
     after = run(plant, hold(Drive.POSITION, home), 100)
     assert np.abs(after.q - home).max() < 1e-6  # It is not thrown.
 

@@ -164,7 +164,10 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
     ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0])))
     ask(MoveJoint(joint=1, angle=float(bench.session.status().q_c[1]) + 0.2))
     reason = obstacle(bench.store.state, bench.session.status())
-    assert (reason.code, dict(reason.values)) == ("ready.outside", {"mm": "74.0", "face": "+x"})
+    assert (reason.code, dict(reason.values)) == (
+        "ready.outside",
+        {"distance": pytest.approx(0.074, abs=5e-5), "face": "+x"},
+    )
     assert "74.0 mm" in Text("zh").say(reason)
     ask(SetSetup(name="active", value=False))
     wait(lambda: "Outside" not in panel._verdict._shown, "Setup to take it back")

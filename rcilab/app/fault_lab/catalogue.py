@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from rcilab.i18n import catalogue
 from rcilab.i18n.locale import Language, require_language
+from rcilab.i18n.units import USUAL, Units
 
 
 def load_catalogue(language: Language) -> Mapping[str, str]:
@@ -13,10 +14,10 @@ def load_catalogue(language: Language) -> Mapping[str, str]:
     return catalogue.load_catalogue("rcilab.app.fault_lab", language)
 
 
-def say(language: Language, key: str, **values: str) -> str:
-    """Returns a sentence in a language, filled with values.
+def say(language: Language, key: str, units: Units = USUAL, **values: object) -> str:
+    """Returns a sentence in a language, filled with values, angles and lengths in these units.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
-    return load_catalogue(require_language(language))[key].format(**values)
+    return units.fill(load_catalogue(require_language(language))[key], values)

@@ -32,7 +32,7 @@ def head_html(exhibit: FaultDemo, text: Text) -> str:
         "learn.number", value=value, bound=with_unit(bound, row.unit, text),
         time=f"{exhibit.time:.3f}", sample=exhibit.sample,
     )  # fmt: skip
-    sent = text.units.restate(exhibit.told("sent", text.language))
+    sent = exhibit.told("sent", text.language, text.units)
     place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
     return (
         f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
@@ -51,11 +51,10 @@ def body_html(exhibit: FaultDemo, text: Text) -> str:
     legend = "".join(
         f'<span class="rl-sign-{sign}">{escape(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
     )
-    restate = text.units.restate
-    source = restate(explain_source(row, language))
+    source = explain_source(row, language)
     rows = (
-        ("learn.cause", escape(restate(exhibit.told("cause", language)))),
-        ("learn.remedy", escape(restate(exhibit.told("remedy", language)))),
+        ("learn.cause", escape(exhibit.told("cause", language, text.units))),
+        ("learn.remedy", escape(exhibit.told("remedy", language, text.units))),
         (
             "learn.condition",
             f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{escape(source)}</span>",

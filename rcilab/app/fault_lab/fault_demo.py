@@ -16,6 +16,7 @@ from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.i18n.locale import Language
+from rcilab.i18n.units import USUAL, Units
 from rcilab.makers.rokae.controller.fault_stop import FAULT_STOP, FaultSource
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
@@ -136,13 +137,13 @@ class FaultDemo:
         after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
 
-    def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en") -> str:
-        """Returns what was done wrong, why the controller minds, or what to do about it, in our own words.
+    def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en", units: Units = USUAL) -> str:
+        """Returns what was done wrong, why the controller stops for it, or what to do about it.
 
         Raises:
             InvalidValueError: There is no such language.
         """
-        return say(language, f"{what}.{self.fault.name}")
+        return say(language, f"{what}.{self.fault.name}", units)
 
     def tell_way_out(self, language: Language = "en") -> tuple[str, ...]:
         """Returns the steps that led out of it, in words.

@@ -107,9 +107,9 @@ def nearest_free(
         return psi, None
     return found, message(
         "elbow.snapped",
-        wanted=f"{math.degrees(psi):.0f}",
+        wanted=psi,
         why=message("elbow.why.other") if is_kept and arcs.at(psi).ok else say_why(arcs.at(psi).joints),
-        taken=f"{math.degrees(found):.0f}",
+        taken=found,
     )
 
 

@@ -108,21 +108,21 @@ def why_not(refusal: UnreachableError, missed: float) -> Message:
         missed: How far the pose that the arm takes instead is from it, [m]: no other distance is shown beside it.
     """
     if refusal.distance > 0.0:
-        return message("reach.far", distance=f"{missed * 1000.0:.0f}")
+        return message("reach.far", distance=missed)
     if refusal.joint is not None:
-        return message("reach.joint", joint=refusal.joint, excess=f"{math.degrees(refusal.excess):.1f}")
+        return message("reach.joint", joint=refusal.joint, excess=refusal.excess)
     return message("reach.no")
 
 
 def _at_limit(model: RobotModel, q: JointVector, least: JointLimitMargin) -> Message:
     limits, joint, angle = model.limits.joint, least.joint, float(q[least.joint - 1])
-    soft, shown = limits.soft_bound_passed(joint, angle), f"{math.degrees(angle):.1f}"
+    soft = limits.soft_bound_passed(joint, angle)
     if soft is not None:
-        return message("reach.at_soft", joint=joint, angle=shown, limit=f"{math.degrees(soft):.1f}")
+        return message("reach.at_soft", joint=joint, angle=angle, limit=soft)
     if least.angle == 0.0:
         return message("reach.at_limit", joint=joint)
-    low, high = (f"{math.degrees(bound[joint - 1]):.1f}" for bound in (limits.lower, limits.upper))
-    return message("reach.beyond_limit", joint=joint, angle=shown, low=low, high=high)
+    low, high = (float(bound[joint - 1]) for bound in (limits.lower, limits.upper))
+    return message("reach.beyond_limit", joint=joint, angle=angle, low=low, high=high)
 
 
 def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> TargetStatus:
@@ -132,7 +132,7 @@ def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions
     if model.dexterity(q).smallest < NEAR_SINGULAR:
         return TargetStatus(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
     if least.angle < NEAR_LIMIT:
-        reason = message("reach.limit", joint=least.joint, margin=f"{math.degrees(least.angle):.1f}")
+        reason = message("reach.limit", joint=least.joint, margin=least.angle)
         return TargetStatus(tone="warn", reason=reason, q=q, solutions=solutions)
     return TargetStatus(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
 
@@ -144,7 +144,8 @@ def _miss(target: Pose, reached: Pose) -> tuple[float, float]:
 
 
 def _how_short(missed: float, turned: float) -> Message:
-    mm, deg = f"{missed * 1000.0:.0f}", f"{math.degrees(turned):.1f}"
-    if deg == "0.0":
-        return message("reach.short_mm", mm=mm)
-    return message("reach.short_deg", deg=deg) if mm == "0" else message("reach.short", mm=mm, deg=deg)
+    if round(math.degrees(turned), 1) == 0.0:
+        return message("reach.short_mm", distance=missed)
+    if round(1000.0 * missed) == 0:
+        return message("reach.short_deg", turn=turned)
+    return message("reach.short", distance=missed, turn=turned)

@@ -45,7 +45,7 @@ def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> S
         turns = np.abs(reach.q - q)
         if turns.max() > _FARTHEST:
             farthest = int(turns.argmax())
-            angle = f"{math.degrees(turns[farthest]):.0f}"
+            angle = float(turns[farthest])
             return Step(None, message("jog.far", joint=farthest + 1, angle=angle))
         return Step(reach.q)
     limits, moved = model.limits.joint, np.array(q)

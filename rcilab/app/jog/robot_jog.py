@@ -89,8 +89,7 @@ class RobotJog:
         if share < STANDING:
             self.let_go()
             first, second = (message(f"link.{link_name(link).split()[0]}", number=link) for link in links)
-            mm = f"{1000.0 * ADVISED_DISTANCE:.0f}"
-            change_jog(self._store, said=message("jog.near", first=first, second=second, mm=mm))
+            change_jog(self._store, said=message("jog.near", first=first, second=second, distance=ADVISED_DISTANCE))
             return False
         try:
             goes_on = None if ticket is None or ticket.done else ticket

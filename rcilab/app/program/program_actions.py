@@ -209,10 +209,10 @@ class ProgramActions:
 
 def _tell_approach(job: Job, plan: Plan) -> Message:
     """Returns that the motion begins with the way to the program's start, and how far that is."""
-    travel = np.degrees(np.abs(job.here - np.array(job.program.start)))
+    travel = np.abs(job.here - np.array(job.program.start))
     joint = int(travel.argmax())
     duration = float(plan.motion.segment_starts[1])
-    return message("program.approach", joint=joint + 1, angle=f"{travel[joint]:.1f}", duration=f"{duration:.2f}")
+    return message("program.approach", joint=joint + 1, angle=float(travel[joint]), duration=f"{duration:.2f}")
 
 
 def _together(said: list[Message]) -> Message | None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import reduce
 from typing import Protocol
 
 import numpy as np
 
 from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
-from rcilab.i18n.translator import Finished, Message, message
-from rcilab.motion.extent import measure_extent
+from rcilab.i18n.translator import Message, message
+from rcilab.motion.extent import MotionExtent, measure_extent
 
 _SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
 _NOT_IDLE = {
@@ -77,12 +78,22 @@ def ask_to_move(plan: Plan, address: str) -> Message:
         model=plan.model.name,
         address=address,
         duration=f"{extent.duration:.2f}",
-        ranges=Finished(extent.describe_joints().replace(" to ", " … ")),
-        mm=f"{1e3 * extent.tool_distance:.0f}",
+        ranges=_joint_ranges(extent),
+        distance=extent.tool_distance,
         joint=extent.fastest_joint,
-        angle=f"{np.degrees(extent.joint_speed):.1f}",
-        speed=f"{1e3 * extent.tool_speed:.0f}",
+        angle=extent.joint_speed,
+        speed=extent.tool_speed,
     )
+
+
+def _joint_ranges(extent: MotionExtent) -> Message:
+    ranges = [
+        message("run.range", joint=joint, low=float(extent.lower[joint - 1]), high=float(extent.upper[joint - 1]))
+        for joint in extent.moving_joints
+    ]
+    if not ranges:
+        return message("run.no_range")
+    return reduce(lambda first, second: message("run.ranges", first=first, second=second), ranges)
 
 
 def is_moving(status: ArmStatus) -> bool:

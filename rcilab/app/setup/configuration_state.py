@@ -106,7 +106,7 @@ def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
     if box is None:
         return None
     face, distance = box.passed_face(position)
-    return message("ready.outside", mm=f"{1000.0 * distance:.1f}", face=face) if distance > _SEEN else None
+    return message("ready.outside", distance=distance, face=face) if distance > _SEEN else None
 
 
 def name_parts(parts: tuple[str, ...]) -> Message:
@@ -123,14 +123,13 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
     if value is None:
         return message("setup.own")
     if isinstance(value, SafetyBox):
-        size = " × ".join(f"{1000.0 * edge:.0f}" for edge in value.size)
-        return message("setup.box_on" if value.active else "setup.box_off", size=size)
+        x, y, z = map(float, value.size)
+        return message("setup.box_on" if value.active else "setup.box_off", x=x, y=y, z=z)
     if isinstance(value, Payload):
-        center = _millimetres(value.center_of_mass)
+        center = _floats(value.center_of_mass)
         return message("setup.load_is" if value.mass else "setup.load_none", mass=f"{value.mass:.2f}", center=center)
     if isinstance(value, SoftJointLimits):
-        ends = zip(np.degrees(value.lower), np.degrees(value.upper), strict=True)
-        return message("setup.joints_are", ranges=", ".join(f"{low:.0f}…{high:.0f}" for low, high in ends))
+        return message("setup.joints_are", ranges=tuple(zip(value.lower, value.upper, strict=True)))
     if isinstance(value, ForceControlFrame):
         axes = next(name for name, kind in FORCE_AXES.items() if kind == value.type)
         place = _describe_pose(value.T_flange_force)
@@ -158,15 +157,11 @@ def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:
 
 
 def _describe_pose(pose: Pose) -> Message:
-    turns = np.degrees(pose.rpy)
-    if not np.abs(turns).max() >= 0.05:
-        return message("setup.place", place=_millimetres(pose.position))
-    return message("setup.pose", place=_millimetres(pose.position), turns=_numbers(turns))
+    place, turns = _floats(pose.position), _floats(pose.rpy)
+    if not np.degrees(np.abs(turns).max()) >= 0.05:
+        return message("setup.place", place=place)
+    return message("setup.pose", place=place, turns=turns)
 
 
-def _millimetres(vector: np.ndarray) -> str:
-    return _numbers(1000.0 * np.asarray(vector))
-
-
-def _numbers(values: np.ndarray) -> str:
-    return ", ".join(f"{round(float(value), 1) + 0.0:g}" for value in values)
+def _floats(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)

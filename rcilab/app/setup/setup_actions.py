@@ -187,9 +187,9 @@ class SetupActions:
         exact = {"lower": own.lower, "upper": own.upper}[end][joint]  # What is typed is rounded.
         typed = math.radians(parsed.value)
         bounds[end][joint] = float(exact) if abs(typed - exact) < _ROUNDED else typed
-        low, high = (math.degrees(bounds[name][joint]) for name in JOINT_ENDS)
+        low, high = (float(bounds[name][joint]) for name in JOINT_ENDS)
         if not low < high:
-            self._store.complain(request.field, message("setup.joint_ends", low=f"{low:.1f}", high=f"{high:.1f}"))
+            self._store.complain(request.field, message("setup.joint_ends", low=low, high=high))
             return
         self._store.clear_problems(*(f"setup.joints.{name}.{joint}" for name in JOINT_ENDS))
         self._limit_joints(SoftJointLimits(lower=tuple(bounds["lower"]), upper=tuple(bounds["upper"])))

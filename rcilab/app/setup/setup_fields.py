@@ -100,7 +100,7 @@ def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupSt
         bounds[FACE_NAMES.index(name)] = value / 1000.0
         axis = FACE_NAMES.index(name) % 3
         if not bounds[axis] < bounds[axis + 3]:
-            low, high = (f"{1000.0 * bounds[i]:.1f}" for i in (axis, axis + 3))
+            low, high = (float(bounds[i]) for i in (axis, axis + 3))
             return message("setup.faces", axis="xyz"[axis], low=low, high=high)
         return _with(setup, box=box_between(wanted.box, bounds))
     if part == "box":
@@ -118,11 +118,11 @@ def with_pose(setup: SetupState, part: str, pose: Pose) -> SetupState | Message:
     wanted = setup.wanted
     length = math.hypot(*pose.parts[1])
     if part != "box" and length > LONGEST_TOOL:
-        return message("setup.far", length=f"{1000.0 * length:.0f}", bound=f"{1000.0 * LONGEST_TOOL:.0f}")
+        return message("setup.far", length=length, bound=LONGEST_TOOL)
     if part == "box":
         assert wanted.box is not None
         if float(np.abs(pose.position).max()) > FARTHEST_FACE:
-            return message("setup.far", length=f"{1000.0 * length:.0f}", bound=f"{1000.0 * FARTHEST_FACE:.0f}")
+            return message("setup.far", length=length, bound=FARTHEST_FACE)
         return _with(setup, box=replace(wanted.box, T_base_box=pose))
     if part == "tool":
         return _with(setup, tool=pose)

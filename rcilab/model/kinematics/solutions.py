@@ -119,15 +119,10 @@ class Solutions(Sequence[JointVector]):
             joint=joint,
             excess=best.excess,
         )
-        facts = {
-            "joint": joint,
-            "angle": f"{degrees(angle):.1f}",
-            "low": f"{degrees(lower):.0f}",
-            "high": f"{degrees(upper):.0f}",
-        }
+        facts = {"joint": joint, "angle": float(angle), "low": float(lower), "high": float(upper)}
         if soft is None:
             return error.coded("joint_beyond", **facts)
-        return error.coded("joint_beyond_soft", **facts, limit=f"{degrees(soft):.2f}")
+        return error.coded("joint_beyond_soft", **facts, limit=soft)
 
     def __repr__(self) -> str:
         rows = "\n".join("  " + " ".join(f"{degrees(angle):8.2f}" for angle in q) for q in self._feasible)

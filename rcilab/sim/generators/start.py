@@ -94,7 +94,7 @@ def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: S
     """
     for number, (angle, here, bound) in enumerate(zip(q, reference, tolerance.joint, strict=True), 1):
         if not abs(angle - here) <= bound:
-            return _jump("start_joint", f"{degrees(angle):.4f}°", f"{degrees(here):.4f}°", angle - here, bound, number)
+            return _jump(angle, here, bound, number)
     return None
 
 
@@ -108,38 +108,28 @@ def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolera
         tolerance: How far they may be apart.
     """
     if not translation <= tolerance.translation:
-        return _tool_jump(
-            "start_position", "position", f"{1e3 * translation:.4g} mm", f"{1e3 * tolerance.translation:.3g} mm"
-        )
+        return _tool_jump("start_position", "position", translation, tolerance.translation)
     if not rotation <= tolerance.rotation:
-        return _tool_jump(
-            "start_orientation", "orientation", f"{degrees(rotation):.4g}°", f"{degrees(tolerance.rotation):.3g}°"
-        )
+        return _tool_jump("start_orientation", "orientation", rotation, tolerance.rotation)
     if not abs(arm_angle) <= tolerance.arm_angle:
-        return _tool_jump(
-            "start_arm_angle", "arm angle", f"{degrees(arm_angle):.4g}°", f"{degrees(tolerance.arm_angle):.3g}°"
-        )
+        return _tool_jump("start_arm_angle", "arm angle", arm_angle, tolerance.arm_angle)
     return None
 
 
-def _jump(code: str, begins: str, stands: str, off: float, bound: float, joint: int) -> Remark:
+def _jump(begins: float, stands: float, bound: float, joint: int) -> Remark:
+    off = abs(begins - stands)
     said = (
-        f"joint {joint}: the first command of the motion is {begins} and the arm's reference is {stands}, "
-        f"{degrees(abs(off)):.3g}° apart, more than {degrees(bound):.3g}°; begin at q_c of the state"
+        f"joint {joint}: the first command of the motion is {degrees(begins):.4f}° and the arm's reference is "
+        f"{degrees(stands):.4f}°, {degrees(off):.3g}° apart, more than {degrees(bound):.3g}°; begin at q_c of the state"
     )
-    amounts = {
-        "begins": begins,
-        "stands": stands,
-        "off": f"{degrees(abs(off)):.3g}°",
-        "bound": f"{degrees(bound):.3g}°",
-    }
-    return Remark(said, code, joint=joint, **amounts)
+    return Remark(said, "start_joint", joint=joint, begins=begins, stands=stands, off=off, bound=bound)
 
 
-def _tool_jump(code: str, what: str, off: str, bound: str) -> Remark:
+def _tool_jump(code: str, what: str, off: float, bound: float) -> Remark:
+    scale, unit = (1e3, " mm") if what == "position" else (degrees(1.0), "°")
     said = (
-        f"the first commanded {what} of the motion is {off} from the arm's reference, more than {bound}; begin at "
-        "toolTobase_pos_c and psi_c of the state"
+        f"the first commanded {what} of the motion is {scale * off:.4g}{unit} from the arm's reference, more than "
+        f"{scale * bound:.3g}{unit}; begin at toolTobase_pos_c and psi_c of the state"
     )
     return Remark(said, code, off=off, bound=bound)
 

@@ -48,7 +48,10 @@ def arm_html(model: RobotModel, q: np.ndarray | None, text: Text) -> str:
     if q is None or len(q) != model.n:
         return f'<p class="rl-note">{esc(text("arm.unknown"))}</p>'
     heads = "".join(f"<th>J{joint + 1}</th>" for joint in range(model.n))
-    cells = "".join(f"<td>{text.unit('deg').restate(f'{angle + 0.0:.1f}')}</td>" for angle in np.degrees(q).round(1))
-    x, y, z, roll, pitch, yaw = (f"{float(number):.1f}" for number in shown_pose(model.forward(q)))
-    tool = text("arm.tool", x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw)
+    cells = "".join(f"<td>{text.units.format(angle, 'rad.1f#')}</td>" for angle in q)
+    place, turns = np.split(np.array(shown_pose(model.forward(q)), float), 2)
+    tool = text(
+        "arm.tool",
+        **dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), (*1e-3 * place, *np.radians(turns)), strict=True)),
+    )
     return f'<table class="rl-table rl-even"><tr>{heads}</tr><tr>{cells}</tr></table><p class="rl-note">{esc(tool)}</p>'

@@ -54,7 +54,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     name, fault = text(f"condition.{condition.id}"), ""
     if condition.fault is not None:
         fault = f"<br>{esc(text('check.raises', fault=condition.fault.manual_name))}"
-    source = text.units.restate(explain_source(condition, text.language))
+    source = explain_source(condition, text.language)
     current = ' aria-current="true"' if condition.id == chosen else ""
     return (
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.goal.target_status import NEAR_LIMIT
 from rcilab.app.jog.jog_actions import SetJog
-from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, FASTEST_TURN, STEPS, HoldJog, PressJog, no_jog
+from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, STEPS, HoldJog, PressJog, no_jog
 from rcilab.app.request import Request
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
@@ -42,7 +42,10 @@ class JogPanel:
         gui.add_html('<i class="rl-jogset"></i>')
         robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
         self._robot = BoundControl(robot, ask, lambda v, p: SetJog(page=p, robot=bool(v)))
-        steps = {text("jog.step_of", step=f"{step:g}") if step else text("jog.held"): step for step in STEPS}
+        steps = {
+            text("jog.step_of", length=1e-3 * step, angle=math.radians(step)) if step else text("jog.held"): step
+            for step in STEPS
+        }
         self._steps = {step: label for label, step in steps.items()}
         step = gui.add_dropdown(
             text("jog.step"), tuple(steps), initial_value=self._steps[jog.step], hint=text("jog.step_hint")
@@ -68,7 +71,7 @@ class JogPanel:
         gui.add_html('<i class="rl-joints rl-held"></i>')
         for joint in range(state.model.n):
             low, high = (float(factor * bound[joint]) for bound in (limits.lower, limits.upper))
-            ends = [f"{math.degrees(bound[joint]):.0f}" for bound in (limits.lower, limits.upper)]
+            ends = [float(bound[joint]) for bound in (limits.lower, limits.upper)]
             hint = text("jog.limit_hint", joint=joint + 1, low=ends[0], high=ends[1], source=source)
             add_jog_button(gui, self._ask, f"J{joint + 1}", f"joint.{joint}", -1)
             value = round(float(np.clip(angles[joint], low, high)), digits)
@@ -125,8 +128,7 @@ def note_html(state: UiState, text: Text) -> str:
 
 def pace_html(speed: float, text: Text) -> str:
     """Returns how fast that is."""
-    turn, joint = math.degrees(speed * FASTEST_TURN), math.degrees(speed * FASTEST_JOINT)
-    said = text("jog.pace", mm=f"{1000.0 * speed * FASTEST_TOOL:.3g}", turn=f"{turn:.2g}", joint=f"{joint:.2g}")
+    said = text("jog.pace", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
     return f'<p class="rl-pace">{esc(said)}</p>'
 
 
@@ -135,8 +137,8 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
     left = max(min(angle - low, high - angle), 0.0)
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
-    said = sign + text("jog.left", angle=f"{math.degrees(left):.0f}" if tone == "good" else f"{math.degrees(left):.1f}")
-    ends = [text.unit("deg").restate(f"{math.degrees(bound):.0f}") for bound in (low, high)]
+    said = sign + text("jog.left", angle=text.units.angle_of(left, 0 if tone == "good" else 1))
+    ends = [text.units.format(bound, "rad.0f#") for bound in (low, high)]
     return (
         f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
         f"</i></i><b>{esc(said)}</b><span>{ends[1]}</span></div>"

@@ -66,5 +66,5 @@ def _note_html(state: UiState, text: Text) -> str:
         return ""
     if state.via is None:
         return f'<p class="rl-note rl-why">{esc(text("target.via_none"))}</p>'
-    x, y, z = (f"{1000.0 * float(number):.0f}" for number in state.via.position)
+    x, y, z = map(float, state.via.position)
     return f'<p class="rl-note">{esc(text("target.via_at", x=x, y=y, z=z))}</p>'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
     ("redo", "arrow-forward-up"),
 )  # fmt: skip
+_SAME = math.radians(1e-4)  # [rad] A joint that is nearer to the start of the program stands there.
 _MOMENT = 0.25  # [s] A choice: a bar that comes and goes faster only flickers.
 _SAID = re.compile(r"[0-9]+:(select|move|up|down|delete|duplicate|undo|redo):([0-9]{1,9}):([0-9]{1,9})")
 
@@ -138,11 +140,11 @@ class ProgramPanel:
         """Returns whether the program starts where the arm is, in words."""
         if status.q_c is None or draft.start is None or len(status.q_c) != len(draft.start):
             return self._text("program.not_planned")
-        travel = np.degrees(np.abs(status.q_c - np.array(draft.start)))
-        if float(travel.max()) < 1e-4:
+        travel = np.abs(status.q_c - np.array(draft.start))
+        if float(travel.max()) < _SAME:
             return self._text("program.not_planned")
         joint = int(travel.argmax())
-        return self._text("program.elsewhere", joint=joint + 1, angle=f"{travel[joint]:.1f}")
+        return self._text("program.elsewhere", joint=joint + 1, angle=float(travel[joint]))
 
 
 def read_row(said: str, page: int | None) -> EditProgram | None:

@@ -100,7 +100,7 @@ def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
         kind,
         _where(waypoint, arm, text),
         f"{100.0 * waypoint.speed:.3g}",
-        "–" if waypoint.blend == 0.0 else text.unit("mm").restate(f"{1000.0 * waypoint.blend:.3g}"),
+        "–" if waypoint.blend == 0.0 else text.units.format(waypoint.blend, "m.3g#"),
         "–" if psi is None else text.units.angle_of(psi, 0).removesuffix(" rad"),
         "–" if waypoint.dwell == 0.0 else f"{waypoint.dwell:.3g}",
     )
@@ -119,5 +119,5 @@ def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
 
 
 def _lengths(position: tuple[float, ...], text: Text) -> str:
-    said = (text.unit("mm").restate(f"{round(1000.0 * number):d}") for number in position)
+    said = (text.units.format(number, "m.0f#") for number in position)
     return " ".join(f"<b>{number}</b>" for number in said)

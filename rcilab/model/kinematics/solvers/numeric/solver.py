@@ -177,4 +177,4 @@ def _check_reach(envelope: Envelope, pose: Pose) -> None:
             f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
             f"shoulder, the arm reaches {longest:.3f} m at most; move the target closer",
             distance=length - longest,
-        ).coded("too_far", distance=f"{1e3 * (length - longest):.1f}")
+        ).coded("too_far", distance=length - longest)

@@ -191,12 +191,12 @@ def reach_error(arm: ArmGeometry, length: float) -> UnreachableError:
             f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
             f"shoulder, the arm reaches {longest:.3f} m; move the target closer",
             distance=length - longest,
-        ).coded("too_far", distance=f"{1e3 * (length - longest):.1f}")
+        ).coded("too_far", distance=length - longest)
     return UnreachableError(
         f"too close by {1e3 * (shortest - length):.1f} mm: the wrist centre would be {length:.3f} m from the "
         f"shoulder, the folded arm keeps {shortest:.3f} m; move the target away",
         distance=shortest - length,
-    ).coded("too_close", distance=f"{1e3 * (shortest - length):.1f}")
+    ).coded("too_close", distance=shortest - length)
 
 
 def _turn_zy(r: Rotation9, about_z: float, about_y: float) -> Rotation9:
