@@ -9,13 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, make_dataclass
 from enum import IntEnum
-from math import degrees
+from math import degrees, nan
 from typing import Any, Literal, TypeAlias, get_args
 
-from rcilab.core.arrays import Array, JointVector, described
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector, described, make_readonly
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.core.spatial import Pose
+from rcilab.core.spatial import IDENTITY, Pose
 
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
 """How a motion is commanded: the members of `ControllerMode` that move the arm, in small letters."""
@@ -135,6 +137,33 @@ def build_state(values: Iterable[object]) -> RobotState:
     state = _Open(*values)
     state.__class__ = RobotState
     return state
+
+
+def unknown_state(n: int) -> RobotState:
+    """Returns a state of which nothing is known, for controllers that report less than this.
+
+    A driver replaces what its controller reports: `replace(unknown_state(6), message_id=1, q=q)`. Numbers are NaN, the
+    modes idle, no fault is set.
+
+    Args:
+        n: Number of joints.
+    """
+    joints, six = make_readonly(np.full(n, nan)), make_readonly(np.full(6, nan))
+    vectors = {
+        "tool_velocity_c": six, "tool_acceleration_c": six, "tau_ext_in_base": six, "tau_ext_in_stiff": six
+    }  # fmt: skip
+    values = {
+        "message_id": 0,
+        "T_base_tool": IDENTITY,
+        "T_base_tool_c": IDENTITY,
+        "faults": (),
+        "motion_generator_mode": MotionGeneratorMode.IDLE,
+        "controller_mode": ControllerMode.OTHER,
+        "robot_mode": RobotMode.IDLE,
+    }
+    floats = dict.fromkeys(("psi", "psi_c", "dpsi_c", "ddpsi_c", "success_rate"), nan)
+    known: dict[str, Any] = {**vectors, **values, **floats}
+    return build_state(known.get(field.name, joints) for field in fields(RobotState))
 
 
 def require_mode(mode: object) -> Mode:

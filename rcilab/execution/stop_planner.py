@@ -99,10 +99,12 @@ class JointStopPlanner:
 
     Args:
         limits: Bounds of the joints.
+        period: Cycles from one command to the next, in which the last one is repeated.
     """
 
-    def __init__(self, limits: JointLimits) -> None:
+    def __init__(self, limits: JointLimits, period: int = 1) -> None:
         self._limits = limits
+        self._period = period
         self._stream = StreamStopPlanner(limits)
 
     def begin(self, state: RobotState) -> None:
@@ -122,7 +124,7 @@ class JointStopPlanner:
         q = self._stream.last.tolist()
         monitor = JointMonitor(self._limits)
         monitor.reset(q, *(difference.tolist() for difference in self._stream.differences()))
-        return _first_breach(monitor, lambda: monitor.step(q))
+        return _first_breach(monitor, lambda: monitor.step(q, self._period))
 
 
 class CartesianStopPlanner:
@@ -135,10 +137,12 @@ class CartesianStopPlanner:
     Args:
         limits: Bounds of the arm.
         model: The arm, for what the joints allow.
+        period: Cycles from one command to the next, in which the last one is repeated.
     """
 
-    def __init__(self, limits: Limits, model: RobotModel) -> None:
+    def __init__(self, limits: Limits, model: RobotModel, period: int = 1) -> None:
         self._limits = limits
+        self._period = period
         self._model = model
         self._poses: list[tuple[int, CartesianPosition]] = []
         self._q = model.home
@@ -184,7 +188,7 @@ class CartesianStopPlanner:
             before = cycle
         last = self._poses[-1][1]
         pose = Pose.from_matrix(last.T_base_tool)
-        return _first_breach(monitor, lambda: monitor.step(pose, last.psi))
+        return _first_breach(monitor, lambda: monitor.step(pose, last.psi, self._period))
 
     def _bounds(self) -> JointLimits:
         """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""

@@ -13,6 +13,7 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Protocol
 
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
@@ -34,6 +35,23 @@ class Capabilities:
     """Whether there is a virtual controller."""
     drives: bool = False
     """Whether there is a driver for the real controller."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """When states and commands go over the wire of a maker."""
+
+    state_period: float = CYCLE_TIME
+    """From one state to the next, [s]."""
+    command_period: float = CYCLE_TIME
+    """From one command of a motion to the next, [s]."""
+    is_state_clock: bool = True
+    """Whether each command answers a state, so that time counts in states; else commands go by the client's clock."""
+
+    @property
+    def command_cycles(self) -> int:
+        """`command_period` in cycles of the grid that motions are planned on."""
+        return max(1, round(self.command_period / CYCLE_TIME))
 
 
 class Maker(Protocol):
@@ -67,6 +85,11 @@ class Maker(Protocol):
     @property
     def capabilities(self) -> Capabilities:
         """What can be done with its arms."""
+        ...
+
+    @property
+    def timing(self) -> Timing:
+        """When states and commands go over its wire."""
         ...
 
     def conditions(self) -> ConditionTable:

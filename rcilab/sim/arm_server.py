@@ -123,7 +123,7 @@ class ArmServer:
     def description(self) -> str:
         """The line that reports that the controller is ready."""
         controller = self.controller
-        return f"listening {self.url} model={controller.model.name} plant={controller.plant.kind}"
+        return f"listening {self.url} model={controller.arm.model.name} plant={controller.arm.plant.kind}"
 
     @property
     def world_address(self) -> str | None:
@@ -228,19 +228,19 @@ class ArmServer:
         then catch up.
         """
         controller = self.controller
-        is_first = not controller.playout.is_playing
-        late = controller.playout.late
+        is_first = not controller.arm.playout.is_playing
+        late = controller.arm.playout.late
         deadline = self._clock.now() + self._command_timeout
         while True:
             remaining = min(deadline - self._clock.now(), _LOOK)
-            self._poll(0.0 if len(controller.playout) else RESEND_TIME if is_first else remaining)
+            self._poll(0.0 if len(controller.arm.playout) else RESEND_TIME if is_first else remaining)
             self._check_parent()
-            if len(controller.playout) or not controller.wants_commands or self._is_ending:
+            if len(controller.arm.playout) or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
                 return
             if self._network.has_lost:
                 return
-            if self._has_timed_out and controller.playout.late > late:
+            if self._has_timed_out and controller.arm.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
             if is_first:
@@ -297,7 +297,7 @@ class ArmServer:
         """Advances by cycles without sending their states, when more commands wait than should."""
         if not self.controller.wants_commands:
             return
-        playout = self.controller.playout
+        playout = self.controller.arm.playout
         extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
         for _ in range(extra):
             if self.controller.wants_commands:
@@ -325,7 +325,7 @@ class ArmServer:
         self._logged_faults = faults
         if faults:
             self._log(f"{name_faults(faults)}: {self.controller.reason}; the arm stops")
-            if self.controller.lacks_commands and self.controller.playout.lost:
+            if self.controller.lacks_commands and self.controller.arm.playout.lost:
                 self._log(
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
                 )

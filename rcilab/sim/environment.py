@@ -75,7 +75,7 @@ class Environment:
         counters: Callable[[], ServerCounters],
     ) -> None:
         self._controller = controller
-        self._plant = controller.plant
+        self._plant = controller.arm.plant
         self._network = network
         self._stalls = stalls
         self._clock = clock
@@ -154,17 +154,17 @@ class Environment:
         controller, counters = self._controller, self._counters()
         commands, states = self._network.faults
         return WorldStatus(
-            model=controller.model.name,
+            model=controller.arm.model.name,
             plant=self._plant.kind,
             cycle=controller.cycle_number,
             phase=controller.phase_name,
             faults=tuple(fault.manual_name for fault in controller.faults),
             reason=controller.reason,
             button=controller.button,
-            q=tuple(controller.q.tolist()),
-            lost=controller.playout.lost,
-            lost_in_row=controller.playout.most_in_row,
-            success_rate=controller.playout.success_rate,
+            q=tuple(controller.arm.signals.measured.q.tolist()),
+            lost=controller.arm.playout.lost,
+            lost_in_row=controller.arm.playout.most_in_row,
+            success_rate=controller.arm.playout.success_rate,
             missed=counters.missed,
             misfits=counters.bad_datagrams,
             strangers=counters.strangers,

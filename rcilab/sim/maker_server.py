@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from rcilab.core.arrays import JointVector
 from rcilab.core.fault import FaultCode
 from rcilab.core.safety_box import SafetyBox
 from rcilab.i18n.translator import Remark
-from rcilab.model.robot_model import RobotModel
 from rcilab.sim.api import LimitTable, SafetyButton
 from rcilab.sim.channels import Channel, Link, Peer
-from rcilab.sim.jitter_buffer import JitterBuffer
-from rcilab.sim.plant import Plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 
 class SimulatedController(Protocol):
@@ -45,28 +42,13 @@ class SimulatedController(Protocol):
     def auto_limit(self, on: bool) -> None: ...
 
     @property
-    def model(self) -> RobotModel:
-        """The arm with its tool and load."""
-        ...
-
-    @property
-    def plant(self) -> Plant:
-        """What moves."""
-        ...
-
-    @property
-    def playout(self) -> JitterBuffer:
-        """The queue of commands."""
+    def arm(self) -> VirtualArm:
+        """What moves, with its sensors and the queue of commands."""
         ...
 
     @property
     def cycle_number(self) -> int:
         """The number of the last state."""
-        ...
-
-    @property
-    def q(self) -> JointVector:
-        """Measured joint angles, shape (n,), [rad]."""
         ...
 
     @property

@@ -190,7 +190,7 @@ class VirtualArm:
         """Follows commands from now on, from the present reference.
 
         Args:
-            limits: Of the arm, as they apply to this motion.
+            limits: Of the arm, as they apply to this motion; infinite where the maker checks nothing.
         """
         mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
         tolerance = start_tolerance(mode.law, parameters)

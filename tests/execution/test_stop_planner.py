@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.monitor import JointMonitor
-from rcilab.core.command import JointTorque
-from rcilab.execution.stop_planner import StreamStopPlanner, TorqueStopPlanner
+from rcilab.core.command import JointPosition, JointTorque
+from rcilab.core.state import unknown_state
+from rcilab.execution.stop_planner import JointStopPlanner, StreamStopPlanner, TorqueStopPlanner
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 
@@ -60,3 +63,15 @@ def test_torques_go_to_zero_at_the_allowed_rate():
     way = np.array([command.tau for command in brake.plan()])
     assert np.array_equal(way[-1], np.zeros(7))
     assert (np.abs(np.diff(way, axis=0)) < LIMITS.torque_rate * 1e-3).all()
+
+
+def test_a_motion_that_is_sent_every_tenth_cycle_may_stand_at_its_end_when_repeated_as_seldom():
+    motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
+    state = replace(unknown_state(MODEL.n), q_c=MODEL.home)
+    last = 10 * -(-(len(motion.q) - 1) // 10)
+    for period, may_stand in ((10, True), (1, False)):
+        planner = JointStopPlanner(LIMITS, period)
+        planner.begin(state)
+        for cycle in range(0, last + 1, 10):
+            planner.remember(JointPosition(motion.q[min(cycle, len(motion.q) - 1)]), cycle, state)
+        assert (planner.find_motion() is None) is may_stand

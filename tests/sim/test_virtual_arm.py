@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -93,3 +95,13 @@ def test_a_push_beyond_the_threshold_is_a_measured_violation(arm: VirtualArm) ->
             break
     assert ArmCondition.NO_COLLISION in {violation.condition for violation in result.measured_violations}
     assert result.command_violations == ()
+
+
+def test_a_motion_is_checked_against_the_limits_it_begins_with(arm: VirtualArm) -> None:
+    unchecked = np.full(MODEL.n, np.inf)
+    joint = replace(MODEL.limits.joint, acceleration=unchecked, jerk=unchecked)
+    arm.is_monitored = False  # The measured acceleration is not what this is about.
+    arm.begin_motion(replace(MODEL.limits, joint=joint))
+    for k in range(20):  # From standstill to 0.5 rad/s in one cycle.
+        assert arm.step(ArmCommand(k, moved(1, 5e-4 * k))) == ((), ())
+    assert arm.step(ArmCommand(20, moved(1, 0.1))).command_violations  # The velocity is still checked.

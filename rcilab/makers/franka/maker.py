@@ -6,7 +6,7 @@ from rcilab.core.condition import ConditionTable
 from rcilab.makers.franka.conditions import FCI_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots import ROBOTS
-from rcilab.makers.maker import Capabilities, PlanningOnly
+from rcilab.makers.maker import Capabilities, PlanningOnly, Timing
 
 
 class Franka(PlanningOnly):
@@ -18,6 +18,7 @@ class Franka(PlanningOnly):
     scheme = "fci"
     robots = ROBOTS
     capabilities = Capabilities()
+    timing = Timing()
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the FCI."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
-from rcilab.makers.maker import Capabilities
+from rcilab.makers.maker import Capabilities, Timing
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.robots import ROBOTS
@@ -28,6 +28,7 @@ class Rokae:
     scheme = "rci"
     robots = ROBOTS
     capabilities = Capabilities(simulates=True, drives=True)
+    timing = Timing()
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the RCI."""

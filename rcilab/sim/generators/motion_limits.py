@@ -66,12 +66,12 @@ def build_motion_limits(
         mode: What the motion is.
         model: The arm with its tool and load.
         parameters: What the client has configured.
-        limits: Of the arm, as they apply to this motion.
+        limits: Of the arm, as they apply to this motion; infinite where the maker checks nothing.
         starts: Measured and commanded joint angles at the start: the farther one opens a range.
         tools: Measured and commanded pose of the tool in base.
         tolerance: How far the first command may be off the reference.
     """
-    joint = parameters.soft_limits(model.limits.joint)
+    joint = parameters.soft_limits(limits.joint)
     for q in starts:
         joint = range_from(joint, q)
     has_walls = mode.law in _SPRINGS and parameters.guiding_box is not None

@@ -75,6 +75,7 @@ class RciController:
     """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
 
     Attributes:
+        arm: What moves.
         settings: Everything that was set.
         phase: What the robot is doing.
         faults: The error bits that are set, in wire order.
@@ -108,7 +109,7 @@ class RciController:
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
         self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
-        self._arm = arm
+        self.arm = arm
         arm.configure(self.settings)
         self._reporter = StateReporter(model, self.settings)
         self._requested = self._shown = _IDLE_MODES
@@ -121,27 +122,22 @@ class RciController:
     @property
     def model(self) -> RobotModel:
         """The arm with the tool and load that were set."""
-        return self._arm.model
+        return self.arm.model
 
     @property
     def plant(self) -> Plant:
         """What moves."""
-        return self._arm.plant
+        return self.arm.plant
 
     @property
     def playout(self) -> JitterBuffer:
         """The queue of commands, with its counts."""
-        return self._arm.playout
+        return self.arm.playout
 
     @property
     def cycle_number(self) -> int:
         """The number of the last state."""
         return self.state.message_id
-
-    @property
-    def q(self) -> JointVector:
-        """Measured joint angles, shape (n,), [rad]."""
-        return self.state.q
 
     @property
     def phase_name(self) -> str:
@@ -172,12 +168,12 @@ class RciController:
     @property
     def is_settled(self) -> bool:
         """Whether the arm stands still in no phase that ends by itself: deferred replies are due."""
-        return self._arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
+        return self.arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
     def is_moving(self) -> bool:
         """Whether the arm moves, or listens for commands that would make it."""
-        return self.phase in _MOVING or not self._arm.commanded.is_at_rest
+        return self.phase in _MOVING or not self.arm.commanded.is_at_rest
 
     @property
     def wants_commands(self) -> bool:
@@ -211,7 +207,7 @@ class RciController:
     @auto_limit.setter
     def auto_limit(self, on: bool) -> None:
         self.settings = replace(self.settings, auto_limit=on)
-        self._arm.configure(self.settings)
+        self.arm.configure(self.settings)
 
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
@@ -224,18 +220,18 @@ class RciController:
     def reset(self, q: JointVector) -> None:
         """Puts the resting arm somewhere else: what a virtual robot can do and a real one cannot."""
         self._is_still = False
-        self._arm.reset(q)
+        self.arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
         """Takes a command that came from the network; it is kept while a motion is in progress."""
-        self.ignored += not self._arm.receive(ArmCommand(*packet))
+        self.ignored += not self.arm.receive(ArmCommand(*packet))
 
     def handle(self, request: rci.Request) -> Reply:
         """Takes a request and returns the answer to it."""
         content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
         if content is not None:
             return Reply(content)
-        cell = check_request(request, self.phase, self.settings, self._arm)
+        cell = check_request(request, self.phase, self.settings, self.arm)
         if not isinstance(cell, Transition):
             return self._refuse(request, cell)
         if Action.APPLY in cell.actions and not self._apply(request):
@@ -249,7 +245,7 @@ class RciController:
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
 
     def _refuse(self, request: rci.Request, status: rci.Status) -> Reply:
-        why = describe_refusal(request, status, self.phase, self.settings, self._arm)
+        why = describe_refusal(request, status, self.phase, self.settings, self.arm)
         return Reply(rci.StatusResponse(status), refusal=why)
 
     def conclude(self, reply: Reply) -> rci.Response:
@@ -283,7 +279,7 @@ class RciController:
         self._message_id += is_seen
         if not self._is_still:
             self._advance()
-        elif self._arm.hold():
+        elif self.arm.hold():
             return self._repeat()
         self.state, self._datagram = self._report(), None
         self._is_still = self._reporter.has_repeated and self._may_stay_still()
@@ -291,17 +287,17 @@ class RciController:
 
     def _advance(self) -> None:
         self._count_down()
-        command_violations, measured_violations = self._arm.step()
+        command_violations, measured_violations = self.arm.step()
         if command_violations:
             self._raise(command_violations)
         elif measured_violations:
             self._raise(measured_violations)
-        if self.phase is Phase.STOPPING and self._arm.is_standstill and not self._arm.is_following:
+        if self.phase is Phase.STOPPING and self.arm.is_standstill and not self.arm.is_following:
             self.on_event(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
         """Returns whether the next cycle will be like this one, unless a request comes or the arm is moved."""
-        return self.phase in _STILL and self._countdown == 0 and self._arm.has_settled
+        return self.phase in _STILL and self._countdown == 0 and self.arm.has_settled
 
     def _repeat(self) -> RobotState:
         self.state = self._reporter.repeat(self._message_id)
@@ -316,7 +312,7 @@ class RciController:
             return
         if self.phase is Phase.STARTING:
             self.on_event(Event.MODES_SHOWN)
-        elif self._arm.commanded.is_at_rest:
+        elif self.arm.commanded.is_at_rest:
             self.on_event(Event.RECOVERED)
 
     def _raise(self, violations: Violations) -> None:
@@ -328,7 +324,7 @@ class RciController:
         controller_mode, motion_mode = self._shown
         return self._reporter.report(
             self._message_id,
-            self._arm.signals,
+            self.arm.signals,
             faults=self.faults,
             success_rate=self.playout.success_rate,
             motion_generator_mode=motion_mode,
@@ -343,8 +339,8 @@ class RciController:
         if cell.phase is Phase.RECOVERING and self.phase is not Phase.RECOVERING:
             self._countdown = self._recovery_time
         self.phase = cell.phase
-        self._arm.is_monitored = cell.phase in _MOVING
-        self._arm.resting_law = _RESTING_LAWS.get(cell.phase, ControlLaw.POSITION)
+        self.arm.is_monitored = cell.phase in _MOVING
+        self.arm.resting_law = _RESTING_LAWS.get(cell.phase, ControlLaw.POSITION)
 
     def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:
@@ -352,28 +348,28 @@ class RciController:
                 assert isinstance(request, rci.StartMove)
                 modes = ControllerMode(request.controller_mode), rci.StartMotionMode(request.motion_mode)
                 self._requested, self._countdown = (modes[0], modes[1].shown_as), self._mode_delay
-                self._arm.prepare_motion(MODES[modes])
+                self.arm.prepare_motion(MODES[modes])
             case Action.SHOW_MODES:
                 self._shown = self._requested
-                self._arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table))
+                self.arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table))
             case Action.REVEAL_MODES:
                 self._shown = self._requested
             case Action.HIDE_MODES:
                 self._shown = _IDLE_MODES
             case Action.DRAIN:
-                self._arm.drain_motion()
+                self.arm.drain_motion()
             case Action.DISCARD:
-                self._arm.discard_motion()
+                self.arm.discard_motion()
             case Action.SET_FAULTS:
                 self.faults = tuple(sorted({*self.faults, *faults}))
             case Action.CLEAR_FAULTS:
                 self.faults = ()
             case Action.GUIDE:
                 assert isinstance(request, rci.StartDrag)
-                self._arm.begin_guiding(guided_freedom(request))
+                self.arm.begin_guiding(guided_freedom(request))
             case Action.REBOOT:
                 self.settings = self.settings.rebooted(self.model.description)
-                self._arm.configure(self.settings)
+                self.arm.configure(self.settings)
                 self._reporter.configure(self.model, self.settings)
             case Action.APPLY:
                 pass  # Done before, because it may fail.
@@ -384,7 +380,7 @@ class RciController:
         except InvalidValueError:
             return False
         self.settings = settings
-        self._arm.configure(settings)
+        self.arm.configure(settings)
         if request.code in _REPORTED:
             self._reporter.configure(self.model, settings)
         return True

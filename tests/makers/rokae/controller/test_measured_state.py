@@ -97,7 +97,7 @@ def test_what_the_sensors_say_is_judged_in_that_cycle(model: RobotModel, mode, a
 
 
 def test_a_collision_is_named_by_the_joint_that_is_farthest_beyond_its_threshold(model: RobotModel) -> None:
-    watch = Hand(model).cycle._arm.measured_state
+    watch = Hand(model).cycle.arm.measured_state
     watch.tau_ext = readonly_copy(np.array([0.0, 90.0, 0.0, 0.0, 0.0, -79.4, 0.0]))
     collision = watch.find_collision((75.0, 75.0, 45.0, 45.0, 30.0, 30.0, 20.0))
     assert collision == "joint 6: external torque -79.4 N m is above its threshold 30 N m"
