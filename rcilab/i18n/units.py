@@ -136,12 +136,12 @@ class Units:
         """
         unit, _, form = spec.partition(".")
         numbers = self._digits(value, unit, form.rstrip("#"))
-        return numbers if form.endswith("#") else _with_unit(numbers, self.from_si(unit)[1])
+        return numbers if form.endswith("#") else _with_unit(numbers, _scale(self, unit)[1])
 
     def _digits(self, value: object, unit: str, form: str, between: str = ", ") -> str:
         if isinstance(value, (tuple, list)):
             return between.join(self._digits(one, unit, form, "…") for one in value)
-        number, (usual, _), (factor, _) = float(cast(float, value)), USUAL.from_si(unit), self.from_si(unit)
+        number, usual, factor = float(cast(float, value)), _scale(USUAL, unit)[0], _scale(self, unit)[0]
         text = _in_form(usual * number, form)
         if factor == usual or not math.isfinite(number):
             return text
@@ -218,6 +218,12 @@ class _FixedNumber:
 
     def __format__(self, spec: str) -> str:
         return self.units.format(self.scale * float(spec), f"{self.unit}.{len(spec.partition('.')[2])}f")
+
+
+@lru_cache
+def _scale(units: Units, unit: str) -> tuple[float, str]:
+    """Returns `Units.from_si` without computing it again: the page fills hundreds of texts a second."""
+    return units.from_si(unit)
 
 
 @lru_cache
