@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.fault_lab.demo_motion import exhibition_of
+from rcilab.app.exhibition import exhibit_fault
 from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
@@ -102,7 +102,7 @@ class FaultPanel(Part):
     def _look(self) -> None:
         """Shows the moment of the fault in scene, timeline and curves."""
         if self._shown is not None:
-            self.state.exhibit(exhibition_of(self._shown))
+            self.state.exhibit(exhibit_fault(self._shown))
 
     def _tell(self) -> None:
         fault, text, exhibit = self.fault.value, self.text, self._shown

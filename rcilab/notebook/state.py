@@ -33,13 +33,12 @@ from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel, require_model
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab.demo_motion import DemoMotion
+    from rcilab.app.exhibition import Exhibition
     from rcilab.app.robot_connection import RobotConnection
     from rcilab.app.session_connection import SessionConnection
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
     from rcilab.motion.motion import Motion
-    from rcilab.notebook.cell_run import CellRun
     from rcilab.recording.run import Run
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
@@ -70,7 +69,7 @@ class LabState:
         self._handlers: Handlers = {**self.goals.handlers, PlanGoal: lambda _: self.make_plan()}
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
-        self.exhibition: DemoMotion | CellRun | None = None
+        self.exhibition: Exhibition | None = None
         """A fault, or what a cell did, looked at in place of the plan until somebody plans, poses or executes."""
         self.run: Run | None = None
         """What came of the last execution."""
@@ -272,9 +271,9 @@ class LabState:
 
     def take_cell_run(self, run: Run, error: RcilabError | None = None) -> None:
         """Shows what a cell did in place of the plan, which stays."""
-        from rcilab.notebook.cell_run import cell_run_of
+        from rcilab.app.exhibition import exhibit_run
 
-        seen = cell_run_of(run, self.model)
+        seen = exhibit_run(run, self.model)
         with self.lock:
             self.run, self.error, self.is_run_of_plan, self._ran = run, error, False, None
             self.exhibit(seen)
@@ -297,7 +296,7 @@ class LabState:
                 self.moment = moment
                 self.tell("moment")
 
-    def exhibit(self, exhibition: DemoMotion | CellRun | None) -> None:
+    def exhibit(self, exhibition: Exhibition | None) -> None:
         """Looks at a fault, or at what a cell did, in place of the plan; None looks at the plan again."""
         with self.lock:
             if exhibition is None and self.exhibition is None:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rcilab.app.exhibition import exhibit_fault
 from rcilab.app.fault_lab import FAULTS, FaultDemo
-from rcilab.app.fault_lab.demo_motion import exhibition_of
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.learn.learn_state import LearnState, LessonState, Show
 from rcilab.app.learn.lessons import LESSONS, Watcher
@@ -159,7 +159,8 @@ def make_show(exhibit: FaultDemo, beside: object) -> Show:
     """Returns a fault as the page shows it."""
     rows = exhibit.whole
     return Show(
-        exhibition=exhibition_of(exhibit),
+        exhibit=exhibit,
+        exhibition=exhibit_fault(exhibit),
         recording=Recording(
             t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
         ),

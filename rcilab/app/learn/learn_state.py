@@ -11,7 +11,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.rokae.faults import Fault
 
 if TYPE_CHECKING:
-    from rcilab.app.fault_lab.demo_motion import DemoMotion
+    from rcilab.app.exhibition import Exhibition
     from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.app.store import UiState
 
@@ -20,21 +20,18 @@ if TYPE_CHECKING:
 class Show:
     """A fault on show, as timeline and scene draw it."""
 
-    exhibition: DemoMotion
+    exhibit: FaultDemo
+    """The fault."""
+    exhibition: Exhibition
     recording: Recording
     """What the arm did."""
     beside: object
     """The motion that was planned on the page when it opened; another one closes the show."""
 
     @property
-    def exhibit(self) -> FaultDemo:
-        """The fault."""
-        return self.exhibition.exhibit
-
-    @property
     def place(self) -> float:
         """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
-        return self.exhibition.moment / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
+        return self.exhibit.sample * CYCLE_TIME / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -1,0 +1,62 @@
+"""What scene, timeline and curves draw in place of the plan: a provoked fault, or what a cell of a notebook ran."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rcilab.app.planning import Plan, build_plan_view
+from rcilab.conformance.check import check
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.motion import Motion
+from rcilab.recording.run import Run
+
+if TYPE_CHECKING:
+    from rcilab.app.fault_lab.fault_demo import FaultDemo
+    from rcilab.model.robot_model import RobotModel
+
+_FEWEST = 8  # [cycles] A shorter run of a cell did not move anything.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Exhibition:
+    """What is drawn in place of the plan. It is never one to execute."""
+
+    plan: Plan
+    """What was commanded; of a fault the wrong command too, and the controller's stop."""
+    scene: Plan
+    """Where the arm is drawn."""
+    run: Run
+    """What the arm did."""
+    moment: float | None = None
+    """When the fault was reported, on the clock of `plan`, [s]; None without one."""
+
+
+def exhibit_fault(demo: FaultDemo) -> Exhibition:
+    """Returns a provoked fault as scene, timeline and curves draw it."""
+
+    def draw(motion: Motion) -> Plan:
+        checked = Motion.from_cycles(motion.q[: demo.sample + 1])  # The rest is the controller's stop.
+        return build_plan_view(demo.model, motion, check(checked, demo.model, distance=None))
+
+    commanded = demo.commanded
+    return Exhibition(
+        plan=draw(commanded),
+        scene=draw(demo.moved),
+        run=Run(plan=commanded, cycles=demo.whole, model=demo.model),
+        moment=demo.sample * CYCLE_TIME,
+    )
+
+
+def exhibit_run(run: Run, model: RobotModel) -> Exhibition | None:
+    """Returns a run of `execute` or of a callback as it is drawn; None where there is too little to draw."""
+    if len(run.cycles) < _FEWEST:
+        return None
+    motion = run.plan or _commanded(run)
+    plan = build_plan_view(model, motion, check(motion, model, distance=None))
+    return Exhibition(plan=plan, scene=plan, run=run)
+
+
+def _commanded(run: Run) -> Motion:
+    """Returns what a callback commanded, each row at the time of its command; of torques, the measured angles."""
+    return Motion.from_cycles(run.q if run.setup.mode == "torque" else run.q_c[run.delay :])
