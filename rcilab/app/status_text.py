@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
 _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
+    "fault.released": "phase.released",
 }  # fmt: skip
 """States that have a text of their own instead of that of their phase."""
+_SAFETY_STOPS = {"fault.pressed": "ready.pressed", "fault.released": "ready.released"}
 _LOST = ("lost.silent", "lost.unreachable", "lost.closed", "lost.other_arm", "lost.rebooted")
 
 
@@ -59,8 +61,8 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
 
 def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
     """Returns the sentence for an incident of the supervisor."""
-    if code == "fault.pressed":
-        return message("ready.pressed")
+    if code in _SAFETY_STOPS:
+        return message(_SAFETY_STOPS[code])
     if code == "fault":
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
@@ -70,8 +72,8 @@ def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message
 
 def tell_status(status: SupervisorStatus) -> Message:
     """Returns what the robot side is doing, in one sentence."""
-    if status.code == "fault.pressed":
-        return message("ready.pressed")
+    if status.code in _SAFETY_STOPS:
+        return message(_SAFETY_STOPS[status.code])
     if status.code == "fault":
         return message("ready.fault_of", faults=name_faults(status.faults))
     if status.code in _CRASHES or status.code in _LOST:
@@ -87,7 +89,7 @@ def tell_success(status: SupervisorStatus) -> Message:
 
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the two or three words for what the robot side is doing."""
-    if status.phase == "idle" and status.is_pressed:
+    if status.phase in ("idle", "fault") and status.is_pressed:
         return "phase.pressed"
     if status.phase == "idle" and status.powered is False:
         return "phase.unpowered"

@@ -53,6 +53,7 @@ MESSAGES: dict[str, str] = {
     "stopping.operator": "Nobody is at the controls: the arm is being brought to rest.",
     "fault": "The controller stopped the arm: {faults}. Recover leads out.",
     "fault.pressed": "An emergency stop or the safety gate holds the arm: release it, then power on.",
+    "fault.released": "The emergency stop is released, or the gate closed; power_on() clears its error bit.",
     "lost.unreachable": "{error}",
     "lost.closed": "{error}",
     "lost.rebooted": "{address} restarts; reconnect once it is up.",

@@ -159,7 +159,7 @@ class ControlProcess:
             self._guide = None
             self._say_ready()
         elif state.faults:
-            if phase != "fault":
+            if phase != "fault" or self._publisher.snapshot.code == "fault.pressed":
                 self._say_fault(state.faults)
         elif phase in ("fault", "lost"):
             self._say_ready()
@@ -333,6 +333,8 @@ class ControlProcess:
         state = None if self._driver is None else self._driver.latest
         if state is not None and state.robot_mode is RobotMode.USER_STOPPED:
             self._publisher.say("fault", "fault.pressed")
+        elif self._publisher.snapshot.code in ("fault.pressed", "fault.released"):
+            self._publisher.say("fault", "fault.released")  # Only the bit is left of it.
         else:
             self._publisher.say("fault", "fault", faults=name_faults(faults))
 

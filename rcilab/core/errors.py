@@ -196,6 +196,10 @@ class CommandRejectedError(RcilabError):
         self.status = status
 
 
+SAFETY_STOP = "safety_stop"
+"""Code of the `ControlError` of a motion that an emergency stop or the safety gate ended."""
+
+
 class ControlError(RecordedError):
     """The controller reported faults and stopped the motion.
 

@@ -19,7 +19,7 @@ from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.driver import ConfiguredArm, StreamingDriver
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.punctual import punctual
-from rcilab.recording.run import Run, build_run
+from rcilab.recording.run import Run, build_run, describe_end
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ class MotionRunner:
                 )
         except BaseException as error:
             if self._listeners or isinstance(error, RecordedError):
-                run = report(str(error) or type(error).__name__, error)
+                run = report(describe_end(error), error)
                 if isinstance(error, RecordedError):
                     error.run = run
             raise

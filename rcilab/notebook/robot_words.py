@@ -8,11 +8,13 @@ from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.session_connection import BusyError
 from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
 from rcilab.control_process import SupervisorStatus
-from rcilab.core.errors import ModelError, RcilabError
+from rcilab.core.errors import SAFETY_STOP, ControlError, ModelError, RcilabError
 from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import head, table, verdict
+from rcilab.recording.html_facts import tell_stop
+from rcilab.recording.run import describe_end
 
 
 def name_phase(status: SupervisorStatus | None, text: Text) -> str:
@@ -69,6 +71,9 @@ def outcome_html(
     """
     error, run = outcome.error, outcome.run
     stopped = verdict("warn", "▲", text("run.left_alone" if is_left_alone else "run.stopped"))
+    if isinstance(error, ControlError) and error.code == SAFETY_STOP:
+        why = tell_stop(describe_end(error), error.faults, text)
+        return verdict("bad", "✗", text("run.safety_stop", why=why))
     if error is not None:
         faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
         if faults:

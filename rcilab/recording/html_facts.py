@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rcilab.core.fault import name_faults
@@ -30,15 +31,29 @@ def fact_rows(run: Run, text: Text) -> list[list[str]]:
     return [[text(f"facts.{name}"), said] for name, said in rows if said]
 
 
+def tell_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
+    """Returns why a motion was stopped before its end, and as which faults a safety stop was reported.
+
+    Args:
+        stopped: What `Run.stopped` says.
+        faults: Those that the controller reported.
+        text: Words.
+    """
+    key, named = f"stop.{stopped}", name_faults(faults)
+    why = text(key) if text.has(key) else stopped
+    return text("stop.reported", why=why, faults=named) if named else why
+
+
 def _ended(run: Run, text: Text) -> str:
+    if run.is_safety_stop:
+        return text("facts.stopped", why=tell_stop(run.stopped or "", run.faults, text))
     if run.faults:
         return text("facts.faulted", faults=name_faults(run.faults))
     if not run.is_complete:
         return text("facts.cut")
     if not run.stopped:
         return text("facts.goal" if run.plan is not None else "facts.last")
-    why = f"stop.{run.stopped}"
-    return text("facts.stopped", why=text(why) if text.has(why) else run.stopped)
+    return text("facts.stopped", why=tell_stop(run.stopped or "", run.faults, text))
 
 
 def _health(run: Run, text: Text) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rcilab.conformance.check import check
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.errors import UsageError, plain_text
+from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import MOST_ROWS
 from rcilab.i18n.localized_text import language
@@ -34,6 +34,17 @@ if TYPE_CHECKING:
 
 _FIRST_ARM = "xMatePro7"  # A recording without a model is of an arm whose controller has the same faults.
 _LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
+
+
+_SAFETY_STOPS = {"estop": "an emergency stop was pressed", "gstop": "the safety gate was opened"}
+"""What `Run.stopped` says of them, by the code of their status."""
+
+
+def describe_end(error: BaseException) -> str:
+    """Returns what `Run.stopped` says of a motion that ended with an error; a safety stop is named without its bits."""
+    if isinstance(error, ControlError) and error.code == SAFETY_STOP:
+        return _SAFETY_STOPS.get(str(error.facts["status"]), str(error))
+    return str(error) or type(error).__name__
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +98,11 @@ class Run:
     """Whether the pace was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
     is_complete: bool = True
     """False when it was read from a file whose end is missing: all that came before is here."""
+
+    @property
+    def is_safety_stop(self) -> bool:
+        """Whether an emergency stop or the safety gate ended it, whatever error bits that set."""
+        return self.stopped in _SAFETY_STOPS.values()
 
     @property
     def t(self) -> Array:

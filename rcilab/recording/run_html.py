@@ -8,7 +8,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from rcilab.core.fault import name_faults
-from rcilab.i18n.catalogue import load_catalogue
+from rcilab.i18n.catalogue import SHARED, load_catalogue
 from rcilab.i18n.locale import require_language
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def run_html(run: Run, language: str = "en") -> str:
     words, timing = load_catalogue("rcilab.recording", require_language(language)), run.timing
     ended = words["card.fault" if run.faults else "card.goal"]
     if run.stopped:
-        ended = words.get(f"stop.{run.stopped}", run.stopped)
+        ended = load_catalogue(SHARED, require_language(language)).get(f"stop.{run.stopped}", run.stopped)
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),

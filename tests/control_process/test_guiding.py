@@ -93,6 +93,7 @@ def test_an_emergency_stop_in_mid_motion_is_what_status_and_error_name(superviso
     with pytest.raises(CommandRejectedError, match="an emergency stop is pressed: release it first"):
         supervisor.power_on().wait(SOON)
     world.press("none")
+    wait_for(lambda: supervisor.status().code == "fault.released")
     supervisor.recover().wait(SOON)
     supervisor.power_on().wait(SOON)
     wait_for(lambda: supervisor.status().phase == "idle")

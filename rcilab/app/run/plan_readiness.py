@@ -39,16 +39,21 @@ class ArmStatus(Protocol):
         ...
 
 
-def arm_obstacle(phase: str, powered: bool | None, *, is_pressed: bool = False) -> Message | None:
+def arm_obstacle(
+    phase: str, powered: bool | None, *, is_pressed: bool = False, is_released: bool = False
+) -> Message | None:
     """Returns why an arm cannot set out in this phase of its control process, or None.
 
     Args:
         phase: Of the control process.
         powered: Motor power; None while unknown.
         is_pressed: Whether an emergency stop or the safety gate holds the arm.
+        is_released: Whether one held it, and only its error bit is left.
     """
     if is_pressed and phase in ("idle", "fault"):
         return message("ready.pressed")
+    if is_released:
+        return message("ready.released")
     if phase in _NOT_IDLE:
         return message(_NOT_IDLE[phase])
     return None if powered else message("ready.power")

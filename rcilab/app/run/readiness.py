@@ -29,7 +29,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
         return message("ready.held")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
         return tell_status(status)
-    resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed)
+    is_released = status.code == "fault.released"
+    resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed, is_released=is_released)
     if resting is not None:
         return resting
     if state.plan is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.run.run_recorder import RunRecorder
 from rcilab.core.errors import ControlError, RcilabError
+from rcilab.recording.run import describe_end
 
 if TYPE_CHECKING:
     import numpy as np
@@ -112,7 +113,7 @@ class RobotRequests:
             return Outcome(what=what, error=error)
         is_stopped = isinstance(error, ControlError) and not error.faults
         is_left_alone = is_stopped and self._connection.status().code == "idle.operator"
-        stopped = None if error is None else str(error)
+        stopped = None if error is None else describe_end(error)
         self._recorder.finish(stopped, self._paced(), is_left_alone=is_left_alone, run=self._connection.take_run())
         last = self._store.state.last_run
         return Outcome(what=what, error=error, run=None if last is None else last.run, is_left_alone=is_left_alone)

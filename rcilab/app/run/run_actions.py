@@ -24,6 +24,7 @@ from rcilab.app.store import Store, UiState
 from rcilab.app.text import Message, message
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import (
+    SAFETY_STOP,
     CertificateError,
     ConnectionLostError,
     ControlError,
@@ -70,6 +71,7 @@ class RunActions:
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self.requests = RobotRequests(store, session)
+        self._is_stop_said = False  # Which safety stop ended the last motion was said with its error.
         self._placed = False  # The goal stands where the arm was first seen.
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._power_asked = float("-inf")
@@ -233,8 +235,9 @@ class RunActions:
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The one that is started in its place comes up without motor power.
             self._trouble = status.incident.code
-            said = tell_incident(status.incident.code, status.incident.message, status)
-            self._store.say("bad", said, trouble=TROUBLE)
+            if status.incident.code != "fault.pressed" or not self._is_stop_said:
+                said = tell_incident(status.incident.code, status.incident.message, status)
+                self._store.say("bad", said, trouble=TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
@@ -303,11 +306,13 @@ class RunActions:
             self._store.say("warn", tell_error(error))
             return
         self._arrival = state.plan.short
+        self._is_stop_said = False
 
     def _report(self, outcome: Outcome) -> None:
         if outcome.error is not None:
             if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
                 self._reached = 0.0  # It had begun, and was not seen on its way.
+            self._is_stop_said = outcome.error.code == SAFETY_STOP
             trouble = TROUBLE if _is_trouble(outcome.error) else ""
             self._store.say(*self._tell_failure(outcome, outcome.error), trouble=trouble)
         elif outcome.what == "power_on":

@@ -9,6 +9,7 @@ from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Finished
+from rcilab.recording.html_facts import tell_stop
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
@@ -62,8 +63,14 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(made.started_ns * 1e-9)) if made.started_ns else ""
     facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
-    why = "" if run.stopped is None or run.faults else f"<br><small>{esc(text.tell(Finished(run.stopped)))}</small>"
+    is_said = run.stopped is None or run.faults or run.is_safety_stop
+    told = "" if is_said else text.tell(Finished(_tell_stop(run, text)))
+    why = told and f"<br><small>{esc(told)}</small>"
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
+
+
+def _tell_stop(run: Run, text: Text) -> str:
+    return tell_stop(run.stopped or "", run.faults, text)
 
 
 def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:
@@ -81,9 +88,11 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     run = recording.run
     assert run is not None
     facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
+    moment = "" if recording.moment is None else f"{recording.moment:.3f}"
+    if run.is_safety_stop:
+        return "bad", text("record.safety_stop", moment=moment, why=_tell_stop(run, text)), facts
     if run.faults:
         faults = name_faults(run.faults)
-        moment = "" if recording.moment is None else f"{recording.moment:.3f}"
         return "bad", text("record.faulted", faults=faults, moment=moment), facts
     if not run.is_complete:
         return "warn", text("record.cut"), facts

@@ -134,7 +134,9 @@ def _drive(what: Any):  # type: ignore[no-untyped-def]
 def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None) -> str:
     """Returns every fault that is set, with its cause and what to do about it; nothing while none is."""
     was_stop = world is not None and isinstance(world.reason, Remark) and world.reason.code in ("estop", "gstop")
-    if status.is_pressed or was_stop:  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
+    if (
+        status.is_pressed or was_stop or status.code == "fault.released"
+    ):  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
         names = esc(name_faults(status.faults))
         said = f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
         return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'

@@ -25,6 +25,7 @@ _TONES = {
     "connecting": "warn",
     "stopping": "warn",
     "closed": "warn",
+    "fault.released": "warn",
 }
 
 
