@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rcilab.core.datagram_filter import keep_all_senders, keep_senders
 from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.arrivals import (
     Arrival,
@@ -24,6 +25,7 @@ from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpCh
 
 _LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot hold up the cycle.
+_FLOOD = 1000  # Strangers' datagrams beside a client after which the kernel drops the others; a tuning value.
 _FRAME_BYTES_AT_ONCE = 4096
 _BACKLOG = 8  # [connections] That wait to be accepted.
 _ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
@@ -41,7 +43,8 @@ class Endpoint:
     Attributes:
         host: Address that it listens on.
         port: TCP port of the main channel.
-        strangers: Datagrams that were ignored because they did not come from the client.
+        strangers: Datagrams that were ignored because they did not come from the client; of a flood, how many were
+            read before the kernel was made to drop them.
 
     Args:
         host: Address to listen on.
@@ -70,7 +73,7 @@ class Endpoint:
         self._owner: Peer | None = None  # The client of the main channel whose datagrams count.
         self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
         self._has_named_stranger = False
-        self.strangers = 0
+        self.strangers = self._strangers_before = 0
         self._arrivals: deque[Arrival] = deque()
         self._watched: list[socket.socket] = []
         self._watch()
@@ -161,6 +164,7 @@ class Endpoint:
         del self._connections[sock]
         if peer is self._owner:
             self._owner = None
+            self._keep_all_senders()
             self._state_port = self._own_port
             self._target = self._fixed_target
         self._watch()
@@ -190,9 +194,16 @@ class Endpoint:
     def _own(self, peer: Peer) -> None:
         """Makes a client the one whose datagrams count."""
         self._owner = peer
+        self._keep_all_senders()
         self._sender, self._has_named_stranger = None, False
         if self._fixed_target is None and self._state_port:
             self._target = (peer.address, self._state_port)
+
+    def _keep_all_senders(self) -> None:
+        """Begins to read, and to count, datagrams of strangers again."""
+        self._strangers_before = self.strangers
+        if self._datagrams is not None:
+            keep_all_senders(self._datagrams[0])
 
     def _watch(self) -> None:
         datagrams = () if self._datagrams is None else (self._datagrams[0],)
@@ -214,6 +225,8 @@ class Endpoint:
             self._sender = sender
             return True
         self.strangers += 1
+        if client and self._datagrams is not None and self.strangers - self._strangers_before == _FLOOD:
+            keep_senders(self._datagrams[0], {client, self.fixed_host or client})
         if not self._has_named_stranger:
             self._has_named_stranger = True
             self._arrivals.append(StrangerDetected("{}:{}".format(*sender), client))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import ctypes
 import errno
 import select
 import socket
-import struct
 import time
-from contextlib import suppress
 from typing import Protocol
 
+from rcilab.core.datagram_filter import keep_senders
 from rcilab.core.errors import ConnectionLostError, DecodeError
 from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import FrameReader
@@ -19,7 +17,6 @@ RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel m
 _LARGEST = 2048  # [bytes] More than any datagram of the RCI.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call: more than the buffer holds of states, and no flood keeps the caller.
 _MS = 1000.0
-_ATTACH_FILTER = 26  # SO_ATTACH_FILTER of Linux; `socket` has no name for it.
 
 
 class Transport(Protocol):
@@ -84,7 +81,7 @@ class SocketTransport:
         self._was_answered = False
         self._reader = FrameReader()
         self._udp = _bind_udp(address, route)
-        _accept_only_from(self._udp, self._robot_host)
+        keep_senders(self._udp, [self._robot_host])
         try:
             self._tcp = _connect_tcp(address, route, timeout)
         except BaseException:
@@ -206,21 +203,6 @@ class SocketTransport:
         return ConnectionLostError(
             f"{self.address}: the connection is lost ({reason}); look whether the controller runs, and connect again"
         )
-
-
-def _accept_only_from(udp: socket.socket, host: str) -> None:
-    """Has the kernel drop datagrams of other senders: a flood of them would leave no room for states in the buffer.
-
-    A filter of classic BPF, struct sock_filter and sock_fprog. Where the kernel grants none, senders are checked when
-    their datagrams are read.
-    """
-    load_source = (0x20, 0, 0, (-0x100000 + 12) & 0xFFFFFFFF)  # BPF_LD | BPF_W | BPF_ABS, SKF_NET_OFF: the IP header's.
-    is_host = (0x15, 0, 1, int.from_bytes(socket.inet_aton(host), "big"))  # BPF_JMP | BPF_JEQ | BPF_K
-    keep, drop = (0x06, 0, 0, 0xFFFFFFFF), (0x06, 0, 0, 0)  # BPF_RET | BPF_K
-    program = b"".join(struct.pack("HBBI", *step) for step in (load_source, is_host, keep, drop))
-    buffer = ctypes.create_string_buffer(program)
-    with suppress(OSError):
-        udp.setsockopt(socket.SOL_SOCKET, _ATTACH_FILTER, struct.pack("HP", 4, ctypes.addressof(buffer)))
 
 
 def _bind_udp(address: RciAddress, route: Route) -> socket.socket:

@@ -22,6 +22,7 @@ from rcilab.motion import plan_joint
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from tests.makers.rokae.controller.test_server import running
+from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
 
@@ -51,6 +52,41 @@ def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
         assert np.array_equal(robot.state.q_c, motion.goal)
         assert sent
         assert 1 <= robot.world.status().strangers <= len(sent)
+
+
+def test_a_flood_of_a_stranger_leaves_room_for_commands():
+    with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.9", 0))
+        host, port = robot.address.removeprefix("rci://").split("?")[0].split(":")
+        robot.power_on()
+        motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+
+        def flood(t, duration):
+            for _ in range(2000):  # More than the buffer holds, between any two commands.
+                udp.sendto(bytes(1000), (host, int(port)))
+
+        run = robot.execute(motion, progress=flood)
+        assert run.faults == ()
+        assert np.array_equal(robot.state.q_c, motion.goal)
+        assert robot.world.status().strangers >= 1000
+
+
+def test_strangers_are_counted_again_for_the_next_client():
+    with running() as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.9", 0))
+        endpoint = found.server._endpoint
+        for _ in range(2):
+            with socket.create_connection((found.host, found.port)):
+                wait_for(lambda: endpoint.has_client, 30.0, "a client")
+                wanted = endpoint.strangers + 1000
+
+                def is_counted(wanted: int = wanted) -> bool:
+                    for _ in range(100):
+                        udp.sendto(b"x", (found.host, found.port))
+                    return endpoint.strangers >= wanted
+
+                wait_for(is_counted, 30.0, "strangers to be counted")
+            wait_for(lambda: not endpoint.has_client, 30.0, "the client to leave")
 
 
 def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs():
