@@ -11,10 +11,14 @@ from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
 from rcilab.app.autosave import Autosave, keepsake_file
+from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, Refuse, TakeControls
 from rcilab.app.dispatcher import Dispatcher
 from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import ChooseBranch
+from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.request import Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
 from rcilab.app.scene.scene_actions import HighlightBranch
@@ -25,15 +29,16 @@ from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
 from rcilab.views.access_control import Gate
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
-from rcilab.workbench import security
-from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
+from rcilab.workbench import live, security
 from rcilab.workbench.page import decorate, introduce, send_file
+from rcilab.workbench.renderer import Renderer, tab_name
 
 if TYPE_CHECKING:
     import viser
 
     from rcilab.recording.run import Run
 
+_LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Heights of a page's window that plots are laid out for.
 _BEAT = 0.4  # [s] A choice: the control process stops a motion when it has heard of nobody for 2 s.
 
 
@@ -111,30 +116,14 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
-        from rcilab.workbench.renderer import Renderer, tab_name
-
         ask = self.conductor.ask
-        self.live = live = LiveChannel(
-            Heard(
-                stop=self.session.stop,
-                here=self._here,
-                seek=lambda page, share: ask(Seek(page=page, place=self.presenter.place_at(share))),
-                size=lambda page, height: ask(SetView(page=page, name="height", value=height)),
-                peek=lambda page, branch: ask(HighlightBranch(page=page, index=branch if branch >= 0 else None)),
-                entered=lambda page: ask(CommitField(page=page)),
-                tab=lambda page, index: ask(OpenTab(page=page, name=tab_name(index))),
-                take=lambda page: ask(TakeControls(page=page)),
-                answer=lambda page, yes: ask(AnswerControls(page=page, yes=yes)),
-                home=self._bring_back,
-                software=lambda page: ask(DrawInSoftware(page=page)),
-            )
-        )
+        self.live = live.LiveChannel(self.session.stop, self._receive, lambda: self._door.guard.count_malformed())
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
         self._door = GuardedServer(
             self._bound,
             gate,
             decorate=self._decorate,
-            routes={LIVE_PATH: live.serve},
+            routes={live.LIVE_PATH: self.live.serve},
             may_act=lambda page: self.store.state.lease.allows(page),
             refuse=lambda page: ask(Refuse(page=page)),
         )
@@ -143,12 +132,12 @@ class Workbench:
         self._follow_pages()
         if self._config.replay is None:
             self.conductor.resume(language=self._config.language)
-        self.presenter = Renderer(self.server, self.store, self.session, live, ask)
+        self.presenter = Renderer(self.server, self.store, self.session, self.live, ask)
         self.presenter.start()
         self.conductor.start()
         if self._config.replay is None:
             self.conductor.robot.open(self._config.model, self._config.target)
-        threading.Thread(target=self._beat, args=(live,), name="operator", daemon=True).start()
+        threading.Thread(target=self._beat, name="operator", daemon=True).start()
 
     def close(self) -> None:
         """Brings a motion to rest, ends the processes, closes the page. May be called twice."""
@@ -186,6 +175,45 @@ class Workbench:
     def _decorate(self, index: bytes) -> bytes:
         return decorate(index, self.store.state.quality)
 
+    def _receive(self, page: int, message: live.PageMessage) -> None:
+        """Acts on a message of a page's live connection; one that only the operator may send ends here for others."""
+        if isinstance(message, live.Here):
+            self._here(page)
+        elif isinstance(message, live.Home):
+            self._bring_back(page)
+        else:
+            request = self._request_of(page, message)
+            if not request.needs_control or self.store.state.lease.allows(page):
+                self.conductor.ask(request)
+            elif not request.is_silent:
+                self._door.guard.refuse(page)
+
+    def _request_of(self, page: int, message: live.PageMessage) -> Request:
+        match message:
+            case live.Seek(place):
+                return Seek(page=page, place=self.presenter.place_at(min(max(place, 0.0), 1.0)))
+            case live.Size(height):
+                return SetView(page=page, name="height", value=min(max(height, _LOWEST), _HIGHEST))
+            case live.Tab(index):
+                return OpenTab(page=page, name=tab_name(index))
+            case live.Entered():
+                return CommitField(page=page)
+            case live.Take():
+                return TakeControls(page=page)
+            case live.Answer(yes):
+                return AnswerControls(page=page, yes=yes)
+            case live.Software():
+                return DrawInSoftware(page=page)
+            case live.Peek(branch):
+                return HighlightBranch(page=page, index=branch)
+            case live.Branch(index):
+                return ChooseBranch(page=page, index=index)
+            case live.Condition(id):
+                return PressCheck(page=page, what="row", row=id)
+            case live.Edit(what, key, place):
+                return EditProgram(page=page, what=what, key=key, place=place)
+        raise AssertionError(message)
+
     def _bring_back(self, page: int) -> None:
         """Shows a page what it showed at first; what other pages see is theirs."""
         if page in self._views:
@@ -197,10 +225,10 @@ class Workbench:
         if self.store.state.lease.holder == page:
             self.session.heartbeat()
 
-    def _beat(self, live: LiveChannel) -> None:
+    def _beat(self) -> None:
         """Asks the pages, all the time, whether somebody is there to press Stop."""
         while not self._stopped.wait(_BEAT):
-            live.beat()
+            self.live.beat()
 
     def __enter__(self) -> Workbench:
         try:

@@ -1,4 +1,4 @@
-"""A second websocket beside viser's: status to the page's bar; Stop, seeking, signs of life and answers back from it.
+"""The websocket of our page next to viser's: status to the bar; Stop, seeking, chosen rows and signs of life from it.
 
 It does not depend on which tab or panel is shown, so Stop stays reachable whatever the page looks like.
 """
@@ -8,61 +8,150 @@ from __future__ import annotations
 import asyncio
 import hmac
 import json
-import math
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal, TypeAlias
+
+import msgspec
+from websockets.asyncio.server import broadcast
+from websockets.exceptions import ConnectionClosed
 
 LIVE_PATH = "/rcilab/live"
 
-_LARGEST_MESSAGE = 4096  # [bytes] A page sends a few words; anything longer is not ours.
+_LARGEST_MESSAGE = 4096  # [bytes] The longest message of a page has some hundred.
+
+_Index: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=99)]
+_Key: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=10**9)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Heard:
-    """What is called when a page says something; each must return at once."""
+class PageMessage(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower):
+    """What a page may send: JSON objects whose `kind` is the name of a class below."""
 
-    stop: Callable[[], None]
-    """Somebody pressed Stop or Esc."""
-    here: Callable[[int], None]
-    """A page has answered a beat: somebody who could press Stop is there."""
-    seek: Callable[[int, float], None]
-    """A place on the time axis was clicked in a page's plot, 0 to 1."""
-    size: Callable[[int, float], None]
-    """Height of a page's window, [px], when it gets the controls and when it changes."""
-    peek: Callable[[int, int], None] = lambda page, branch: None
-    """The branch that is under a page's mouse, from 0; -1 when it is left."""
-    entered: Callable[[int], None] = lambda page: None
-    """What was typed in a page is complete."""
-    tab: Callable[[int, int], None] = lambda page, index: None
-    """Another tab was opened in a page, counted from 0."""
-    take: Callable[[int], None]
-    """A page wants the controls."""
-    answer: Callable[[int, bool], None]
-    """A page was asked for the controls."""
-    software: Callable[[int], None] = lambda page: None
-    """A page's browser draws without a graphics card."""
-    home: Callable[[int], None] = lambda page: None
-    """A page wants its camera back where it was at first."""
+
+class Hello(PageMessage):
+    """Which of viser's clients the page is, with the key that only this client was given."""
+
+    page: int
+    key: str
+
+
+class Stop(PageMessage):
+    """Stop or Esc was pressed."""
+
+
+class Here(PageMessage):
+    """The page answers a beat: there is a page on which Stop can be pressed."""
+
+
+class Home(PageMessage):
+    """The page's camera is to go back to where it was at first."""
+
+
+class Seek(PageMessage):
+    """A plot was clicked at this part of its time axis, 0 to 1."""
+
+    place: float
+
+
+class Size(PageMessage):
+    """Height of the page's window, [px], when it gets the controls and when it changes."""
+
+    height: float
+
+
+class Tab(PageMessage):
+    """Another tab was opened, counted from 0."""
+
+    index: _Index
+
+
+class Entered(PageMessage):
+    """What was typed is complete."""
+
+
+class Take(PageMessage):
+    """The page wants the controls."""
+
+
+class Answer(PageMessage):
+    """Whether the page, which was asked for the controls, hands them over."""
+
+    yes: bool
+
+
+class Software(PageMessage):
+    """The browser draws without a graphics card."""
+
+
+class Peek(PageMessage):
+    """The branch, from 0, that is under the mouse or has the focus; None when it is left."""
+
+    branch: _Index | None
+
+
+class Branch(PageMessage):
+    """A branch of the list, from 0, was chosen."""
+
+    index: _Index
+
+
+class Condition(PageMessage):
+    """A row of the report was chosen."""
+
+    id: Annotated[str, msgspec.Meta(pattern=r"\A[a-z_.]{1,60}\Z")]
+
+
+class Edit(PageMessage):
+    """Something was done in the list of waypoints."""
+
+    what: Literal["select", "move", "up", "down", "delete", "duplicate", "undo", "redo"]
+    key: _Key
+    """Of the waypoint."""
+    place: _Key
+    """Where to move it, from 0."""
+
+
+_DECODER = msgspec.json.Decoder(
+    Hello
+    | Stop
+    | Here
+    | Home
+    | Seek
+    | Size
+    | Tab
+    | Entered
+    | Take
+    | Answer
+    | Software
+    | Peek
+    | Branch
+    | Condition
+    | Edit
+)
 
 
 class LiveChannel:
-    """Sends one JSON object to every page when it changes, and hears the few things the bar can say.
-
-    A page says which of viser's clients it is by a key that only this client was given.
+    """Sends one JSON object to every page when it changes, and receives the few messages a page has for us.
 
     Args:
-        heard: What to do.
+        on_stop: Called for every Stop, from any page that may open the websocket.
+        on_message: Called with a page's client id and its message; must return at once. Messages of pages that have
+            not proved which client they are do not get here.
+        on_malformed: Called for what is not a message of a page; it is dropped.
     """
 
-    def __init__(self, heard: Heard) -> None:
-        self._heard = heard
+    def __init__(
+        self,
+        on_stop: Callable[[], None],
+        on_message: Callable[[int, PageMessage], None],
+        on_malformed: Callable[[], None],
+    ) -> None:
+        self._on_stop, self._on_message, self._on_malformed = on_stop, on_message, on_malformed
         self._pages: dict[Any, int | None] = {}  # Connection -> client id. Owned by the event loop.
         self._keys: dict[int, str] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._latest: dict[str, Any] = {"server": secrets.token_hex(8)}
-        """What pages show; `server` tells them that another workbench answers at this address since."""
+        """What pages show; from `server` they see that another workbench answers at this address."""
 
     def introduce(self, page: int) -> str:
         """Returns the key of a client that has just connected; the page brings it along on its live connection."""
@@ -72,102 +161,68 @@ class LiveChannel:
         """Drops the key of a client that has gone."""
         self._keys.pop(page, None)
 
-    async def serve(self, page: Any) -> None:
+    async def serve(self, connection: Any) -> None:
         """Serves one page until it goes; runs on the server's event loop."""
         self._loop = asyncio.get_running_loop()
-        self._pages[page] = None
+        self._pages[connection] = None
         try:
-            await page.send(json.dumps(self._latest))
-            async for message in page:
-                self._pages[page] = self.hear(message, self._pages[page])
-        except Exception as error:
-            from websockets.exceptions import ConnectionClosed
-
-            if not isinstance(error, ConnectionClosed):
-                raise
+            await connection.send(json.dumps(self._latest))
+            async for raw in connection:
+                self._pages[connection] = self.receive(raw, self._pages[connection])
+        except ConnectionClosed:
+            pass
         finally:
-            self._pages.pop(page, None)
+            self._pages.pop(connection, None)
 
-    def hear(self, message: str | bytes, page: int | None = None) -> int | None:
-        """Acts on one message; anything that is not one of ours is ignored.
+    def receive(self, raw: str | bytes, page: int | None = None) -> int | None:
+        """Acts on one message.
 
         Args:
-            message: As it came.
+            raw: As it came.
             page: Client id of the page it came from, as far as it is known.
 
         Returns:
             The client id from now on.
         """
-        said = _decode(message)
-        kind = said.get("kind")
-        if kind == "hello":
-            return self._greet(said)
-        if kind == "stop":
-            self._heard.stop()
-        elif page not in self._keys:
-            pass  # Nobody that we know.
-        elif kind == "seek":
-            _pass_on(said.get("place"), 0.0, 1.0, lambda place: self._heard.seek(page, place))
-        elif kind == "size":
-            _pass_on(said.get("height"), 200.0, 4000.0, lambda height: self._heard.size(page, height))
-        elif kind == "here":
-            self._heard.here(page)
-        elif kind == "peek":
-            _pass_on(said.get("branch"), -1.0, 99.0, lambda branch: self._heard.peek(page, int(branch)))
-        elif kind == "entered":
-            self._heard.entered(page)
-        elif kind == "tab":
-            _pass_on(said.get("index"), 0.0, 99.0, lambda index: self._heard.tab(page, int(index)))
-        elif kind == "take":
-            self._heard.take(page)
-        elif kind == "software":
-            self._heard.software(page)
-        elif kind == "home":
-            self._heard.home(page)
-        elif kind == "answer" and isinstance(said.get("yes"), bool):
-            self._heard.answer(page, said["yes"])
+        message = _decode(raw)
+        if message is None:
+            self._on_malformed()
+        elif isinstance(message, Hello):
+            return self._greet(message)
+        elif isinstance(message, Stop):
+            self._on_stop()
+        elif page in self._keys:
+            self._on_message(page, message)
         return page
 
-    def _greet(self, said: dict[str, Any]) -> int | None:
-        page, key = said.get("page"), said.get("key")
-        if not isinstance(page, int) or not isinstance(key, str) or page not in self._keys:
+    def _greet(self, hello: Hello) -> int | None:
+        key = self._keys.get(hello.page)
+        if key is None or not hmac.compare_digest(hello.key.encode(errors="replace"), key.encode()):
             return None
-        if not hmac.compare_digest(key.encode(errors="replace"), self._keys[page].encode()):
-            return None
-        self._heard.here(page)
-        return page
+        self._on_message(hello.page, Here())
+        return hello.page
 
     def publish(self, **values: Any) -> None:
-        """Shows new values; only those that changed travel. For one thread, the presenter's."""
+        """Shows new values; only those that changed are sent. Called by one thread, the renderer's."""
         changed = {name: value for name, value in values.items() if self._latest.get(name) != value}
-        if not changed:
-            return
-        self._latest = {**self._latest, **changed}
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._send, json.dumps(changed))
+        if changed:
+            self._latest = {**self._latest, **changed}
+            self._send(json.dumps(changed))
 
     def beat(self) -> None:
         """Asks every page whether it is still there. A page answers even while its timers are throttled in the back."""
+        self._send('{"beat": 1}')
+
+    def _send(self, text: str) -> None:
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._send, '{"beat": 1}')
-
-    def _send(self, message: str) -> None:
-        from websockets.asyncio.server import broadcast
-
-        broadcast(self._pages, message)
+            self._loop.call_soon_threadsafe(lambda: broadcast(self._pages, text))
 
 
-def _decode(message: str | bytes) -> dict[str, Any]:
-    """Returns what a page says; nothing where that is not one of ours."""
-    if len(message) > _LARGEST_MESSAGE:
-        return {}
+def _decode(raw: str | bytes) -> PageMessage | None:
+    """Returns a message of a page, or None for anything else."""
+    if len(raw) > _LARGEST_MESSAGE:
+        return None
     try:
-        said = json.loads(message)
-    except (ValueError, RecursionError):
-        return {}
-    return said if isinstance(said, dict) else {}
-
-
-def _pass_on(number: object, low: float, high: float, act: Callable[[float], None]) -> None:
-    if isinstance(number, int | float) and not isinstance(number, bool) and abs(number) < math.inf:
-        act(float(min(max(number, low), high)))
+        return _DECODER.decode(raw)
+    except (ValueError, RecursionError):  # msgspec's errors, and text that is not Unicode.
+        return None

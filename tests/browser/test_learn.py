@@ -43,7 +43,7 @@ def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):
     page.open_tab("Check")
     page.wait(lambda: page.state.plan is not None and page.state.plan.complete, "a complete check")
     fast = page.state.plan
-    row = page.tab.locator("[data-say='joint.torque_rate']")
+    row = page.tab.locator("[data-condition='joint.torque_rate']")
     row.focus()
     page.tab.keyboard.press("Enter")
     page.wait(lambda: page.state.check.row == "joint.torque_rate", "the row")

@@ -27,7 +27,6 @@ from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.workbench.panels.program import read_row
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.scene.waypoint_markers import label_of, labels_of
@@ -362,12 +361,6 @@ def test_files_bring_circles_and_elbow_moves_that_stay_as_they_are(bench):
         assert bench.told == "program.no_target"
     assert "57°" in list_html(bench.state, bench.program.draft, None, Text("en"))
     assert draft_of(bench.program.draft.program(MODEL), MODEL).program(MODEL).waypoints == moves
-
-
-@pytest.mark.parametrize("said", ["", "1:select:1", "1:clear:1:1", "1:select:x:1", "1:select:-1:0", "1:select:²:0"])
-def test_what_no_list_says_is_ignored(said):
-    assert read_row(said, 1) is None
-    assert read_row("1:select:1:0", None) is None
 
 
 def test_a_program_that_was_changed_since_is_not_executed(square):

@@ -21,7 +21,7 @@ from rcilab.app.text import LANGUAGES, Text
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
-from rcilab.workbench.live import Heard, LiveChannel
+from rcilab.workbench.live import Here, Home, LiveChannel, PageMessage, Peek
 from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
@@ -185,35 +185,14 @@ def test_the_ways_to_reach_a_target_are_listed_nearest_first_and_lead_where_they
     assert np.allclose(meant, away, atol=0.51)  # Shown in whole degrees.
 
 
-def test_a_page_that_is_known_gets_its_camera_back_and_no_other_does():
-    brought: list[int] = []
-    nothing = {name: lambda *_: None for name in ("stop", "here", "seek", "size", "take", "answer")}
-    live = LiveChannel(Heard(**nothing, home=brought.append))
-    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
-    live.hear('{"kind": "home"}')
-    assert brought == []
-    live.hear('{"kind": "home"}', page)
-    assert brought == [3]
-
-
-def test_a_page_says_which_branch_is_under_the_mouse():
-    heard: list[tuple[int, int]] = []
-    live = LiveChannel(
-        Heard(
-            stop=lambda: None,
-            here=lambda page: None,
-            seek=lambda page, place: None,
-            size=lambda page, height: None,
-            take=lambda page: None,
-            answer=lambda page, yes: None,
-            peek=lambda page, branch: heard.append((page, branch)),
-        )
-    )
-    page = live.hear(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
-    for message in ('{"kind": "peek", "branch": 2}', '{"kind": "peek", "branch": -1}', '{"kind": "peek"}'):
-        live.hear(message, page)
-        live.hear(message)
-    assert heard == [(3, 2), (3, -1)]
+def test_only_a_page_that_is_known_is_received():
+    received: list[tuple[int, PageMessage]] = []
+    live = LiveChannel(lambda: None, lambda page, message: received.append((page, message)), lambda: None)
+    page = live.receive(json.dumps({"kind": "hello", "page": 3, "key": live.introduce(3)}))
+    for message in ('{"kind": "home"}', '{"kind": "peek", "branch": 2}', '{"kind": "peek", "branch": null}'):
+        live.receive(message, page)
+        live.receive(message)
+    assert received == [(3, message) for message in (Here(), Home(), Peek(2), Peek(None))]
 
 
 def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):

@@ -17,7 +17,7 @@ from rcilab.core.errors import UsageError
 from rcilab.views.access_control import Gate
 from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.workbench import security
-from rcilab.workbench.live import LIVE_PATH, Heard, LiveChannel
+from rcilab.workbench.live import LIVE_PATH, Answer, Here, LiveChannel, PageMessage, Seek, Take
 from rcilab.workbench.page import decorate
 from rcilab.workbench.security import bind, check_host
 from tests.waiting import wait_for
@@ -78,18 +78,10 @@ class Door:
 
     def __init__(self) -> None:
         self.stops = threading.Event()
-        self.seeks: list[float] = []
-        self.here: list[int] = []
-        self.asked: list[object] = []
+        self.received: list[tuple[int, PageMessage]] = []
+        self.malformed = 0
         self.live = LiveChannel(
-            Heard(
-                stop=self.stops.set,
-                here=self.here.append,
-                seek=lambda page, place: self.seeks.append(place),
-                size=lambda page, height: None,
-                take=self.asked.append,
-                answer=lambda page, yes: self.asked.append((page, yes)),
-            )
+            self.stops.set, lambda page, message: self.received.append((page, message)), self.count_malformed
         )
         bound = bind("127.0.0.1", 0)
         self.port = bound.getsockname()[1]
@@ -97,6 +89,9 @@ class Door:
             bound, Gate(host="127.0.0.1", port=self.port), decorate=decorate, routes={LIVE_PATH: self.live.serve}
         )
         self.server = self.guard.viser
+
+    def count_malformed(self) -> None:
+        self.malformed += 1
 
     def connect(self, path: str = "/", origin: str | None = "", protocol: str | None = None):
         headers = {} if origin is None else {"Origin": origin or f"http://127.0.0.1:{self.port}"}
@@ -191,28 +186,37 @@ def test_a_client_can_set_a_value_but_neither_nan_nor_anything_else(door):
     assert slider.value == 0.25
 
 
+GARBAGE: tuple[str | bytes, ...] = (
+    "", "{", "[]", "1", "x" * 9000, "[" * 4000, b"\xff\x00", '{"kind": []}', '{"kind": "clear"}',
+    json.dumps({"kind": "seek", "place": "x"}), '{"kind":"seek","place":NaN}', '{"kind":"seek","place":1e999}',
+    json.dumps({"kind": "seek", "place": True}), json.dumps({"kind": "answer", "yes": 1}),
+    json.dumps({"kind": "condition", "id": "joint.velocity\n"}), json.dumps({"kind": "condition", "id": "a" * 61}),
+    json.dumps({"kind": "peek"}), json.dumps({"kind": "peek", "branch": -1}),
+    json.dumps({"kind": "branch", "index": 10**30}), json.dumps({"kind": "tab", "index": -1}),
+    *(json.dumps({"kind": "edit", **edit}) for edit in (
+        {"what": "select", "key": 1}, {"what": "clear", "key": 1, "place": 1}, {"what": ["up"], "key": 1, "place": 0},
+        {"what": "select", "key": "x", "place": 0}, {"what": "select", "key": -1, "place": 0},
+    )),
+)  # fmt: skip
+
+
 def test_stop_and_seek_arrive_over_the_live_channel_and_garbage_does_not_hurt_it(door):
     door.stops.clear()
+    door.received.clear()
+    door.malformed = 0
     with door.connect("/rcilab/live") as page:
         assert isinstance(json.loads(page.recv(timeout=10)), dict)
         page.send(json.dumps({"kind": "seek", "place": 0.5}))  # Of nobody that we know.
         page.send(json.dumps({"kind": "hello", "page": 7, "key": door.live.introduce(7)}))
-        for garbage in (
-            "",
-            "{",
-            "[]",
-            "1",
-            json.dumps({"kind": "seek", "place": "x"}),
-            '{"kind":"seek","place":NaN}',
-            "x" * 9000,
-            b"\xff\x00",
-        ):
+        for garbage in GARBAGE:
             page.send(garbage)
         page.send(json.dumps({"kind": "seek", "place": 7.0}))
         page.send(json.dumps({"kind": "seek", "place": 0.25}))
         page.send(json.dumps({"kind": "stop"}))
         assert door.stops.wait(10.0)
-    assert door.seeks == [1.0, 0.25]
+    assert door.received == [(7, Here()), (7, Seek(7.0)), (7, Seek(0.25))]
+    assert door.malformed == len(GARBAGE)
+    door.live.forget(7)
 
 
 def test_published_values_reach_every_page_and_the_next_one_too(door):
@@ -227,7 +231,7 @@ def test_published_values_reach_every_page_and_the_next_one_too(door):
 
 
 def test_only_a_page_that_brings_its_key_is_somebody(door):
-    door.here.clear()
+    door.received.clear()
     key = door.live.introduce(5)
     words = [{"kind": "here"}, {"kind": "take"}, {"kind": "answer", "yes": True}]
     with door.connect("/rcilab/live") as page:
@@ -237,9 +241,8 @@ def test_only_a_page_that_brings_its_key_is_somebody(door):
                 page.send(json.dumps(said))
         for said in ({"kind": "hello", "page": 5, "key": key}, *words, {"kind": "answer", "yes": 1}):
             page.send(json.dumps(said))
-        wait_for(lambda: len(door.asked) >= 2)
-    assert door.here == [5, 5]
-    assert door.asked == [5, (5, True)]
+        wait_for(lambda: len(door.received) >= 4)
+    assert door.received == [(5, message) for message in (Here(), Here(), Take(), Answer(yes=True))]
     door.live.forget(5)
 
 

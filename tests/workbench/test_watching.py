@@ -12,6 +12,7 @@ import pytest
 import viser
 from websockets.sync.client import ClientConnection, connect
 
+from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, told, wait
@@ -86,15 +87,29 @@ def poke(value: object, handle: Any) -> object:
     return "rci://192.0.2.1:1337" if isinstance(value, str) else value
 
 
+ACTS: tuple[tuple[str, dict[str, object]], ...] = (
+    ("seek", {"place": 0.7}),
+    ("size", {"height": 333.0}),
+    ("peek", {"branch": 1}),
+    ("branch", {"index": 1}),
+    ("condition", {"id": "joint.velocity"}),
+    ("edit", {"what": "undo", "key": 0, "place": 0}),
+    ("edit", {"what": "delete", "key": 1, "place": 0}),
+)
+
+
 def test_no_control_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
         assert bench.store.state.lease.holder == operator.page
+        bench.conductor.ask(EditProgram(page=operator.page, what="add"))
+        wait(lambda: bool(bench.store.state.program.draft.steps), "a waypoint")
+        wait(lambda: bench.store.state.world.status is not None, "the state of the simulation")
         before = bench.store.state
         shown = {name: handle.value for name, handle in controls(bench).items() if not handle._impl.is_button}
         for name, handle in controls(bench).items():
             if "controls" not in name:
                 watcher.set(handle, True if handle._impl.is_button else poke(handle.value, handle))
-        for kind, values in (("seek", {"place": 0.7}), ("size", {"height": 333.0}), ("peek", {"branch": 1})):
+        for kind, values in ACTS:
             watcher.say(kind, **values)
         watcher.settle()
         wait(lambda: told(bench) == "notice.watching", "the watching page to be told")

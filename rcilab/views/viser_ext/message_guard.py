@@ -145,6 +145,10 @@ class MessageGuard:
             handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
             if handle is not None and not handle._impl.is_button:
                 state.message_buffer.push(self._kinds.GuiUpdateMessage(message.uuid, {"value": handle.value}))
+        self.refuse(client)
+
+    def refuse(self, client: int) -> None:
+        """Reports that a page has used a control and may not, at most once a second for each page."""
         now = time.monotonic()
         if now - self._refused.get(client, float("-inf")) >= _REFUSED_AGAIN:
             self._refused[client] = now

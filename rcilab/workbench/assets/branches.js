@@ -1,16 +1,14 @@
 // The branch list of the Target tab: the row under the mouse, or with the focus, is shown in the scene; Enter, Space or
-// a click chooses it, by pressing the button of viser's that stands hidden behind the list.
+// a click chooses it.
 (() => {
   "use strict";
-  let told = -1, had = -1;
+  let told = null, had = -1;
 
   const rows = () => [...document.querySelectorAll(".rl-branch")];
   const rowOf = (node) => node instanceof Element ? node.closest(".rl-branch") : null;
 
   const choose = (row) => {
-    const group = document.querySelector("div:has(> .rl-choice) + div, div:has(> div > .rl-choice) + div");
-    const button = group && group.querySelectorAll("button")[Number(row.dataset.branch)];
-    if (button) button.click();
+    window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "branch", index: Number(row.dataset.branch) } }));
   };
 
   document.addEventListener("click", (event) => {
@@ -44,7 +42,7 @@
   setInterval(() => {
     keep();
     const seen = document.querySelector(".rl-branch:hover") || rowOf(document.activeElement);
-    const branch = seen && seen.getClientRects().length ? Number(seen.dataset.branch) : -1;
+    const branch = seen && seen.getClientRects().length ? Number(seen.dataset.branch) : null;
     if (branch === told) return;
     told = branch;
     window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "peek", branch } }));

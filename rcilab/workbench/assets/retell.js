@@ -1,10 +1,11 @@
 // viser has one throttle for all its controls: within 50 ms, what is told of one replaces what was to be told of another.
 // So a text box that is left right after its last key is told once more when nothing has been typed for a moment. After
 // that, whoever has left a box or pressed Enter in it need not wait until the typing has paused: what is there counts.
+// What is chosen in a list ("rl-act") goes by our own connection, which is faster than viser's: it waits for the text.
 (() => {
   "use strict";
   const WINDOW = 80, left = new Map();  // [ms] A little more than viser's.
-  let last = -Infinity, box = null, timer = 0, saying = 0, isUnsaid = false;
+  let last = -Infinity, box = null, timer = 0, saying = 0, isUnsaid = false, acts = [];
 
   const retell = () => {
     timer = 0;
@@ -28,13 +29,19 @@
   const say = () => {
     if (timer) return enter();  // Something is still to be told.
     isUnsaid = false;
-    window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "entered" } }));
+    [{ kind: "entered" }, ...acts.splice(0)].forEach(send);
   };
+  const send = (detail) => window.dispatchEvent(new CustomEvent("rl-say", { detail }));
+  window.addEventListener("rl-act", ({ detail }) => {
+    if (!isUnsaid) return send(detail);
+    if (!acts.length) enter();
+    acts.push(detail);
+  });
 
   document.addEventListener("keydown", (event) => { if (event.key === "Enter" && event.target === box) enter(); }, true);
   document.addEventListener("input", (event) => {
     if (!event.isTrusted) return;
-    clearTimeout(saying);
+    if (!acts.length) clearTimeout(saying);
     isUnsaid = true;
     last = performance.now();
     box = event.target;

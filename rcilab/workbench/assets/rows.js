@@ -1,9 +1,9 @@
 // The list of the Program tab: rows that are chosen, moved and deleted by mouse and keyboard, and the button that copies
-// the script. What is done is written into a hidden field of viser's, so that it comes from this page and no other.
+// the script.
 (() => {
   "use strict";
   const LATE = 1500;  // [ms] A choice: for so long the list may still come as it was before the last choice.
-  let serial = Date.now(), had = false, dragged = null, waiting = [], timer = 0, picked = null, since = 0;
+  let had = false, dragged = null, picked = null, since = 0;
 
   const listOf = (node) => node instanceof Element ? node.closest(".rl-steps") : null;
   const rows = (list) => [...list.querySelectorAll("[data-key]")];
@@ -13,21 +13,10 @@
     return mine >= 0 ? mine : find(list, (row) => row.getAttribute("aria-selected") === "true");
   };
 
-  const flush = () => {
-    timer = 0;
-    const words = waiting.shift();
-    const field = document.querySelector("div:has(> .rl-bridge) + div input, div:has(> div > .rl-bridge) + div input");
-    if (!words || !field) { waiting = []; return; }
-    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(field, `${++serial}:${words}`);
-    field.dispatchEvent(new Event("input", { bubbles: true }));
-    timer = setTimeout(flush, 80);  // viser passes on no more than twenty a second.
-  };
-
   const say = (what, key, place = 0) => {
     if (what === "select") { picked = key; since = performance.now(); }
     if (["delete", "duplicate", "undo", "redo"].includes(what)) picked = null;  // Another row will be chosen for us.
-    waiting.push(`${what}:${key}:${place}`);
-    if (!timer) flush();
+    window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "edit", what, key: Number(key), place: Number(place) } }));
   };
 
   const choose = (list, place) => {

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.goal_actions import ChooseBranch
 from rcilab.app.goal.target_status import NEAR_LIMIT, margin, telling_joints
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
@@ -15,27 +14,18 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_MOST = 16
-
 
 class BranchesPanel:
-    """A list for mouse and keyboard. A chosen row presses a hidden button, so that it comes from this page."""
+    """A list for mouse and keyboard; `branches.js` sends which row is chosen."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
-        self._text, self._ask = text, ask
+        self._text = text
         self._seen: tuple[object, ...] = (None, None, None)
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the list."""
-        text, ask = self._text, self._ask
-        with gui.add_folder(text("target.branches")):
+        with gui.add_folder(self._text("target.branches")):
             self._rows = Html(gui)
-            gui.add_html('<i class="rl-choice"></i>')
-            choice = gui.add_button_group(" ", [str(number) for number in range(1, _MOST + 1)])
-
-            @choice.on_click
-            async def _(event: Any) -> None:
-                ask(ChooseBranch(page=event.client_id, index=int(event.target.value) - 1))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows goal and arm."""

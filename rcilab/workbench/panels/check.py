@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _MOMENT = 0.5  # [s] A choice: what takes longer gets a bar and a way to end it.
-_SAID = re.compile(r"[0-9]+:([a-z_.]{1,60})")
 
 
 class CheckPanel:
@@ -53,15 +51,6 @@ class CheckPanel:
             on_press(self._cancel, ask, lambda page: PressCheck(page=page, what="cancel"))
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._answer = Html(gui)
-        gui.add_html('<i class="rl-saybridge"></i>')
-        bridge = gui.add_text(text("check.rows"), "")  # Not shown: pick.js writes into it which row was clicked.
-
-        @bridge.on_update
-        async def _(event: Any) -> None:
-            found = _SAID.fullmatch(event.target.value)
-            if event.client_id is not None and found is not None:
-                ask(PressCheck(page=event.client_id, what="row", row=found[1]))
-
         self._table = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:

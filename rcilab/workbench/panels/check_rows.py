@@ -57,7 +57,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     source = explain_source(condition, text.language)
     current = ' aria-current="true"' if condition.id == chosen else ""
     return (
-        f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-say="{esc(condition.id)}"{current} '
+        f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-condition="{esc(condition.id)}"{current} '
         f'title="{esc(text("check.row_hint"))}">'
         f'<div class="rl-line"><i class="rl-sign">{_SIGNS[tone]}</i><b>{esc(name)}</b>'
         f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row)}</span></div>'

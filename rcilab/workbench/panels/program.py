@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +30,6 @@ _TOOLS = (
 )  # fmt: skip
 _SAME = math.radians(1e-4)  # [rad] A joint that is nearer to the start of the program stands there.
 _MOMENT = 0.25  # [s] A choice: a bar that comes and goes faster only flickers.
-_SAID = re.compile(r"[0-9]+:(select|move|up|down|delete|duplicate|undo|redo):([0-9]{1,9}):([0-9]{1,9})")
 
 
 class ProgramPanel:
@@ -55,15 +53,6 @@ class ProgramPanel:
                 on_press(button, ask, _edit("add", source=source))
         self._refused = Html(gui)
         self._list = Html(gui)
-        gui.add_html('<i class="rl-bridge"></i>')
-        bridge = gui.add_text(text("program.list"), "")  # Not shown: rows.js writes into it what is done in the list.
-
-        @bridge.on_update
-        async def _(event: Any) -> None:
-            request = read_row(event.target.value, event.client_id)
-            if request is not None:
-                ask(request)
-
         with gui.add_folder(text("program.tools")):
             gui.add_html('<i class="rl-tools rl-bare"></i>')
             self._tools: dict[str, Any] = {}
@@ -145,15 +134,6 @@ class ProgramPanel:
             return self._text("program.not_planned")
         joint = int(travel.argmax())
         return self._text("program.elsewhere", joint=joint + 1, angle=float(travel[joint]))
-
-
-def read_row(said: str, page: int | None) -> EditProgram | None:
-    """Returns what somebody did in the list: NUMBER:WHAT:KEY:PLACE; None for anything else."""
-    found = _SAID.fullmatch(said)
-    if page is None or found is None:
-        return None
-    what: Any = found[1]
-    return EditProgram(page=page, what=what, key=int(found[2]), place=int(found[3]))
 
 
 def _edit(what: Any, **values: Any):  # type: ignore[no-untyped-def]
