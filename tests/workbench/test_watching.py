@@ -62,8 +62,10 @@ def script(bench: Workbench) -> Iterator[Script]:
     protocol: Any = f"viser-v{viser.__version__}"
     address = f"ws://127.0.0.1:{bench.port}"
     with (
-        connect(f"{address}/", additional_headers=origin, subprotocols=[protocol], max_size=None) as link,
-        connect(f"{address}/rcilab/live", additional_headers=origin) as bar,
+        connect(
+            f"{address}/", additional_headers=origin, subprotocols=[protocol], max_size=None, ping_interval=None
+        ) as link,
+        connect(f"{address}/rcilab/live", additional_headers=origin, ping_interval=None) as bar,
     ):
         yield Script(bench, link, bar)
 
@@ -102,7 +104,8 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
         assert bench.store.state.lease.holder == operator.page
         bench.conductor.ask(EditProgram(page=operator.page, what="add"))
-        wait(lambda: bool(bench.store.state.program.draft.steps), "a waypoint")
+        (dwell,) = [handle for name, handle in controls(bench).items() if name.startswith("Dwell")]
+        wait(lambda: dwell.value == "0.00", "a waypoint to be shown")
         wait(lambda: bench.store.state.world.status is not None, "the state of the simulation")
         before = bench.store.state
         shown = {name: handle.value for name, handle in controls(bench).items() if not handle._impl.is_button}
