@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
+from rcilab.views.viser_ext.orientation import turn
 
 if TYPE_CHECKING:
     import viser
@@ -98,7 +98,7 @@ class ViserScene:
         """Moves a node; see `Scene`."""
         handle = self._handle(name)
         if wxyz is not None:
-            _turn(handle, wxyz)
+            turn(handle, wxyz)
         if position is not None:
             handle.position = position
 
@@ -153,29 +153,6 @@ class ViserScene:
             return self._handles[name]
         except KeyError:
             raise unknown_node(name) from None
-
-
-def _turn(handle: Any, wxyz: Sequence[float]) -> None:
-    """Does what `handle.wxyz = wxyz` does, in a tenth of the time: viser 1.1 compares by `np.allclose` before it sends.
-
-    Arms are turned joint by joint at the display's rate, and only joints that have moved.
-    """
-    node, turned = handle._impl, tuple(wxyz)
-    node.wxyz[:] = turned
-    node.api._queue_scene_message(_turned_message()(node.name, turned))
-
-
-@cache
-def _turned_message() -> Any:
-    """Returns viser's `SetOrientationMessage`, but for how it is written: viser asks for the type of each number."""
-    from viser import _messages
-
-    class TurnedMessage(_messages.SetOrientationMessage):
-        def as_serializable_dict(self, binary_buffers: list[memoryview] | None = None) -> dict[str, Any]:
-            return {"name": self.name, "wxyz": self.wxyz, "owner": self.owner, "type": "SetOrientationMessage"}
-
-    TurnedMessage.__name__ = "SetOrientationMessage"  # Newer ones replace older ones of the same name and node.
-    return TurnedMessage
 
 
 def _line_colors(colors: np.ndarray) -> np.ndarray:

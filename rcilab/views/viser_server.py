@@ -2,8 +2,8 @@
 
 viser 1.1 binds every interface by default, takes the next port when the wanted one is busy, answers a websocket from
 any Origin (so any web page in the operator's browser could press our buttons), opens a public tunnel when a client
-asks for it, and writes whatever a client sends into its handles, NaN and callback lists included. Everything that
-stands against this is in this file, in `gate` and in `message_guard`, and the tests try each door.
+asks for it, and writes whatever a client sends into its handles, NaN and callback lists included. What prevents this
+is in this file, in `access_control`, `viser_ext.server_start` and `viser_ext.message_guard`.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from __future__ import annotations
 import asyncio
 import logging
 import socket
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from functools import partial
 from http import HTTPStatus
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from rcilab.core.closeable import Closeable
 from rcilab.views.access_control import Gate, Guesses, Refusal
 from rcilab.views.arrivals import BACKLOG, Arrivals, watch_loop
-from rcilab.views.viser_ext import assignments, icons, loop_event, sendable
 from rcilab.views.viser_ext.message_guard import LARGEST_MESSAGE, MessageGuard
-from rcilab.views.viser_ext.version_guard import require_known_viser
+from rcilab.views.viser_ext.server_start import start_server, stop_server
 
 if TYPE_CHECKING:
     import viser
@@ -73,73 +73,47 @@ class GuardedServer(Closeable):
         may_act: Callable[[int], bool] = lambda page: True,
         refuse: Callable[[int], None] = lambda page: None,
     ) -> None:
-        import viser
-        from viser import _messages
-
         self._gate, self._guesses = gate, Guesses()
-        self._protocol = f"viser-v{viser.__version__}"
+        self._protocol = f"viser-v{version('viser')}"
         self._decorate = decorate
         self._routes = dict(routes or {})
-        require_known_viser()
-        loop_event.install()
-        assignments.install()
-        icons.install()
-        sendable.install()
-        with self._serving(bound), _quiet():
-            self.viser: viser.ViserServer = viser.ViserServer(host=gate.host, port=gate.port, verbose=False)
-        sockets = self.viser._websock_server  # What is called on it below has no public spelling in viser 1.1.
-        sockets.unregister_handler(_messages.ShareUrlRequest)
-        sockets.unregister_handler(_messages.ShareUrlDisconnect)
+        self.viser: viser.ViserServer = start_server(gate.host, gate.port, partial(self._adapt, bound))
         self.guard = MessageGuard(self.viser, may_act, refuse)
 
     def close(self) -> None:
         """Stops serving."""
-        with _quiet():
-            self.viser.stop()
+        stop_server(self.viser)
 
-    @contextmanager
-    def _serving(self, bound: socket.socket) -> Iterator[None]:
-        """Replaces the `serve` that viser's server thread is about to call."""
-        import websockets.asyncio.server as serving
+    def _adapt(self, bound: socket.socket, handler: Any, options: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+        """Puts the gate, the guard and our own websockets in front of viser's handler of connections."""
+        answer = options["process_request"]
+        arrivals = Arrivals()
+        watch_loop(asyncio.get_running_loop())
 
-        original = serving.serve
+        async def route(connection: Any) -> None:
+            own = self._routes.get(_path_of(connection.request))
+            if own is not None:
+                await own(connection)
+            else:
+                self.guard.listen(connection)
+                await handler(connection)
 
-        def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
-            del host, port  # viser would try the next port; the socket is bound to the one we want.
-            answer = options.pop("process_request")
-            arrivals = Arrivals()
-            watch_loop(asyncio.get_running_loop())
+        def process(connection: Any, request: Any) -> Any:
+            arrivals.served(connection)
+            return self._answer(answer, connection, request)
 
-            async def route(connection: Any) -> None:
-                own = self._routes.get(_path_of(connection.request))
-                if own is not None:
-                    await own(connection)
-                else:
-                    self.guard.listen(connection)
-                    await handler(connection)
-
-            def process(connection: Any, request: Any) -> Any:
-                arrivals.served(connection)
-                return self._answer(answer, connection, request)
-
-            # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
-            quiet = logging.getLogger("rcilab.page")
-            quiet.setLevel(logging.CRITICAL)
-            ours = {
-                "sock": bound,
-                "backlog": BACKLOG,
-                "process_request": process,
-                "create_connection": arrivals.build_connection,
-                "logger": quiet,
-                "max_size": LARGEST_MESSAGE,
-            }
-            return original(route, **{**options, **ours})
-
-        serving.serve = serve
-        try:
-            yield
-        finally:
-            serving.serve = original
+        # A browser opens connections ahead of need and drops them unused; that is no error worth a traceback.
+        quiet = logging.getLogger("rcilab.page")
+        quiet.setLevel(logging.CRITICAL)
+        ours = {
+            "sock": bound,
+            "backlog": BACKLOG,
+            "process_request": process,
+            "create_connection": arrivals.build_connection,
+            "logger": quiet,
+            "max_size": LARGEST_MESSAGE,
+        }
+        return route, {**options, **ours}
 
     def _answer(self, answer: Callable[[Any, Any], Any], connection: Any, request: Any) -> Any:
         """Returns the response to a request, or None to go on and open a websocket."""
@@ -214,19 +188,3 @@ def _refusal(reason: str, status: HTTPStatus = HTTPStatus.FORBIDDEN) -> Any:
     body = f"{status.value}: {reason}\n".encode()
     headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
     return Response(status.value, status.phrase, headers, body)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps viser's box of addresses and its parting words away: our callers say where the page is, in one line.
-
-    viser prints through rich, which in a notebook does not go through stdout.
-    """
-    import rich
-
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = before

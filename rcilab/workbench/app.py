@@ -27,10 +27,11 @@ from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store, UiState
 from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
 from rcilab.views.access_control import Gate
+from rcilab.views.viser_ext.client_messages import send_file
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
 from rcilab.workbench import live, security
-from rcilab.workbench.page import decorate, introduce, send_file
+from rcilab.workbench.page import decorate, introduce
 from rcilab.workbench.renderer import Renderer, tab_name
 
 if TYPE_CHECKING:

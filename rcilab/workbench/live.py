@@ -24,7 +24,7 @@ _Index: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=99)]
 _Key: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=10**9)]
 
 
-class PageMessage(msgspec.Struct, frozen=True, tag_field="kind", tag=str.lower):
+class PageMessage(msgspec.Struct, tag_field="kind", tag=str.lower):
     """What a page may send: JSON objects whose `kind` is the name of a class below."""
 
 

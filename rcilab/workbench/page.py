@@ -3,14 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
-import mimetypes
-import os
-import time
-from collections.abc import Callable
 from importlib.resources import files
-from typing import IO, TYPE_CHECKING, Any
-from uuid import uuid4
+from typing import TYPE_CHECKING
 
 from rcilab.views.viser_ext.client_messages import run_javascript
 
@@ -18,9 +12,6 @@ if TYPE_CHECKING:
     import viser
 
 _BRAND = (11, 111, 194)
-_PART = 1024 * 1024  # [bytes] As viser.
-_WAITING = 8  # Messages of a page that may wait for their way while a file is sent.
-_PAUSE = 0.005  # [s]
 
 
 def decorate(index: bytes, quality: str = "full") -> bytes:
@@ -54,41 +45,3 @@ def dress(server: viser.ViserServer, theme: str) -> None:
     server.gui.configure_theme(
         brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium", dark_mode=theme == "dark"
     )
-
-
-def send_file(client: viser.ClientHandle, name: str, stream: IO[bytes], is_unwanted: Callable[[], bool]) -> bool:
-    """Hands a file to a page's browser, part by part, so that it need not fit into memory; returns whether all went.
-
-    `client.send_file_download` takes all of it at once.
-
-    Args:
-        client: The page.
-        name: What the browser saves it as.
-        stream: Read from its beginning.
-        is_unwanted: Asked between the parts; True gives up.
-    """
-    from viser import _messages
-
-    connection: Any = client.gui._websock_interface
-    buffer = connection.get_message_buffer()
-    size = stream.seek(0, os.SEEK_END)
-    stream.seek(0)
-    transfer = str(uuid4())
-    kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-    connection.queue_message(
-        _messages.FileTransferStartDownload(
-            save_immediately=True, transfer_uuid=transfer, filename=name, mime_type=kind,
-            part_count=math.ceil(size / _PART), size_bytes=size,
-        )
-    )  # fmt: skip
-    for place in range(math.ceil(size / _PART)):
-        while len(buffer.message_from_id) > _WAITING and not buffer.done:
-            if is_unwanted():
-                return False
-            time.sleep(_PAUSE)
-        if buffer.done or is_unwanted():
-            return False
-        part = _messages.FileTransferPart(None, transfer_uuid=transfer, part_index=place, content=stream.read(_PART))
-        connection.queue_message(part)
-        client.flush()
-    return True

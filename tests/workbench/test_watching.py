@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -12,8 +13,11 @@ import pytest
 import viser
 from websockets.sync.client import ClientConnection, connect
 
+from rcilab.app.control_lock_actions import Refuse
 from rcilab.app.program.edit_actions import EditProgram
+from rcilab.app.request import Request
 from rcilab.app.run.target_robot_actions import ChooseDestination
+from rcilab.app.view_actions import CommitField
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, told, wait
 
@@ -89,38 +93,53 @@ def poke(value: object, handle: Any) -> object:
     return "rci://192.0.2.1:1337" if isinstance(value, str) else value
 
 
-ACTS: tuple[tuple[str, dict[str, object]], ...] = (
-    ("seek", {"place": 0.7}),
-    ("size", {"height": 333.0}),
-    ("peek", {"branch": 1}),
-    ("branch", {"index": 1}),
-    ("condition", {"id": "joint.velocity"}),
-    ("edit", {"what": "undo", "key": 0, "place": 0}),
-    ("edit", {"what": "delete", "key": 1, "place": 0}),
-)
-
-
 def test_no_control_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
         assert bench.store.state.lease.holder == operator.page
-        bench.conductor.ask(EditProgram(page=operator.page, what="add"))
-        (dwell,) = [handle for name, handle in controls(bench).items() if name.startswith("Dwell")]
-        wait(lambda: dwell.value == "0.00", "a waypoint to be shown")
-        wait(lambda: bench.store.state.world.status is not None, "the state of the simulation")
         before = bench.store.state
         shown = {name: handle.value for name, handle in controls(bench).items() if not handle._impl.is_button}
         for name, handle in controls(bench).items():
             if "controls" not in name:
                 watcher.set(handle, True if handle._impl.is_button else poke(handle.value, handle))
-        for kind, values in ACTS:
+        for kind, values in (("seek", {"place": 0.7}), ("size", {"height": 333.0}), ("peek", {"branch": 1})):
             watcher.say(kind, **values)
         watcher.settle()
         wait(lambda: told(bench) == "notice.watching", "the watching page to be told")
         after = bench.store.state
-        ours = [name for name in before.__dataclass_fields__ if name not in ("notices", "entered", "lease")]
+        ours = [name for name in before.__dataclass_fields__ if name not in ("notices", "entered", "lease", "world")]
         assert [name for name in ours if getattr(after, name) is not getattr(before, name)] == []
+        assert replace(after.world, status=None) == replace(before.world, status=None)  # The simulation reports on.
         assert {name: handle.value for name, handle in controls(bench).items() if name in shown} == shown
         assert bench.session.status().phase == "idle"
+
+
+def test_no_row_of_a_watching_page_leads_anywhere(bench):
+    with script(bench) as operator, script(bench) as watcher:
+        bench.conductor.ask(EditProgram(page=operator.page, what="add"))
+        wait(lambda: bool(bench.store.state.program.draft.steps), "a waypoint")
+        asked = []
+        take = bench.conductor.ask
+
+        def ask(request: Request) -> None:
+            asked.append(request)
+            take(request)
+
+        before = bench.store.state
+        key = before.program.draft.steps[0].key
+        rows: list[tuple[str, dict[str, Any]]] = [
+            ("condition", {"id": "joint.velocity"}), ("branch", {"index": 1}),
+            *(("edit", {"what": what, "key": key, "place": 0}) for what in ("delete", "duplicate", "undo", "select")),
+        ]  # fmt: skip
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(bench.conductor, "ask", ask)
+            for kind, values in rows:
+                watcher.say(kind, **values)
+            watcher.settle()
+        assert {type(request) for request in asked if request.page == watcher.page} <= {Refuse, CommitField}
+        after = bench.store.state
+        assert (after.program, after.goal, after.check) == (before.program, before.goal, before.check)
+        operator.say("edit", what="delete", key=key, place=0)
+        wait(lambda: not bench.store.state.program.draft.steps, "the operator's message to be acted on")
 
 
 def test_what_a_page_typed_goes_with_its_controls(bench):

@@ -1,4 +1,5 @@
 // Groups stay folded or open as somebody left them: viser builds them anew with the page, and with another language.
+// Unnecessary once viser keeps the state of a folder in the browser, by its label.
 (() => {
   "use strict";
   const KEY = "rcilab.folds", PAUSE = 120;  // [ms] A choice: between two looks, whatever changes meanwhile.

@@ -2,6 +2,7 @@
 // before a frame's labels are drawn, those that would be seen in part are moved until they are seen whole, and those that
 // would lie on another one are moved above it.
 // viser 1.1 has no public way to its labels; where they are not found as expected, they stay as viser has them.
+// Unnecessary once viser keeps labels inside the scene, and apart from each other.
 (() => {
   "use strict";
   const LOOK = 700, MARGIN = 6;  // [ms] between two looks for viser's labels; [px] A choice.

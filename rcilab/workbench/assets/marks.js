@@ -1,6 +1,7 @@
 // What viser's boxes hold, written on them as data-rl, so that the style sheet can tell them apart. It could ask with
 // :has(), but with a hundred such questions the browser looks at the whole page again whenever a piece of HTML changes,
 // which took 45 ms instead of half of one. Done in the same breath as viser's change, before anything is drawn.
+// Unnecessary once viser gives its controls classes of the application's own.
 (() => {
   "use strict";
   // .rl-NAME, an element of ours: "NAME" is the box around the one it is in, as viser wraps every control; "in-NAME" that.

@@ -2,6 +2,7 @@
 // nowhere. A name is the label of the row, with the heading above where there is one; a box without a label is that of
 // the control before it. Folders open with a mouse only: they become buttons. The hint of a button lies in its icon
 // (views/icons.py), since viser shows none. All of it again whenever viser redraws.
+// Unnecessary once viser names sliders, text boxes and picture buttons, shows hints, and makes folders buttons.
 (() => {
   "use strict";
   const PAUSE = 200;  // [ms] A choice: between two looks, whatever changes meanwhile.

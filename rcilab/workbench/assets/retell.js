@@ -2,6 +2,7 @@
 // So a text box that is left right after its last key is told once more when nothing has been typed for a moment. After
 // that, whoever has left a box or pressed Enter in it need not wait until the typing has paused: what is there counts.
 // What is chosen in a list ("rl-act") goes by our own connection, which is faster than viser's: it waits for the text.
+// Unnecessary once viser throttles each control by itself.
 (() => {
   "use strict";
   const WINDOW = 80, left = new Map();  // [ms] A little more than viser's.
