@@ -10,15 +10,17 @@ import ipywidgets
 
 from rcilab.app.connection import Robot
 from rcilab.app.robot_connection import RobotConnection
+from rcilab.app.run.drive_state import parameter_obstacle
 from rcilab.app.run.mode_actions import ModeActions
-from rcilab.app.run.plan_readiness import ask_to_move
+from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, plan_obstacle
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.session_connection import SessionConnection
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
-from rcilab.core.errors import PlanningError, RcilabError
+from rcilab.core.errors import SAFETY_STOP, PlanningError, RcilabError
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import normalise_address
 from rcilab.makers.maker import require_driver
 from rcilab.notebook.browser_heartbeat import kernel_heart
@@ -26,7 +28,6 @@ from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.part import Part
-from rcilab.notebook.ready import obstacle
 from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
 from rcilab.notebook.signal_fields import SignalFields
 from rcilab.notebook.speed_fields import SpeedFields
@@ -272,7 +273,7 @@ class RunPanel(Part):
         self._show()
 
     def _on_execute(self) -> None:
-        reason, plan = obstacle(self.state), self.state.now.plan
+        reason, plan = _obstacle(self.state), self.state.now.plan
         if reason is not None:
             write(self._said, problem(self.text.say(reason)))
             return
@@ -286,7 +287,7 @@ class RunPanel(Part):
 
     def _move(self) -> None:
         self._forget_question()
-        reason, plan = obstacle(self.state), self.state.now.plan
+        reason, plan = _obstacle(self.state), self.state.now.plan
         if reason is None and plan is not None:
             self.state.exhibit(None)
             self.state.look_at(None)
@@ -312,7 +313,7 @@ class RunPanel(Part):
         self.connect.layout.display = "none" if status is not None else None
         is_own = isinstance(state.robot, RobotConnection)
         self.disconnect.layout.display = None if is_own else "none"
-        reason = obstacle(state)
+        reason = _obstacle(state)
         self.execute.disabled = reason is not None
         powered = None if status is None else status.powered
         is_pressed = status is not None and status.is_pressed
@@ -378,3 +379,18 @@ class RunPanel(Part):
 
         button.on_click(press)
         return button
+
+
+def _obstacle(state: LabState) -> Message | None:
+    """Returns what stands in the way of Execute, or None when it may be pressed."""
+    status = state.status
+    if status is None:
+        return message("ready.closed")
+    if status.phase == "closed" and state.session is not None:
+        return message("ready.session_closed")
+    was_stop = status.phase == "fault" and state.error is not None and state.error.code == SAFETY_STOP
+    is_released = status.code == "fault.released" or was_stop
+    resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed, is_released=is_released)
+    if resting is not None or state.now.plan is None:
+        return resting or plan_obstacle(None, status.q_c)
+    return parameter_obstacle(state.now, status) or plan_obstacle(state.now.plan, status.q_c)
