@@ -11,7 +11,7 @@ import pytest
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition
 from rcilab.core.spatial import Pose, turn_between
-from rcilab.makers.rokae.controller.settings import default_settings
+from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import load_model
 from rcilab.sim.arm_parameters import ForceAxesKind
 from rcilab.sim.force_frame import ForceAxes
@@ -95,7 +95,7 @@ def test_a_path_that_reverses_does_not_throw_the_arm_that_presses(robot, directi
 
 
 def test_the_axes_of_a_path_turn_by_a_bounded_step_and_arrive():
-    settings = replace(default_settings(MODEL.description), force_axes=ForceAxesKind.PATH)
+    settings = replace(Settings.of(MODEL.description), force_axes=ForceAxesKind.PATH)
     axes = ForceAxes(MODEL, settings)
     tool = MODEL.forward(MODEL.home)
     axes.follow([0.0, 0.1, 0.0], tool)

@@ -21,7 +21,7 @@ from rcilab.app.text import Text, load_catalogue
 from rcilab.app.view_actions import ShowPlot
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
-from rcilab.makers.rokae.controller.settings import default_settings
+from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench
@@ -83,7 +83,7 @@ def execute(bench, place=0.3):
 
 
 def test_what_the_page_takes_for_defaults_is_what_the_virtual_controller_wakes_up_with():
-    ours, woken = standard_control(MODEL.limits), default_settings(MODEL.description)
+    ours, woken = standard_control(MODEL.limits), Settings.of(MODEL.description)
     assert ours.joint_stiffness == woken.joint_stiffness
     assert ours.cartesian_stiffness == woken.cartesian_stiffness
     assert ours.desired_wrench == woken.desired_wrench

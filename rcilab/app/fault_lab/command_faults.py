@@ -126,8 +126,9 @@ def _tool_velocity(scene: Scene) -> Callback:
 
 
 def _joint_acceleration(scene: Scene) -> Callback:
-    bound = scene.limits.joint.acceleration[3 if scene.robot.model.n == 7 else 2]
-    return joint_stream(scene.start.q_c, scene.robot.model.n - 4, path(rise(0.97, 2.0 * bound, 80)))
+    elbow = scene.robot.model.n - 4  # Joint 4 of seven, joint 3 of six, from 0.
+    bound = scene.limits.joint.acceleration[elbow]
+    return joint_stream(scene.start.q_c, elbow, path(rise(0.97, 2.0 * bound, 80)))
 
 
 def _tool_acceleration(scene: Scene) -> Callback:

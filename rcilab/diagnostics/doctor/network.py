@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rcilab.core.errors import ConnectionLostError
 from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.doctor.system import System
-from rcilab.makers.rokae.driver.address import RobotAddress, Route, choose_route
+from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
 from rcilab.realtime.punctual import PRIORITY
 
@@ -58,7 +58,7 @@ def check_softirq(system: System) -> Finding:
     return Finding(name, "note", f"{found}: packets can wait behind SCHED_FIFO loops", advice)
 
 
-def check_route(address: RobotAddress, system: System) -> tuple[Finding, Route | None]:
+def check_route(address: RciAddress, system: System) -> tuple[Finding, Route | None]:
     """Does a cable lead from here to the robot, without anything in between? The route goes with the answer."""
     name = "route"
     try:

@@ -12,13 +12,13 @@ from rcilab.diagnostics.doctor.jitter import check_jitter
 from rcilab.diagnostics.doctor.round_trip import check_controller, check_round_trip
 from rcilab.diagnostics.doctor.system import System
 from rcilab.diagnostics.host import BROWSERS, probe_realtime
-from rcilab.makers.rokae.driver.address import RobotAddress
+from rcilab.makers.rokae.driver.address import RciAddress
 
 
 def examine(
     system: System,
     *,
-    robot: RobotAddress | None = None,
+    robot: RciAddress | None = None,
     seconds: float = 0.0,
     progress: Callable[[float, float], None] = lambda spent, worst: None,
 ) -> Iterator[Finding]:

@@ -39,7 +39,7 @@ def model_response(arm: RobotDescription) -> ModelResponse:
     """Returns the answer to LoadRobotModel."""
     rows = [(1000.0 * row.a, row.alpha, 1000.0 * row.d, row.theta_offset) for row in arm.dh]
     dh = [number for row in rows for number in row] + [0.0] * (28 - 4 * arm.n)
-    parameters = base_parameters(arm) if arm.n == 7 else np.zeros(len(_COLUMNS))
+    parameters = base_parameters(arm) if arm.n == len(_SERVED) else np.zeros(len(_COLUMNS))
     return ModelResponse(
         dh=tuple(dh),
         dynamics_with_friction=_in_blocks(parameters, unused=2, friction=3),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.settings import default_settings
+from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.sim.actuator import ControlLaw
@@ -91,7 +91,7 @@ def test_a_motion_that_begins_at_full_jerk_is_no_new_start(make_hand, mode) -> N
 
 
 def test_a_softer_spring_gives_more_tolerance_up_to_a_bound() -> None:
-    settings = default_settings(MODEL.description)
+    settings = Settings.of(MODEL.description)
     stiff = start_tolerance(ControlLaw.POSITION, settings)
     assert stiff.joint == (1e-3,) * 7
     soft = start_tolerance(

@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.controller.settings import Settings, apply_request, default_settings
+from rcilab.makers.rokae.controller.settings import Settings, apply_request
 from rcilab.robots import RobotDescription, describe_robot
 from rcilab.sim.arm_parameters import ForceAxesKind
 
@@ -97,7 +97,7 @@ def arm() -> RobotDescription:
 
 @pytest.fixture
 def settings(arm: RobotDescription) -> Settings:
-    return default_settings(arm)
+    return Settings.of(arm)
 
 
 @pytest.mark.parametrize("request_", GOOD, ids=lambda request_: type(request_).__name__)
@@ -151,7 +151,7 @@ def test_taken_values_are_in_the_settings(settings, arm) -> None:
 
 def test_a_6_axis_arm_looks_at_six_elements_only() -> None:
     arm = describe_robot("xMate3")
-    settings = default_settings(arm)
+    settings = Settings.of(arm)
     for request_ in (
         rci.SetCollisionBehavior((75.0, 75.0, 45.0, 30.0, 30.0, 20.0, NAN)),
         rci.SetJointImpedance((3000.0,) * 3 + (300.0,) * 3 + (NAN,)),
