@@ -35,7 +35,10 @@ def test_an_integer_beyond_every_float_is_a_value_like_others(call):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: rcilab.Program(model="xMatePro7", start=MODEL.home, waypoints=None), "waypoints: None are no list"),
+        (
+            lambda: rcilab.Program(model="xMatePro7", start=MODEL.home, waypoints=None),
+            "waypoints must be a list.*, got None",
+        ),
         (lambda: MODEL.limits.source([]), "limit: .* is unknown; known: joint.lower"),
         (lambda: rcilab.Monitor(MODEL, np.array(["a", "b"])), "mode: .* is unknown"),
     ],
@@ -48,7 +51,7 @@ def test_things_of_another_kind_are_named(call, said):
 def test_a_callback_that_is_none_is_refused_before_anything_starts():
     with rcilab.simulate(MODEL) as robot:
         robot.power_on()
-        with pytest.raises(InvalidValueError, match="callback: 5 is no function"):
+        with pytest.raises(InvalidValueError, match=r"callback must be a function .*, got 5"):
             robot.control(5)
         assert robot.state.controller_mode.name == "OTHER"
 

@@ -10,7 +10,7 @@ from importlib import import_module
 
 from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
 from rcilab.core.errors import RcilabError
-from rcilab.core.memory import STARVED, is_starved
+from rcilab.core.memory import OUT_OF_MEMORY, is_starved
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
@@ -45,11 +45,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (MemoryError, ImportError, RuntimeError) as error:
         if not is_starved(error):
             raise
-        print(f"rcilab: {STARVED}", file=sys.stderr)
+        print(f"rcilab: {OUT_OF_MEMORY}", file=sys.stderr)
         return _USAGE
     except OSError as error:
         if is_starved(error):
-            print(f"rcilab: {STARVED}", file=sys.stderr)
+            print(f"rcilab: {OUT_OF_MEMORY}", file=sys.stderr)
             return _USAGE
         if not is_unwritable(error):
             raise

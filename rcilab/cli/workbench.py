@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.errors import UsageError
-from rcilab.core.memory import STARVED, is_starved
+from rcilab.core.memory import OUT_OF_MEMORY, is_starved
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -146,7 +146,7 @@ def _ended_by_starving(ending: threading.Event) -> Iterator[None]:
     finally:
         threading.excepthook = before
     if died.is_set():
-        raise UsageError(STARVED)
+        raise UsageError(OUT_OF_MEMORY)
 
 
 @contextmanager

@@ -13,7 +13,12 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
-from rcilab.motion.speed_scaling import SpeedScaledMotion, begun_at, changed_pace, require_pace
+from rcilab.motion.speed_scaling import (
+    SpeedScaledMotion,
+    change_speed_override,
+    require_speed_override,
+    start_with_override,
+)
 
 _ATTEMPTS = 12  # Candidates that are checked in full, which bounds the time of a change.
 _PAST = 3  # Rows that the differences of a row reach back to.
@@ -26,7 +31,7 @@ def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> Sp
 
     Args:
         motion: The motion, checked as planned.
-        pace: `SLOWEST_PACE` to 1.
+        pace: `MIN_SPEED_OVERRIDE` to 1.
         model: The arm, with its tool and load.
         mode: How it is commanded.
 
@@ -34,7 +39,7 @@ def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> Sp
         InvalidValueError: The override is out of range.
         PlanningError: At this speed it breaks a condition that it keeps as planned, as torques that hold the arm may.
     """
-    paced = begun_at(motion, require_pace(pace))
+    paced = start_with_override(motion, require_speed_override(pace))
     if not paced.changed:
         return paced
     broken = _breaches(paced, model, mode)
@@ -62,7 +67,9 @@ def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotMod
     Raises:
         PlanningError: There is no such change from there: the motion arrives before, or uses all of a limit until then.
     """
-    for _, candidate in zip(range(_ATTEMPTS), changed_pace(paced, cycle, pace, model.limits.joint), strict=False):
+    for _, candidate in zip(
+        range(_ATTEMPTS), change_speed_override(paced, cycle, pace, model.limits.joint), strict=False
+    ):
         if not _breaches(candidate, model, mode):
             return candidate
     raise PlanningError(

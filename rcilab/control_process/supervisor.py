@@ -54,7 +54,7 @@ from rcilab.makers.configuration import RobotConfiguration, require_setup
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
 from rcilab.makers.maker import maker_of, require_driver
 from rcilab.model.robot_model import require_model
-from rcilab.motion.speed_scaling import SpeedScaledMotion, require_pace
+from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 
 if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate
@@ -340,7 +340,7 @@ class Supervisor(Closeable):
             UsageError: No motion of `execute` is under way, or this machine is too busy.
             PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
         """
-        return self._override_of_motion().change(require_pace(pace))
+        return self._override_of_motion().change(require_speed_override(pace))
 
     @property
     def paced(self) -> SpeedScaledMotion | None:
@@ -632,7 +632,7 @@ class Supervisor(Closeable):
         if paced is None or shown.motion_time is None:
             return {}
         place = paced.place_at(round(shown.motion_time / CYCLE_TIME))
-        return {"motion_place": place, "pace": paced.pace, "mode": self._override.mode}
+        return {"motion_place": place, "pace": paced.override, "mode": self._override.mode}
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:

@@ -51,8 +51,7 @@ from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import SIGNALS, StreamingDriver, open_driver
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
-from rcilab.realtime.punctual import PRIORITY
-from rcilab.realtime.scheduling import enter_realtime
+from rcilab.realtime.scheduling import PRIORITY, enter_realtime
 
 SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
 _LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the supervisor.

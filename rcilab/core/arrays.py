@@ -1,4 +1,4 @@
-"""Arrays at the border: aliases by role, and the one check that makes a value fit to be trusted inside."""
+"""Array types by role, and the checks that validate array arguments."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rcilab.core.errors import InvalidValueError
 Array: TypeAlias = NDArray[np.float64]
 
 JointVector: TypeAlias = Array
-"""One number a joint, shape (n,)."""
+"""One number per joint, shape (n,)."""
 
 JointPath: TypeAlias = Array
-"""One row a sample, shape (N, n)."""
+"""One row per sample, shape (N, n)."""
 
 Vector3: TypeAlias = Array
 """Shape (3,)."""
@@ -26,12 +26,12 @@ Matrix: TypeAlias = Array
 
 
 def scalar(value: float) -> Array:
-    """Returns a number as a read-only array of shape (): a constant that numpy need not convert in every product."""
+    """Returns a number as a read-only array of shape (): a constant that numpy does not convert in every product."""
     return readonly_copy(value)
 
 
 def readonly_copy(value: ArrayLike) -> Array:
-    """Returns a read-only float64 copy of `value`, or itself where it is such a copy already."""
+    """Returns a read-only float64 copy of `value`, or `value` itself if it already is one."""
     if isinstance(value, np.ndarray):
         array = cast("Array", value)
         if array.base is None and array.dtype == np.float64 and not array.flags.writeable:
@@ -40,14 +40,14 @@ def readonly_copy(value: ArrayLike) -> Array:
 
 
 def make_readonly(array: Array) -> Array:
-    """Makes an array read-only that nobody else writes to, and returns it: `readonly_copy` needs no copy of it."""
-    # By its place, which the stubs do not know of: by its name it takes twice as long.
+    """Makes an array of the caller read-only and returns it, so that `readonly_copy` does not copy it."""
+    # Positional, which numpy's stubs do not declare: by keyword the call takes twice as long.
     array.setflags(False)  # pyright: ignore[reportCallIssue]
     return array
 
 
 class Unquoted(str):
-    """Text that an error shows as it is, without quotes, where a value would stand."""
+    """Text that an error shows without quotes in place of a value."""
 
     __slots__ = ()
 
@@ -55,18 +55,18 @@ class Unquoted(str):
 
 
 def described(value: object) -> object:
-    """Returns what an error should show of a value, in one line: of a table its shape, anything else as it is."""
+    """Returns what an error shows of a value, in one line: the shape of a table, anything else unchanged."""
     if getattr(value, "ndim", 0) > 1:
         return Unquoted(f"an array of shape {getattr(value, 'shape', '')}")
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def as_number(value: object, name: str, unit: str = "") -> float:
-    """Returns a number as a plain float; NaN and infinities are numbers too.
+    """Returns a number as a plain float; NaN and infinities are accepted.
 
     Args:
-        value: Anything that is one number; text is not.
-        name: What to call it in an error.
+        value: A number; text is rejected.
+        name: Name of the value in an error.
         unit: Unit to name in an error, such as "rad".
 
     Raises:
@@ -76,10 +76,10 @@ def as_number(value: object, name: str, unit: str = "") -> float:
         return float(value)
     if not isinstance(value, str | bytes) and getattr(value, "ndim", 0) == 0:
         try:
-            return float(value)  # type: ignore[arg-type]  # Whatever has no float is refused below.
+            return float(value)  # type: ignore[arg-type]  # What float() rejects is rejected below.
         except (TypeError, ValueError, OverflowError):
             pass
-    raise InvalidValueError(name, described(value), f"is not a number{_in(unit)}").coded("no_number")
+    raise InvalidValueError(name, described(value), f"must be a number{_in(unit)}").coded("no_number")
 
 
 def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
@@ -88,7 +88,7 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     Args:
         value: Anything array-like.
         size: Number of elements it must have.
-        name: What to call it in an error.
+        name: Name of the value in an error.
         unit: Unit to name in an error, such as "rad".
 
     Raises:
@@ -97,7 +97,7 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidValueError(name, value, f"is not {size} numbers{_in(unit)}").coded(
+        raise InvalidValueError(name, value, f"must be {size} numbers{_in(unit)}").coded(
             "numbers", count=size
         ) from error
     if array.shape != (size,):
@@ -110,12 +110,12 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
 
 
 def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") -> Array:
-    """Returns a checked, read-only copy of a table with one row a sample and one column a joint.
+    """Returns a checked, read-only copy of a table with one row per sample and one column per joint.
 
     Args:
         value: Anything array-like.
-        columns: Number of columns it must have; None takes any but zero.
-        name: What to call it in an error.
+        columns: Number of columns it must have; None accepts any number above 0.
+        name: Name of the value in an error.
         unit: Unit to name in an error, such as "rad".
 
     Raises:
@@ -124,7 +124,7 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidValueError(name, described(value), f"is not a table of numbers{_in(unit)}") from error
+        raise InvalidValueError(name, described(value), f"must be a table of numbers{_in(unit)}") from error
     if array.ndim != 2 or 0 in array.shape or columns not in (None, array.shape[1]):
         needed = f"needs shape (N, {'n' if columns is None else columns}){_in(unit)}"
         shown = described(array) if array.ndim else value
@@ -138,21 +138,21 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
 
 
 def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Array | None = None) -> Array:
-    """Returns a checked, read-only copy of one vector, or of a table with one row a sample.
+    """Returns a checked, read-only copy of one vector, or of a table with one row per sample.
 
     Args:
         value: Anything array-like, shape (columns,) or (N, columns).
         columns: Number of columns it must have.
-        name: What to call it in an error.
+        name: Name of the value in an error.
         unit: Unit to name in an error, such as "rad".
-        like: What it must have the same number of rows as.
+        like: Array whose number of rows it must have.
 
     Raises:
         InvalidValueError: It is neither, has another number of rows, or is not finite.
     """
     try:
         is_table = np.ndim(value) > 1
-    except ValueError:  # Rows of different lengths; the error for a vector says what is wrong.
+    except ValueError:  # Rows of different lengths: the error of as_vector describes them.
         is_table = False
     array = as_path(value, columns, name, unit) if is_table else as_vector(value, columns, name, unit)
     if like is not None and array.shape[:-1] != like.shape[:-1]:

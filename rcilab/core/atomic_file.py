@@ -1,4 +1,4 @@
-"""Small files that are exchanged as a whole: whoever reads meets the old one or the new one, also after a crash."""
+"""Atomic replacement of small files: a reader finds the old or the new content, also after a crash."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from rcilab.core.error_base import InvalidValueError
 
 @contextmanager
 def replacing(file: str | PathLike[str], *, survives_power_loss: bool = False) -> Generator[IO[bytes]]:
-    """Gives a stream whose content takes the place of a file once all of it is written; a failure leaves the file.
+    """Opens a stream whose content replaces a file once it is complete; after a failure the file is unchanged.
 
-    A symbolic link stays one, and what is not a regular file (/dev/stdout, a pipe) is written to directly.
+    A symbolic link stays a link. Anything but a regular file (/dev/stdout, a pipe) is written to directly.
 
     Args:
-        file: Where; its folder must exist.
-        survives_power_loss: Whether to wait until the disk has it; a killed process loses nothing in any case.
+        file: The file; its folder must exist.
+        survives_power_loss: Whether to wait until it is on the disk. Without it a killed process loses nothing either.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     path = Path(file)
     if path.exists() and not path.is_file():
@@ -62,15 +62,15 @@ def _mode_of(path: Path) -> int:
 
 
 def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> None:
-    """Writes a text file, and the folders it is in; nothing of it is left where that fails.
+    """Writes a text file and creates its folders; after a failure nothing of it is left.
 
     Args:
-        file: Where.
-        text: What.
-        survives_power_loss: Whether to wait until the disk has it; a killed process loses nothing in any case.
+        file: The file.
+        text: Its new content.
+        survives_power_loss: Whether to wait until it is on the disk. Without it a killed process loses nothing either.
 
     Raises:
-        OSError: It cannot be written.
+        OSError: The file cannot be written.
     """
     file.parent.mkdir(parents=True, exist_ok=True)
     with replacing(file, survives_power_loss=survives_power_loss) as stream:
@@ -78,19 +78,19 @@ def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> N
 
 
 def read_whole(file: Path, what: str, most: int) -> bytes:
-    """Returns what is in a file.
+    """Returns the content of a file.
 
     Args:
-        file: Where.
-        what: What it should be, for the error: "program file".
-        most: Bytes that are read at most.
+        file: The file.
+        what: The kind of file, for the error: "program file".
+        most: Largest number of bytes to read.
 
     Raises:
-        InvalidValueError: There is none, or it cannot be read.
+        InvalidValueError: The file does not exist or cannot be read.
     """
     try:
         with file.open("rb") as stream:
-            status = os.fstat(stream.fileno())  # A file is given as much room as it needs, not as it may.
+            status = os.fstat(stream.fileno())  # Allocate the file's size, not the bound.
             return stream.read(min(most, status.st_size + 1) if stat.S_ISREG(status.st_mode) else most)
     except FileNotFoundError as error:
         raise InvalidValueError(what, str(file), "does not exist").coded("no_file", file=str(file)) from error

@@ -1,4 +1,4 @@
-"""One job at a time beside the thread of page or notebook: what takes longer than they may stand still."""
+"""One background job at a time, for work that would block the thread of the page or the notebook."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Context = TypeVar("Context")
 Result = TypeVar("Result")
 
 ProgressCallback: TypeAlias = Callable[[float], None]
-"""Takes how much is done, 0 to 1; does not return where nobody wants the result any more."""
+"""Receives the progress, 0 to 1; does not return once the job is cancelled."""
 
 
 class BackgroundJob(Generic[Context, Result]):
-    """Starts, drops and takes jobs. Its owner looks several times a second what has come of one.
+    """Starts and cancels jobs and returns their results. Its owner polls it several times a second.
 
     Args:
-        name: Of the threads.
+        name: Name of its threads.
     """
 
     def __init__(self, name: str) -> None:
@@ -29,39 +29,39 @@ class BackgroundJob(Generic[Context, Result]):
 
     @property
     def progress(self) -> float | None:
-        """How much is done, 0 to 1; None where nothing is being worked out."""
+        """Progress of the job, 0 to 1; None without a job."""
         return None if self._job is None else self._job.progress
 
     @property
     def is_done(self) -> bool:
-        """Whether there is something to take."""
+        """Whether a result can be taken."""
         return self._job is not None and self._job.outcome.done()
 
     def wait(self, timeout: float) -> None:
-        """Returns once there is something to take, at the latest after a while, [s]; at once where there is no job."""
+        """Waits until a result can be taken, at most `timeout`, [s]; returns at once without a job."""
         job = self._job
         if job is not None:
             wait([job.outcome], timeout)
 
     def start(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
-        """Begins; what was being worked out is dropped.
+        """Starts a job; a running one is cancelled.
 
         Args:
-            about: What it is about; comes back with the result.
-            run: Does it.
+            about: Context of the job, returned with its result.
+            run: The job.
         """
         self.cancel()
         self._job = _Job(about, run)
         threading.Thread(target=self._job.run, name=self._name, daemon=True).start()
 
     def cancel(self) -> None:
-        """Drops what is being worked out, at once; its thread ends when it next tells how much is done."""
+        """Cancels the job at once; its thread ends at its next progress report."""
         if self._job is not None:
-            self._job.unwanted.set()
+            self._job.cancelled.set()
         self._job = None
 
     def take(self) -> tuple[Context, Result | RcilabError]:
-        """Returns what the job was about and what came of it, once it is done; a failure of ours is raised."""
+        """Returns context and result of the finished job; an `RcilabError` is returned as the result."""
         job, self._job = self._job, None
         assert job is not None
         try:
@@ -71,7 +71,7 @@ class BackgroundJob(Generic[Context, Result]):
 
 
 class _CancelledError(Exception):
-    """Nobody wants the result any more."""
+    """The job was cancelled."""
 
 
 class _Job(Generic[Context, Result]):
@@ -80,16 +80,16 @@ class _Job(Generic[Context, Result]):
     def __init__(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
         self.about, self._run = about, run
         self.progress = 0.0
-        self.unwanted = threading.Event()
+        self.cancelled = threading.Event()
         self.outcome: Future[Result] = Future()
 
     def run(self) -> None:
         try:
-            self.outcome.set_result(self._run(self._tell))
-        except Exception as error:  # Whoever takes it tells it, or raises it where bugs are counted.
+            self.outcome.set_result(self._run(self._report_progress))
+        except Exception as error:  # `take` returns or raises it.
             self.outcome.set_exception(error)
 
-    def _tell(self, share: float) -> None:
-        if self.unwanted.is_set():
+    def _report_progress(self, share: float) -> None:
+        if self.cancelled.is_set():
             raise _CancelledError
         self.progress = share

@@ -1,4 +1,4 @@
-"""How far the links shall stay from each other and from the floor: rcilab's own condition, no controller checks it."""
+"""Clearance between links and to the floor: a condition of rcilab itself, which no controller checks."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from rcilab.core.arrays import as_number
 from rcilab.core.errors import InvalidValueError
 
 ADVISED_DISTANCE = 0.02  # [m]
-"""What is left to what the capsules do not cover: a link's rim (at most 12 mm), cables, a brake's way."""
+"""Covers what the capsules leave out: a link's rim (at most 12 mm), cables, the braking distance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClearanceLimit:
-    """How far the capsules around the links shall stay from each other and from the floor.
+    """Minimum distances of the capsules around the links from each other and from the floor.
 
-    A motion that comes as near as `links` or `floor` is refused; one that comes as near as `advised` is advised
-    against. The floor is a horizontal plane under the whole arm; the base stands on it and is not compared with it.
+    A motion with a distance of `links` or `floor` or less is refused; one with `advised` or less gets a
+    recommendation. The floor is a horizontal plane under the whole arm. The base stands on it and is not checked.
 
     Raises:
         InvalidValueError: A number is not finite, or a distance or radius is below 0.
@@ -29,12 +29,11 @@ class ClearanceLimit:
     floor: float = 0.0
     """Between a link that moves up or down and the floor, [m]."""
     advised: float = ADVISED_DISTANCE
-    """What is recommended for both, [m]."""
+    """Recommended distance for both, [m]."""
     floor_height: float | None = 0.0
     """Height of the floor in the base frame, [m]; None without a floor, as under a ceiling."""
     tool_radius: float | None = None
-    """Radius of a capsule from the flange to the origin of the tool that counts as a link, [m]; None: the tool has no
-    body."""
+    """Radius of the tool's capsule, from the flange to the origin of the tool, [m]; None: the tool is not checked."""
 
     def __post_init__(self) -> None:
         """Checks the values."""
@@ -46,7 +45,7 @@ class ClearanceLimit:
             if not isfinite(number):
                 raise InvalidValueError(name, number, "must be finite [m]")
             if number < 0.0 and name != "floor_height":
-                raise InvalidValueError(name, number, "m must not be below 0")
+                raise InvalidValueError(name, number, "must not be below 0 [m]")
             object.__setattr__(self, name, number)
 
 
@@ -54,13 +53,13 @@ STANDARD_DISTANCE = ClearanceLimit()
 """Links that do not touch each other nor a floor at height 0, with 20 mm recommended."""
 
 FLOOR = -1
-"""Stands for the floor where a link's number is expected."""
+"""Link number of the floor."""
 TOOL = -2
-"""Stands for the tool where a link's number is expected."""
+"""Link number of the tool."""
 
 
 class LinkPair(NamedTuple):
-    """The two links of a distance: 0 is the base, n the last link; or `TOOL`, or `FLOOR`."""
+    """The two links of a distance: 0 is the base, n the last link; also `TOOL` and `FLOOR`."""
 
     first: int
     second: int
@@ -70,5 +69,5 @@ class LinkPair(NamedTuple):
 
 
 def link_name(number: int) -> str:
-    """Returns a link's name in words by its number; see `LinkPair`."""
+    """Returns the name of a link by its number; see `LinkPair`."""
     return {FLOOR: "floor", TOOL: "tool", 0: "base"}.get(number, f"link {number}")

@@ -1,4 +1,4 @@
-"""Time as something one is handed: the system's clock, or one that a test moves by hand."""
+"""Clocks: the system's monotonic clock, and one that a test advances."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ CYCLE_TIME = 0.001  # [s] RCI manual 3.3: the control period is 1 ms.
 
 
 class Clock(Protocol):
-    """A monotonic clock one can wait on."""
+    """A monotonic clock with a sleep."""
 
     def now(self) -> float:
         """Returns the time, [s], from an arbitrary origin."""
         ...
 
     def sleep_until(self, deadline: float) -> None:
-        """Returns once `now()` has reached `deadline`; at once when it has passed already."""
+        """Sleeps until `now()` reaches `deadline`; returns at once when it has passed."""
         ...
 
 
@@ -35,7 +35,7 @@ class SystemClock:
 
 
 class ManualClock:
-    """A clock that moves only when told to, or when somebody sleeps on it.
+    """A clock that moves only in `advance` and `sleep_until`.
 
     Args:
         start: First reading, [s].
@@ -45,7 +45,7 @@ class ManualClock:
         self._now = start
 
     def now(self) -> float:
-        """Returns the time it was last moved to, [s]."""
+        """Returns its current time, [s]."""
         return self._now
 
     def advance(self, duration: float) -> None:

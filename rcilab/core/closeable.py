@@ -1,4 +1,4 @@
-"""What can be closed can stand in a `with` statement."""
+"""Base class of objects that own a resource and work as context managers."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Self
 
 
 class Closeable(ABC):
-    """Owns something until it is closed; leaving its `with` block closes it, whatever happened there."""
+    """Owns a resource until it is closed; leaving its `with` block closes it, also after an exception."""
 
     @abstractmethod
     def close(self) -> None:
-        """Lets go of what is owned. May be called twice."""
+        """Releases the resource. May be called twice."""
 
     def __enter__(self) -> Self:
         return self

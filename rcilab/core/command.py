@@ -1,4 +1,4 @@
-"""What a control callback answers with: one immutable command a cycle."""
+"""The commands a control callback returns: one immutable command per cycle."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class CartesianPosition:
     T_base_tool: Matrix
     """Homogeneous transform, shape (4, 4), [m]."""
     psi: float | None = None
-    """Arm angle, [rad]; None leaves it to the controller."""
+    """Arm angle, [rad]; None: the controller chooses it."""
     finished: bool = False
     """True on the last command of a motion."""
 

@@ -1,4 +1,4 @@
-"""Conditions on a motion: a quantity between two bounds, its source and the fault it raises; a table for each maker."""
+"""Conditions on a motion: a quantity, its bounds, source and fault. Each maker has a table of them."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
 
 AnyLimits: TypeAlias = Limits | JointLimits
-"""All limits of an arm; a condition on joints makes do with those of the joints."""
+"""All limits of an arm; for a condition on joints, those of the joints are enough."""
 
 _PLACES: dict[Signal, str] = {
     "arm_angle": "elbow",
@@ -49,7 +49,7 @@ _PLACES: dict[Signal, str] = {
     "floor_distance": "links",
     "lost_commands": "network",
 }
-"""Whose value it is; anything else is the tool's."""
+"""What the value belongs to; any other signal belongs to the tool."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -59,42 +59,42 @@ class Condition:
     id: str
     """Short stable name, such as "joint.velocity"."""
     quantity: str
-    """The quantity in words, such as "commanded velocity"."""
+    """Name of the quantity, such as "commanded velocity"."""
     formula: str
-    """As the manual, or the maker's page, prints it."""
+    """As printed in the maker's manual or on its page."""
     necessity: Necessity
-    """The robot stops when a necessary condition is broken."""
+    """The robot stops when a necessary condition is violated."""
     unit: str
     source: str = ""
-    """Where condition and bound come from."""
+    """Source of condition and bound."""
     fault: FaultCode | None = None
-    """What the maker's controller raises; None for a recommended condition, and for one that it does not check."""
+    """Fault of the maker's controller; None for a recommended condition and for one that it does not check."""
     stage: Stage
     """When it is checked."""
     signal: Signal = "joint"
-    """The signal it is on."""
+    """The signal it bounds."""
     order: int
-    """Which derivative of the signal it is on: 0 the signal itself, 3 its jerk."""
+    """Derivative of the signal that it bounds: 0 the signal itself, 3 its jerk."""
     bounds: Callable[[AnyLimits], Bounds]
-    """Returns its bounds from the limits of an arm."""
+    """Computes its bounds from the limits of an arm."""
 
     @property
     def is_measured(self) -> bool:
-        """Whether it is on measured values, not on commanded ones."""
+        """Whether it bounds measured values, not commanded ones."""
         return self.id.startswith("measured.")
 
     @property
     def is_clearance(self) -> bool:
-        """Whether it is on distances, which no controller checks: rcilab's own."""
+        """Whether it bounds distances, which only rcilab checks and no controller."""
         return self.signal in ("link_distance", "floor_distance")
 
     @property
     def is_per_joint(self) -> bool:
-        """Whether every joint has a value and a bound of its own."""
+        """Whether every joint has its own value and bound."""
         return self.signal in ("joint", "torque", "external_torque")
 
     def place(self, axis: int) -> str:
-        """Returns whose value it is, in words: "joint 2", "tool", "elbow", "links", "network"."""
+        """Returns what the value belongs to: "joint 2", "tool", "elbow", "links", "network"."""
         if self.is_per_joint:
             return f"joint {axis}"
         return _PLACES.get(self.signal, "tool")
@@ -112,10 +112,10 @@ def all_limits(limits: AnyLimits) -> Limits:
     """Returns the bounds of the whole arm.
 
     Raises:
-        InvalidValueError: They are those of the joints only.
+        InvalidValueError: They are the limits of the joints only.
     """
     if isinstance(limits, JointLimits):
-        raise InvalidValueError("limits", limits, "are of the joints only; pass model.limits")
+        raise InvalidValueError("limits", limits, "must not be those of the joints only; pass model.limits")
     return limits
 
 
@@ -126,7 +126,7 @@ def same(value: float) -> Bounds:
 
 
 def tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
-    """Returns the function for bounds that are the same for every joint, around zero."""
+    """Returns a function for bounds around zero that are the same for every joint."""
 
     def bounds(limits: AnyLimits) -> Bounds:
         bound = np.full(len(joint_limits(limits).velocity), value)
@@ -137,10 +137,10 @@ def tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ConditionTable:
-    """The conditions of one maker's interface. Rows on the same quantity have the same id in every table."""
+    """The conditions of one maker's interface. Conditions on the same quantity have the same id in every table."""
 
     name: str
-    """Of the interface, such as "RCI"."""
+    """Name of the interface, such as "RCI"."""
     motion: tuple[Condition, ...]
     """For every joint motion."""
     cartesian: tuple[Condition, ...]
@@ -148,20 +148,20 @@ class ConditionTable:
     torque: tuple[Condition, ...]
     """For a motion that is sent as torques."""
     measured: tuple[Condition, ...]
-    """For what the sensors measure."""
+    """For measured values."""
     box: Condition
-    """For a commanded tool where there is a safety box."""
+    """For the commanded tool position with a safety box."""
     conditions: tuple[Condition, ...]
     """Every condition of the interface."""
 
     def rows(self, mode: Mode, *, has_elbow: bool = True, has_box: bool = False) -> tuple[Condition, ...]:
-        """Returns the conditions on a motion in a mode, without those on distances.
+        """Returns the conditions on a motion in a mode, except those on distances.
 
         Args:
-            mode: How it is commanded.
+            mode: Command mode of the motion.
             has_elbow: Whether the arm has an arm angle.
-            has_box: Whether there is a safety box. A motion in torques has no commanded position: the measured one
-                is checked.
+            has_box: Whether there is a safety box. A torque motion has no commanded position: its measured one is
+                checked.
         """
         if mode == "torque":
             return self.torque + ((self.find("measured.cartesian.position"),) if has_box else ())

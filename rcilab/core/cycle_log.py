@@ -1,4 +1,4 @@
-"""Recorded cycles: what a row holds, and files of them: CSV for people and spreadsheets, NPZ for numpy."""
+"""Recorded cycles: the layout of a row, and files of rows: CSV for spreadsheets, NPZ for numpy."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from rcilab.core.atomic_file import replacing
 from rcilab.core.error_base import InvalidValueError
 
 STATE_FIELDS = ("tau_ext_in_base", "tau_ext_in_stiff", "T_base_tool", "theta")
-"""What else of a state a row holds, by the names that `RobotState` has for it, in the order of the row."""
+"""More fields of a row, named as in `RobotState`, in the order of the row."""
 OTHER_STATE_FIELDS = (
     "dq_c", "ddq_c", "T_base_tool_c", "tool_velocity_c", "tool_acceleration_c", "tau_filtered", "tau_c", "dtau_c",
     "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
 )  # fmt: skip
-"""What a complete row holds behind those: all that is left of the state, plain numbers at its end."""
+"""Further fields of a complete row: the rest of the state, plain numbers last."""
 
 _POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
 _SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
@@ -33,7 +33,7 @@ _SCREWS = {
     "tool_velocity_c": ("m/s", "rad/s"),
     "tool_acceleration_c": ("m/s^2", "rad/s^2"),
 }
-"""Units of what has a linear and an angular half of three each."""
+"""Units of fields with three linear and three angular components."""
 
 
 def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
@@ -43,14 +43,14 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     message_id              number of the controller cycle
     t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
     received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
-    lateness                how late it was handled, by the robot's own 1 ms grid, [s]; NaN: nobody waited for it
+    lateness                how late it was handled, by the robot's own 1 ms grid, [s]; NaN: no deadline
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
     command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
     faults                  the error bits as one number of 64 bits, bit k = fault k of the maker
-    lost                    controller cycles between the previous row and this one that never reached us
+    lost                    controller cycles between the previous row and this one that were not received
     robot_mode, controller_mode, motion_generator_mode    as on the wire
-    braking                 1: what was sent in answer brings the arm to rest, whatever was planned
+    braking                 1: the answer is part of a stop, not of the plan
     tau                     measured joint torques, [N m], shape (n,)
     command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
     command_psi             arm angle sent with it, [rad]; NaN when none was sent
@@ -61,12 +61,12 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     theta                   motor positions, motor side of the gear, [rad], shape (n,)
     ======================  ==================================================================================
 
-    A complete one goes on with the rest of the state, by the names of `RobotState`: `OTHER_STATE_FIELDS`. What a file
-    of an earlier version does not have is NaN.
+    A complete row continues with the rest of the state, `OTHER_STATE_FIELDS`, named as in `RobotState`. A field that a
+    file of an earlier version does not have is NaN.
 
     Args:
         n: Number of joints.
-        complete: Whether a row holds everything that the state has.
+        complete: Whether a row holds every field of the state.
     """
     vector = ("<f8", (n,))
     return np.dtype(
@@ -130,14 +130,14 @@ UNITS = {
     "motor_tau": "N m",
     "motor_tau_filtered": "N m",
 }
-"""Unit of each field that has one and only one; see `_unit` for the others."""
+"""Unit of each field with a single unit; see `_unit` for the others."""
 
 _CHUNK = 2000  # Rows of a CSV between two reports of progress.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Column:
-    """One number a cycle."""
+    """One number per cycle."""
 
     name: str
     """Such as q[1], command_pose[1,4] or t."""
@@ -153,11 +153,11 @@ class Column:
 
 
 def split_columns(name: str, unit: str | Callable[[tuple[int, ...]], str], values: NDArray[Any]) -> list[Column]:
-    """Returns the columns of an array with one entry a cycle: name[1], name[2], ... or name[1,1], ..., from 1.
+    """Returns the columns of an array with one entry per cycle: name[1], name[2], ... or name[1,1], ..., from 1.
 
     Args:
-        name: Of the array.
-        unit: Of its numbers, or what tells that of each by its place in an entry, counted from 0.
+        name: Name of the array.
+        unit: Unit of its numbers, or a function that returns the unit for an index in an entry, counted from 0.
         values: The array, shape (N, ...).
     """
     columns: list[Column] = []
@@ -186,12 +186,12 @@ def _unit(name: str, place: tuple[int, ...]) -> str:
 
 
 def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[float], None] | None = None) -> None:
-    """Writes columns as CSV: a header line with names and units, then plain numbers; nan where there is nothing.
+    """Writes columns as CSV: a header line with names and units, then plain numbers; nan for a missing value.
 
     Args:
         columns: All of the same length.
-        stream: Where to; opened with newline="".
-        progress: Called with the share that is done, now and then.
+        stream: Destination, opened with newline="".
+        progress: Called with the progress, 0 to 1, after every chunk of rows.
     """
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([column.title for column in columns])
@@ -206,15 +206,15 @@ def write_csv(columns: Sequence[Column], stream: IO[str], progress: Callable[[fl
 
 
 def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
-    """Writes recorded cycles, one row each, in SI units; the ending of the name chooses the format.
+    """Writes recorded cycles, one row each, in SI units; the file's ending selects the format.
 
     .csv: a header line with units, then plain numbers; an array of a cycle becomes columns `q[1] [rad]`,
-    `q[2] [rad]`, ..., a matrix `command_pose[1,1]`, ...; nan where there was nothing. .npz: one array a field,
+    `q[2] [rad]`, ..., a matrix `command_pose[1,1]`, ...; nan for a missing value. .npz: one array per field,
     `numpy.load(file)["q"]` of shape (N, n).
 
     Args:
         cycles: The rows, a structured array of shape (N,).
-        file: Where to; an existing file is replaced.
+        file: Destination; an existing file is replaced.
 
     Raises:
         InvalidValueError: The ending is unknown, or the file cannot be written.

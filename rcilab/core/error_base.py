@@ -1,4 +1,4 @@
-"""The root of the errors and the two for wrong use: what the files of `errors.py`'s own imports raise."""
+"""The root of the errors and the two for wrong use, for modules that `errors.py` imports."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from types import MappingProxyType
 from typing import Self
 
 _UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""What would act on a terminal, break a line, turn the direction of writing, or is half a character."""
-_LONGEST = 2000  # Characters of what an error says of a value; tuning value: the longest of ours have some 600.
+"""Characters that control a terminal, break a line or reverse the writing direction, and surrogates."""
+_LONGEST = 2000  # Characters of a text in an error; the longest in normal use have about 600.
 
 
 def plain_text(text: str, most: int = _LONGEST) -> str:
-    """Returns a text in one line that anybody may print: with the escapes of what is not to be seen, and not too long.
+    """Returns a text that is safe to print: one line, control characters escaped, of limited length.
 
     Args:
-        text: From anywhere.
-        most: Characters; of a longer text the end is left out.
+        text: Text from any source.
+        most: Largest number of characters; a longer text is cut.
     """
     if len(text) > most:
         text = text[: most - 1] + "…"
@@ -25,22 +25,22 @@ def plain_text(text: str, most: int = _LONGEST) -> str:
 
 
 class RcilabError(Exception):
-    """The root of everything this package raises on purpose.
+    """The root of all exceptions of this package.
 
     Attributes:
-        code: Names what went wrong, for faces that say it in their own words and language; "" where nothing does.
-        facts: What fills these words, by name: numbers in SI, text, or errors.
+        code: Key of its message `error.CODE` in the catalogues, for a UI in another language; "" without one.
+        facts: Values for that message, by name: numbers in SI, text, or errors.
     """
 
     code: str = ""
     facts: Mapping[str, object] = MappingProxyType({})
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickles sentence and attributes: a constructor takes facts, not the sentence that it made of them."""
+        """Pickles message and attributes: a constructor takes facts, not the message that it builds from them."""
         return _restore, (type(self), self.args, self.__dict__)
 
     def coded(self, code: str, **facts: object) -> Self:
-        """Returns this error with a name for what went wrong; its words are `error.CODE` of the catalogues of words."""
+        """Sets code and facts, and returns this error."""
         self.code, self.facts = code, facts
         return self
 
@@ -53,25 +53,31 @@ def _restore(kind: type[RcilabError], args: tuple[object, ...], attributes: Mapp
 
 
 class UsageError(RcilabError, RuntimeError):
-    """A call in the wrong order or the wrong way."""
+    """A call in the wrong order or with wrong arguments."""
 
 
 class InvalidValueError(UsageError, ValueError):
     """A value that cannot be used: wrong shape, not finite, out of range.
 
     Attributes:
-        name: What the value is called.
-        value: The value as it came in.
-        requirement: What it has to be, and what it is not.
+        name: Name of the value.
+        value: The value that was passed.
+        requirement: What it must be ("must be ...", "needs ..."), or what is wrong with it; may end with "; advice".
     """
 
     def __init__(self, name: str, value: object, requirement: str) -> None:
         name, requirement = plain_text(name), plain_text(requirement)
         is_array = type(value).__module__ == "numpy" and hasattr(value, "tolist")
         text = plain_text(repr(value.tolist() if is_array else value))  # type: ignore[attr-defined]
-        said = text if len(text) < 120 else text[:117] + "..."
-        is_missing = text in ("None", "nothing") and requirement.startswith("is missing")
-        super().__init__(f"{name} {requirement}" if is_missing else f"{name}: {said} {requirement}")
+        shown = text if len(text) < 120 else text[:117] + "..."
+        if requirement.startswith(("must ", "needs ")):
+            rule, semicolon, advice = requirement.partition("; ")
+            message = f"{name} {rule}, got {shown}{semicolon}{advice}"
+        elif requirement.startswith("is missing") and text in ("None", "nothing"):
+            message = f"{name} {requirement}"
+        else:
+            message = f"{name}: {shown} {requirement}"
+        super().__init__(message)
         self.name = name
         self.value = value
         self.requirement = requirement

@@ -1,24 +1,24 @@
-"""What can go wrong, as one family of exceptions built from facts.
+"""The exceptions of the package, one family built from facts.
 
     RcilabError
-      ModelError                 an unknown robot, a description that is no arm
+      ModelError                 an unknown robot, an invalid description of an arm
       KinematicsError
         UnreachableError         no joint angles give this pose
-        SingularError            the answer is not defined at this place
+        SingularError            the answer is not defined at this configuration
       PlanningError
-      ConformanceError           .violations: the motion breaks a condition
-        CertificateError         .changed: judged, but not this motion, or not any more
+      ConformanceError           .violations: the motion violates a condition
+        CertificateError         .changed: the certificate does not match the motion or the robot
       ProtocolError
-        DecodeError              .offset: these bytes are no message
+        DecodeError              .offset: these bytes are not a valid message
         VersionMismatchError     .found, .expected
       ConnectionLostError
-      CommandRejectedError       .command, .status: the controller said no
+      CommandRejectedError       .command, .status: the controller refused a command
       ControlError               .faults, .record: the controller stopped the motion
       DeadlineError              also a TimeoutError
       UsageError                 also a RuntimeError: wrong call order
         InvalidValueError        also a ValueError: .name, .value
 
-Facts stay on the exception as attributes; nobody has to search a message for meaning.
+Facts are attributes of the exception, so that no code has to parse a message.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ __all__ = [
 
 
 class ModelError(RcilabError):
-    """An unknown robot, or a description that is no arm."""
+    """An unknown robot, or an invalid description of an arm."""
 
 
 class KinematicsError(RcilabError):
-    """A geometric question without an answer."""
+    """A geometric problem without a solution."""
 
 
 class UnreachableError(KinematicsError):
@@ -65,8 +65,8 @@ class UnreachableError(KinematicsError):
 
     Attributes:
         distance: How far the wrist centre is from the reachable shell, [m]; 0 when reach is not the reason.
-        joint: Number of the joint (from 1) whose limit is in the way, or None.
-        excess: How far that joint would have to pass its limit, [rad].
+        joint: Number of the joint (from 1) whose limit prevents it, or None.
+        excess: How far that joint would exceed its limit, [rad].
     """
 
     def __init__(self, message: str, *, distance: float = 0.0, joint: int | None = None, excess: float = 0.0) -> None:
@@ -77,15 +77,15 @@ class UnreachableError(KinematicsError):
 
 
 class SingularError(KinematicsError):
-    """The answer is not defined here: an axis is lost or an angle has no reference."""
+    """The answer is not defined at this configuration: an axis vanishes or an angle has no reference."""
 
 
 class PlanningError(RcilabError):
-    """No motion could be made from this request.
+    """No motion can be planned for this request.
 
     Attributes:
-        share: Where a path cannot be followed, as a part of the way, 0 to 1; None where it is no matter of place.
-        waypoint: Number of the waypoint of a program on the way to which it is, from 1; None where it is no program's.
+        share: Where a path cannot be followed, as a part of its length, 0 to 1; None if no point of it is the cause.
+        waypoint: Number of the program's waypoint whose segment fails, from 1; None without a program.
     """
 
     def __init__(self, message: str, *, share: float | None = None, waypoint: int | None = None) -> None:
@@ -95,7 +95,7 @@ class PlanningError(RcilabError):
 
 
 class ConformanceError(RcilabError):
-    """A motion breaks at least one necessary condition.
+    """A motion violates at least one necessary condition.
 
     Attributes:
         violations: The violated conditions, worst first.
@@ -107,7 +107,7 @@ class ConformanceError(RcilabError):
 
 
 class CertificateError(ConformanceError):
-    """The motion was never judged, or something it was judged with has changed since.
+    """The motion was never checked, or something has changed since the check.
 
     Attributes:
         changed: What differs: any of motion, model, limits, tool, load, safety box, start state.
@@ -119,15 +119,15 @@ class CertificateError(ConformanceError):
 
 
 class ProtocolError(RcilabError):
-    """The other side does not speak as agreed."""
+    """The peer violates the protocol."""
 
 
 class DecodeError(ProtocolError):
-    """These bytes are no message.
+    """These bytes are not a valid message.
 
     Attributes:
-        problem: What is wrong, without the place.
-        offset: Where the first wrong byte stands.
+        problem: What is wrong, without the offset.
+        offset: Offset of the first wrong byte.
     """
 
     def __init__(self, message: str, offset: int = 0) -> None:
@@ -136,7 +136,7 @@ class DecodeError(ProtocolError):
 
 
 class VersionMismatchError(ProtocolError):
-    """Two sides of an interface were built from different versions of it."""
+    """The two sides of an interface have different versions."""
 
     def __init__(
         self, what: str, found: object, expected: object, advice: str = "restart both sides from one rcilab"
@@ -148,12 +148,12 @@ class VersionMismatchError(ProtocolError):
 
 
 class RecordedError(RcilabError):
-    """Something ended a motion, and this is what the last cycles were.
+    """An error that ended a motion, with the last recorded cycles.
 
     Attributes:
-        record: The last cycles before the end, as recorded: a structured array, one row a cycle; or None.
-        run: The whole motion up to its end, an `rcilab.Run`: to be plotted, saved and replayed; None where none was
-            under way, or where it ran in another process.
+        record: The last cycles before the end, a structured array, one row per cycle; or None.
+        run: The whole motion up to its end, an `rcilab.Run`, to plot, save and replay; None without a motion, or if it ran
+            in another process.
     """
 
     run: Any = None
@@ -163,7 +163,7 @@ class RecordedError(RcilabError):
         self.record = record
 
     def save(self, file: str | PathLike[str]) -> None:
-        """Writes the last cycles to a file; its ending chooses the format: .csv or .npz. `run.save` writes them all.
+        """Writes the last cycles to a file; its ending selects the format: .csv or .npz. `run.save` writes all.
 
         Raises:
             UsageError: There is no record.
@@ -172,20 +172,20 @@ class RecordedError(RcilabError):
         from rcilab.core.cycle_log import save_cycles
 
         if self.record is None:
-            raise UsageError("this error carries no record: nothing was recorded before it")
+            raise UsageError("this error has no record: no cycle was recorded before it")
         save_cycles(self.record, file)
 
 
 class ConnectionLostError(RecordedError):
-    """The robot, the controller or a process of ours is not there, or is there no longer."""
+    """The robot, the controller or a process of rcilab cannot be reached, or the connection to it ended."""
 
 
 class CommandRejectedError(RcilabError):
-    """The controller answered a command with a refusal.
+    """The controller refused a command.
 
     Attributes:
         command: Name of the command.
-        status: The status that came back.
+        status: The status it returned.
     """
 
     def __init__(self, command: str, status: object, advice: str = "", *, reason: str = "") -> None:
@@ -205,7 +205,7 @@ class ControlError(RecordedError):
 
     Attributes:
         faults: The faults that were set, in wire order.
-        stop: The cycles after `record`, in which the controller brought the arm to rest, alike; None where not seen.
+        stop: The cycles after `record`, in which the controller stopped the arm; None if they were not received.
     """
 
     stop: Any = None
@@ -216,4 +216,4 @@ class ControlError(RecordedError):
 
 
 class DeadlineError(RcilabError, TimeoutError):
-    """Something did not happen in time."""
+    """A deadline was missed."""

@@ -1,4 +1,4 @@
-"""What a fault is, for every maker: a numbered member with one name, a cause and a remedy."""
+"""The base of every maker's fault enumeration: a fault has a number, a name, a cause and a remedy."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class FaultCode(IntEnum):
-    """One fault that a controller reports; the value is its number there. Every maker derives its own enumeration."""
+    """A fault that a controller reports; the value is its number. Every maker derives its own enumeration."""
 
     @property
     def maker(self) -> str:
@@ -16,20 +16,20 @@ class FaultCode(IntEnum):
 
     @property
     def manual_name(self) -> str:
-        """The name as the maker's manual or client library prints it."""
+        """Name in the maker's manual or client library."""
         return self.name.lower()
 
     @property
     def cause(self) -> str:
-        """What the robot detected, in a few words."""
+        """Short description of what the robot detected."""
         raise NotImplementedError
 
     @property
     def remedy(self) -> str:
-        """What to do about it, in one sentence; empty where the maker gives no advice."""
+        """What to do about it, one sentence; empty if the maker gives no advice."""
         return ""
 
 
 def name_faults(faults: Iterable[object]) -> str:
-    """Returns the names of faults as their maker prints them, with commas between."""
+    """Returns the makers' names of faults, separated by commas."""
     return ", ".join(fault.manual_name for fault in faults if isinstance(fault, FaultCode))

@@ -1,6 +1,7 @@
-"""How much a file may hold, known from its headers before room is made for it: a few kilobytes can unpack to anything.
+"""Bounds for the content of a file, checked from its headers before allocation: a small file can unpack to gigabytes.
 
-One number bounds everything, and whoever trusts a file raises it: `max_rows` in Python, `--max-rows` in a shell.
+A single number bounds everything; the caller raises it for a trusted file: `max_rows` in Python, `--max-rows` in a
+shell.
 """
 
 from __future__ import annotations
@@ -8,33 +9,33 @@ from __future__ import annotations
 from rcilab.core.errors import InvalidValueError
 
 MOST_ROWS = 1_000_000
-"""Cycles of 1 ms in a motion or a run: 17 minutes. Tuning value: to judge a row takes 1.1 KB, so all of them 1.1 GB."""
+"""Cycles of 1 ms in a motion or a run: 17 minutes. Checking a row takes 1.1 KB, so this many rows take 1.1 GB."""
 ROW_BYTES = 1024
-"""What a row may take in a file, unpacked. Tuning value: a cycle of a run takes 816 bytes."""
+"""Largest size of a row in a file, unpacked. A cycle of a run takes 816 bytes; the rest is margin."""
 
 
 def require_max_rows(max_rows: object) -> int:
-    """Returns a bound that can be one.
+    """Returns a valid bound.
 
     Raises:
-        InvalidValueError: It is no whole number above 0.
+        InvalidValueError: It is not a whole number above 0.
     """
     if isinstance(max_rows, bool) or not isinstance(max_rows, int) or max_rows < 1:
-        raise InvalidValueError("max_rows", max_rows, "must be a whole number above 0: cycles of 1 ms")
+        raise InvalidValueError("max_rows", max_rows, "must be a whole number of 1 ms cycles above 0")
     return max_rows
 
 
 def require_rows(rows: int, max_rows: int, what: str, name: str) -> None:
-    """Refuses a file of too many rows.
+    """Rejects a file with too many rows.
 
     Args:
-        rows: How many it says that it holds.
-        max_rows: How many it may hold.
-        what: What it is, for the error.
-        name: What to call it in the error.
+        rows: Number of rows according to its header.
+        max_rows: Largest allowed number of rows.
+        what: Kind of file, for the error.
+        name: Name of the file in the error.
 
     Raises:
-        InvalidValueError: They are too many; the message says how to take it nevertheless.
+        InvalidValueError: There are too many; the message names the option that allows them.
     """
     if rows > max_rows:
         raise InvalidValueError(
@@ -46,10 +47,10 @@ def require_rows(rows: int, max_rows: int, what: str, name: str) -> None:
 
 
 def require_bytes(size: int, max_rows: int, what: str, name: str) -> None:
-    """Refuses a file that takes too much room, unpacked; `size` in bytes, the rest as of `require_rows`.
+    """Rejects a file whose unpacked `size`, [bytes], is too large; the other arguments as for `require_rows`.
 
     Raises:
-        InvalidValueError: It is too large; the message says how to take it nevertheless.
+        InvalidValueError: It is too large; the message names the option that allows it.
     """
     most = max_rows * ROW_BYTES
     if size > most:

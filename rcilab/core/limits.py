@@ -1,4 +1,4 @@
-"""The bounds of an arm, every one with the place it was taken from."""
+"""The limits of an arm, each with its source."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 
-_ROUNDING = 1e-6  # [rad] Soft limits this close to the own ones, converted from degrees, are the own ones.
+_ROUNDING = 1e-6  # [rad] Soft limits within this distance of the arm's own, converted from degrees, equal them.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -32,11 +32,11 @@ class JointLimits:
     torque_rate: JointVector
     """Largest rate of the commanded torque, [N m/s]."""
     collision_threshold: JointVector
-    """Largest threshold that `setCollisionBehavior` takes, [N m]."""
+    """Largest threshold that `setCollisionBehavior` accepts, [N m]."""
     stiffness: JointVector
-    """Largest stiffness that `setJointImpedance` takes, [N m/rad]."""
+    """Largest stiffness that `setJointImpedance` accepts, [N m/rad]."""
     own: JointLimits | None = None
-    """The arm's own limits, where soft limits of the joint angles were set; None: these are its own."""
+    """The arm's own limits if soft limits of the joint angles are set; None: these are its own."""
 
     def __repr__(self) -> str:
         names = ", ".join(name for name in self.__slots__ if name != "own")
@@ -50,7 +50,7 @@ class JointLimits:
         return bool((inwards if side == "lower" else -inwards) > _ROUNDING)
 
     def soft_bound_passed(self, joint: int, angle: float) -> float | None:
-        """Returns the soft limit that an angle of a joint, counted from 1, reaches or passes, [rad]; None: no such."""
+        """Returns the soft limit that an angle of a joint, counted from 1, reaches or exceeds, [rad], or None."""
         lower, upper = float(self.lower[joint - 1]), float(self.upper[joint - 1])
         if angle <= lower:
             return lower if self.is_soft(joint, "lower") else None
@@ -74,7 +74,7 @@ class CartesianLimits:
     rotation_jerk: float
     """[rad/s^3]."""
     translation_stiffness: float
-    """Largest stiffness that `setCartesianImpedance` takes, [N/m]."""
+    """Largest stiffness that `setCartesianImpedance` accepts, [N/m]."""
     rotation_stiffness: float
     """[N m/rad]."""
     force: float
@@ -104,20 +104,20 @@ class Limits:
     arm_angle: ArmAngleLimits | None
     """None for an arm without a redundant joint."""
     sources: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """Where each bound was taken from, by dotted name."""
+    """Source of each limit, by dotted name."""
 
     def __repr__(self) -> str:
         arm_angle = "" if self.arm_angle is None else ", .arm_angle"
         return f"<Limits of {len(self.joint.velocity)} joints: .joint, .cartesian{arm_angle}, .source(name)>"
 
     def source(self, name: str) -> str:
-        """Returns where a bound was taken from.
+        """Returns the source of a limit.
 
         Args:
-            name: Dotted name of the bound, such as "joint.velocity".
+            name: Dotted name of the limit, such as "joint.velocity".
 
         Raises:
-            InvalidValueError: There is no such bound; the message lists those that exist.
+            InvalidValueError: There is no such limit; the message lists those that exist.
         """
         try:
             return self.sources[name]

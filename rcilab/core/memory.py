@@ -1,4 +1,4 @@
-"""Too little memory for a thread, a mapping or an array: Python and the kernel have several errors for it."""
+"""Detection of low memory for a thread, a mapping or an array, which Python reports by several errors."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from contextlib import contextmanager
 
 from rcilab.core.errors import UsageError
 
-STARVED = "there is not enough free memory for this; close other programs or raise ulimit -v"
+OUT_OF_MEMORY = "there is not enough free memory for this; close other programs or raise ulimit -v"
 
 
 def is_starved(error: BaseException) -> bool:
-    """Returns whether an error says that memory is short, for whatever was asked."""
+    """Returns whether an error means that memory is short."""
     if isinstance(error, MemoryError):
         return True
-    if isinstance(error, ImportError):  # glibc's words for a library that cannot be mapped; they are not translated.
+    if isinstance(error, ImportError):  # glibc's text for a library that cannot be mapped; it is not translated.
         return "failed to map segment" in str(error) or "cannot allocate memory" in str(error).lower()
     if isinstance(error, OSError):
         return error.errno == errno.ENOMEM
@@ -24,7 +24,7 @@ def is_starved(error: BaseException) -> bool:
 
 @contextmanager
 def memory_needed() -> Generator[None]:
-    """Makes an error of ours out of any that says that memory is short.
+    """Turns an error that means low memory into a `UsageError`.
 
     Raises:
         UsageError: Memory is short.
@@ -34,4 +34,4 @@ def memory_needed() -> Generator[None]:
     except (MemoryError, ImportError, OSError, RuntimeError) as error:
         if not is_starved(error):
             raise
-        raise UsageError(STARVED).coded("starved") from error
+        raise UsageError(OUT_OF_MEMORY).coded("starved") from error

@@ -1,4 +1,4 @@
-"""A pose as a robot reports it: 16 numbers of a datagram, read only when somebody asks."""
+"""A pose as a robot reports it: 16 numbers of a datagram, decoded on first use."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from rcilab.core.spatial import Pose
 
 
 class ReportedPose(Pose):
-    """A `Pose` that costs its reader nothing until it is used: a state with two of them comes every millisecond.
+    """A `Pose` that is decoded on first use, because a state with two of them arrives every millisecond.
 
     Args:
-        numbers: A homogeneous transform, shape (4, 4) or (16,) row-major, [m]. Not checked, and never written to.
+        numbers: A homogeneous transform, shape (4, 4) or (16,) row-major, [m]. Not checked, never modified.
     """
 
     __slots__ = ("_numbers",)
@@ -23,10 +23,10 @@ class ReportedPose(Pose):
     def __init__(self, numbers: Array) -> None:
         self._numbers = numbers
 
-    if not TYPE_CHECKING:  # A type checker would take every name for one that a pose has.
+    if not TYPE_CHECKING:  # A type checker would accept every attribute name.
 
         def __getattr__(self, name: str) -> object:
-            """Reads rotation and position when the first of them is asked for; then they are attributes."""
+            """Decodes rotation and position at the first access to one of them; then they are attributes."""
             if name not in ("_r", "_p"):
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             a, b, c, x, d, e, f, y, g, h, i, z = self._numbers.ravel()[:12].tolist()

@@ -1,4 +1,4 @@
-"""Rotations between numpy's matrices and vectors, axis times angle: what brakes and rate limiters compute with."""
+"""Rotations as matrices and as rotation vectors (axis times angle), for stop planner and rate limiter."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from rcilab.core.arrays import Array, Matrix
 from rcilab.core.spatial import Rotation9, turn_between
 
-_TINY = 1e-12  # [rad] Below it a rotation has no axis to speak of.
+_TINY = 1e-12  # [rad] Below it the axis of a rotation is not defined numerically.
 
 
 def rotation_vector(R_old: Matrix, R_new: Matrix) -> Array:
-    """Returns the turn from one orientation to another, axis times angle in their common axes, shape (3,), [rad].
+    """Returns the rotation vector from one orientation to another in their common axes, shape (3,), [rad].
 
     Args:
         R_old: Shape (3, 3).
@@ -23,7 +23,7 @@ def rotation_vector(R_old: Matrix, R_new: Matrix) -> Array:
 
 
 def rotation_matrix(vector: Array) -> Matrix:
-    """Returns the rotation, shape (3, 3), about an axis by an angle, given as their product (Rodrigues)."""
+    """Returns the rotation matrix, shape (3, 3), of a rotation vector (Rodrigues)."""
     angle = float(np.linalg.norm(vector))
     x, y, z = vector if angle < _TINY else vector / angle
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

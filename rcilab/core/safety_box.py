@@ -1,4 +1,4 @@
-"""The box that the tool shall stay in: `setCartesianLimit`, RCI manual V1.3.1, section 3.1.4."""
+"""The box that the tool must not leave: `setCartesianLimit`, RCI manual V1.3.1, section 3.1.4."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class SafetyBox:
     """A box in the base frame. It bounds the origin of the tool frame, not the links.
 
     Raises:
-        InvalidValueError: An edge is not a positive, finite length, or the pose is none.
+        InvalidValueError: An edge is not a positive, finite length, or the pose is not valid.
     """
 
     size: tuple[float, ...]
-    """Edges along x, y and z of its frame, three numbers, [m]."""
+    """Edge lengths along x, y and z of its frame, three numbers, [m]."""
     T_base_box: Pose
-    """Its centre and directions."""
+    """Pose of its centre."""
     active: bool = True
-    """Whether it bounds anything; one that is not active is kept and does nothing."""
+    """Whether it is enforced; an inactive one is kept and has no effect."""
 
     def __post_init__(self) -> None:
         """Checks the values."""
@@ -41,7 +41,7 @@ class SafetyBox:
         object.__setattr__(self, "size", size)
 
     def excess(self, position: Sequence[float]) -> float:
-        """Returns how far a point lies outside, [m]: its distance from the box, or minus its depth inside.
+        """Returns how far a point lies outside, [m]: its distance from the box, negative inside.
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -57,7 +57,7 @@ class SafetyBox:
         return hypot(dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0)
 
     def passed_face(self, position: Sequence[float] | Array) -> tuple[str, float]:
-        """Returns the face that a point lies farthest past, such as "+x", and how far, [m]; minus inside.
+        """Returns the face that a point exceeds most, such as "+x", and by how much, [m]; negative inside.
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -88,14 +88,14 @@ class SafetyBox:
 
 
 class EntryBox:
-    """A safety box for a tool that starts outside it: the faces that it starts beyond may be passed inwards only.
+    """A safety box for a tool that starts outside it: faces that it starts beyond may only be crossed inwards.
 
-    Such a face is where the tool is now, until the tool is inside it; the other faces are those of the box. Owned by
-    one monitor, which asks once a cycle.
+    Such a face moves with the tool until the tool is inside; the other faces are those of the box. Owned by one
+    monitor, which calls it once per cycle.
 
     Args:
-        box: Where the tool belongs.
-        positions: Where the tool starts, in the base frame, three numbers each, [m]: the farthest one opens a face.
+        box: The safety box.
+        positions: Start positions of the tool in the base frame, three numbers each, [m]; the farthest one counts.
     """
 
     _ROUNDING = 1e-6  # [m] How far outwards rounding may move a tool that is commanded to stay.
@@ -109,7 +109,7 @@ class EntryBox:
         ]
 
     def excess(self, position: Sequence[float]) -> float:
-        """Returns how far a point lies outside of what is open to the tool, [m]; see `SafetyBox.excess`.
+        """Returns how far a point lies outside the extended box, [m]; see `SafetyBox.excess`.
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -130,29 +130,29 @@ class EntryBox:
 
 
 def box_from(box: SafetyBox | None, *positions: Sequence[float]) -> SafetyBox | EntryBox | None:
-    """Returns what bounds a tool that starts at a position: its box, or the way into it; None when nothing does.
+    """Returns the box for a tool that starts at a position: the safety box, or one extended to the start; or None.
 
     Args:
-        box: Where the tool belongs; None, or one that is not active, bounds nothing.
-        positions: Where the tool starts, as measured and as commanded, in the base frame, three numbers each, [m].
+        box: The safety box; None or an inactive one gives None.
+        positions: Start positions of the tool, measured and commanded, in the base frame, three numbers each, [m].
     """
     box = active_box(box)
     return box if box is None or max(map(box.excess, positions)) <= 0.0 else EntryBox(box, *positions)
 
 
 def require_box(box: object) -> SafetyBox:
-    """Returns `box` if it is a safety box, active or not.
+    """Returns `box` if it is a `SafetyBox`, active or not.
 
     Raises:
-        InvalidValueError: It is something else; the message says what makes one.
+        InvalidValueError: It is something else; the message says how to make one.
     """
     if isinstance(box, SafetyBox):
         return box
-    raise InvalidValueError("box", described(box), "is no SafetyBox; SafetyBox(size=..., T_base_box=...) makes one")
+    raise InvalidValueError("box", described(box), "must be a SafetyBox; use SafetyBox(size=..., T_base_box=...)")
 
 
 def active_box(box: object) -> SafetyBox | None:
-    """Returns the safety box if it bounds anything; None when there is none, or when it is not active.
+    """Returns the safety box if it is active, else None.
 
     Raises:
         InvalidValueError: It is something else.

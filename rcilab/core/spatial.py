@@ -1,4 +1,4 @@
-"""Poses and rotations: one value type, and one converter for every way of writing them down.
+"""Poses and rotations: one value type, and one converter for every notation.
 
 The same transform has many spellings. `T_base_tool` here = RCI `toolTobase_pos` (16 numbers, row-major) = libfranka
 `O_T_EE` (16 numbers, column-major) = pinocchio `SE3` (quaternion xyzw) = MuJoCo and viser (position and quaternion
@@ -19,19 +19,19 @@ from rcilab.core.arrays import Array, Matrix, Vector3, as_vector, described
 from rcilab.core.errors import InvalidValueError
 
 Rotation9: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
-"""A rotation matrix as nine floats, row-major: what scalar code on the 1 kHz path computes with."""
+"""A rotation matrix as nine floats, row-major, for scalar code on the 1 kHz path."""
 
 UNIT_TOLERANCE = 1e-5
 """How far rows and columns of a rotation may be from unit length; the vendor's client uses the same."""
 
 PERPENDICULAR_TOLERANCE = 1e-4
-"""How large the cosine of the angle between two rows may be. The vendor's client does not look at it; tuning value: a
-rotation that was written down with five decimals passes."""
+"""Largest cosine of the angle between two rows. The vendor's client does not check it; a rotation rounded to five
+decimals passes."""
 
 _NUMBERS = Struct("<16d")
-_SHORTEST, _LONGEST = (1.0 - UNIT_TOLERANCE) ** 2, (1.0 + UNIT_TOLERANCE) ** 2  # Of lengths squared.
+_SHORTEST, _LONGEST = (1.0 - UNIT_TOLERANCE) ** 2, (1.0 + UNIT_TOLERANCE) ** 2  # Squared lengths.
 _EXACT = 1e-12
-"""A rotation that is off by no more is taken as it is; one that is off by more is made one."""
+"""A rotation matrix with a larger error is orthonormalised."""
 
 
 class Pose:
@@ -46,7 +46,7 @@ class Pose:
     """
 
     __slots__ = ("_p", "_r")
-    __array_ufunc__ = None  # So that `matrix @ pose` comes to us.
+    __array_ufunc__ = None  # So that numpy hands `matrix @ pose` to __rmatmul__.
 
     _r: Rotation9
     _p: tuple[float, float, float]
@@ -59,7 +59,7 @@ class Pose:
 
     @classmethod
     def from_parts(cls, rotation: Rotation9, position: tuple[float, float, float]) -> Pose:
-        """Builds a pose from floats that are known to be a rotation (row-major) and a position, [m]. Not checked."""
+        """Builds a pose from a valid rotation (row-major) and a position, [m]. Not checked."""
         pose = object.__new__(cls)
         pose._r = rotation
         pose._p = position
@@ -75,7 +75,7 @@ class Pose:
         try:
             m = np.array(matrix, dtype=np.float64)
         except (TypeError, ValueError, OverflowError) as error:
-            raise InvalidValueError("pose", described(matrix), "is not a 4 x 4 matrix of numbers") from error
+            raise InvalidValueError("pose", described(matrix), "must be a 4 x 4 matrix of numbers") from error
         if m.shape != (4, 4):
             shown = described(m) if m.ndim else matrix
             raise InvalidValueError("pose", shown, "needs shape (4, 4)")
@@ -96,7 +96,7 @@ class Pose:
 
     @classmethod
     def from_row_major(cls, numbers: Sequence[float]) -> Pose:
-        """Builds a pose from 16 numbers written row by row, as the RCI does.
+        """Builds a pose from 16 numbers in row-major order, as in the RCI.
 
         Raises:
             InvalidValueError: They are not a proper rigid transform.
@@ -141,7 +141,7 @@ class Pose:
         return self._r, self._p
 
     def as_row_major(self) -> tuple[float, ...]:
-        """Returns the 16 numbers of the transform, row by row, as the RCI writes them."""
+        """Returns the 16 numbers of the transform in row-major order, as in the RCI."""
         r, p = self._r, self._p
         return (
             r[0], r[1], r[2], p[0],
@@ -151,7 +151,7 @@ class Pose:
         )  # fmt: skip
 
     def tobytes(self) -> bytes:
-        """Returns those numbers as they travel and are recorded: 16 little-endian doubles."""
+        """Returns those numbers as in datagrams and recordings: 16 little-endian doubles."""
         return _NUMBERS.pack(*self.as_row_major())
 
     def inverse(self) -> Pose:
@@ -176,10 +176,10 @@ class Pose:
     def __matmul__(self, other: ArrayLike) -> Any: ...
 
     def __matmul__(self, other: Pose | ArrayLike) -> Any:
-        """Returns `T_a_c` from `T_a_b @ T_b_c`, also where that is a matrix (4, 4), or points of b as seen in a.
+        """Returns `T_a_c` for `T_a_b @ T_b_c`, also for a matrix (4, 4), or points of b expressed in a.
 
         Args:
-            other: A pose, or points of shape (3,) or (N, 3), [m]; the points come back in their shape.
+            other: A pose, or points of shape (3,) or (N, 3), [m]; points keep their shape.
 
         Raises:
             InvalidValueError: The other factor is neither a pose nor points.
@@ -218,7 +218,7 @@ class Pose:
         except (TypeError, ValueError, OverflowError):
             raise _no_pose("pose", other) from None
         if points.ndim not in (1, 2) or points.shape[-1] != 3:
-            raise InvalidValueError("factor", described(other), "is no Pose, and no points of shape (3,) or (N, 3)")
+            raise InvalidValueError("factor", described(other), "must be a Pose, or points of shape (3,) or (N, 3)")
         return points @ self.rotation.T + self.position
 
     def is_close(self, other: Pose | ArrayLike, tolerance: float = 1e-9) -> bool:
@@ -242,12 +242,12 @@ def is_transform(value: object) -> bool:
 
 
 def as_pose(value: object, name: str = "pose", advice: str = "") -> Pose:
-    """Returns a pose that was given as a `Pose` or as a homogeneous transform, shape (4, 4): for borders.
+    """Returns a pose that was passed as a `Pose` or as a homogeneous transform, shape (4, 4).
 
     Args:
-        value: What was given.
-        name: What to call it in an error.
-        advice: What else to write, for the error.
+        value: The argument.
+        name: Name of the argument in an error.
+        advice: End of the error message.
 
     Raises:
         InvalidValueError: It is neither, or not finite, or not a proper rigid transform.
@@ -266,14 +266,14 @@ def as_pose(value: object, name: str = "pose", advice: str = "") -> Pose:
 
 
 def _no_pose(name: str, value: object, advice: str = "") -> InvalidValueError:
-    return InvalidValueError(name, described(value), f"is no Pose, and no matrix of shape (4, 4){advice}")
+    return InvalidValueError(name, described(value), f"must be a Pose or a matrix of shape (4, 4){advice}")
 
 
 IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 
 
 def find_rotation_error(r: Rotation9) -> str | None:
-    """Returns why nine finite numbers, row-major, are no rotation, or None when they are one but for rounding."""
+    """Returns why nine finite numbers, row-major, are not a rotation matrix; None if they are, within rounding."""
     a, b, c, d, e, f, g, h, i = r
     squares = (
         a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i,
@@ -282,18 +282,18 @@ def find_rotation_error(r: Rotation9) -> str | None:
     least, most = min(squares), max(squares)
     if least < _SHORTEST or most > _LONGEST:
         off = max(1.0 - math.sqrt(least), math.sqrt(most) - 1.0)
-        return f"holds no rotation: a row or column is {off:.3g} off unit length, {UNIT_TOLERANCE:g} is allowed"
+        return f"is not a rotation: a row or column is {off:.3g} off unit length, {UNIT_TOLERANCE:g} is allowed"
     cosine = max(abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i))
     if cosine > PERPENDICULAR_TOLERANCE:
         allowed = f"{PERPENDICULAR_TOLERANCE:g} is allowed"
-        return f"holds no rotation: the cosine between two rows is {cosine:.3g}, {allowed}"
+        return f"is not a rotation: the cosine between two rows is {cosine:.3g}, {allowed}"
     if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
-        return "holds a reflection, not a rotation"
+        return "is a reflection, not a rotation"
     return None
 
 
 def rotation_from_wxyz(wxyz: Sequence[float]) -> Rotation9:
-    """Returns the rotation matrix, row-major, of a quaternion of any length but zero.
+    """Returns the rotation matrix, row-major, of a quaternion of any length above zero.
 
     Raises:
         InvalidValueError: The quaternion is zero and has no direction.
@@ -350,10 +350,10 @@ def rpy_from_rotation(r: Rotation9) -> tuple[float, float, float]:
 
 
 def turn_between(old: Rotation9, new: Rotation9) -> tuple[float, float, float]:
-    """Returns the rotation vector, [rad], that turns `old` into `new`; in the axes in which both are given.
+    """Returns the rotation vector, [rad], from `old` to `new`, in the axes in which both are given.
 
-    Its direction is the axis, its length the angle, 0 to pi: log(R_new R_old^T). Exact also for the tiny turns of one
-    cycle, where the trace alone would lose half of the digits.
+    Its direction is the axis, its length the angle, 0 to pi: log(R_new R_old^T). Accurate also for the small rotations
+    of one cycle, where the trace alone would lose half of the digits.
 
     Args:
         old: Rotation matrix, row-major.
@@ -371,7 +371,7 @@ def turn_between(old: Rotation9, new: Rotation9) -> tuple[float, float, float]:
         return scale * sx, scale * sy, scale * sz
     if cosine > 0.0:
         return sx, sy, sz
-    # Half a turn: the matrix is 2 a a^T - 1, and its largest diagonal element tells the axis a best.
+    # Near pi the matrix is 2 a a^T - 1; its largest diagonal element gives the axis a most accurately.
     m = (
         (p * a + q * b + r * c, p * d + q * e + r * f, p * g + q * h + r * i),
         (s * a + t * b + u * c, s * d + t * e + u * f, s * g + t * h + u * i),

@@ -1,7 +1,7 @@
-"""The state an RCI robot reports every millisecond, and the vocabulary of its modes.
+"""The state of a robot in one cycle, and its modes.
 
-Names follow RCI manual V1.3.1, section 3.2.2; a frame in a name reads `T_base_tool`, the pose of the tool in the
-base. Vectors have one element a joint of the arm; the wire's unused seventh element of a 6-axis arm is gone.
+Names follow RCI manual V1.3.1, section 3.2.2; `T_base_tool` is the pose of the tool in the base. Vectors have one
+element per joint of the arm, without the unused seventh element that the RCI sends for a 6-axis arm.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.spatial import IDENTITY, Pose
 
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
-"""How a motion is commanded: the members of `ControllerMode` that move the arm, in small letters."""
+"""Command mode of a motion: the members of `ControllerMode` that move the arm, in lower case."""
 MODES: tuple[Mode, ...] = get_args(Mode)
 
 
@@ -36,7 +36,7 @@ class ControllerMode(IntEnum):
 
 
 class MotionGeneratorMode(IntEnum):
-    """What the commands of a motion are, as the state numbers it (a StartMove request numbers it otherwise)."""
+    """Kind of command of a motion, numbered as in the state (a StartMove request numbers it differently)."""
 
     IDLE = 0
     JOINT_POSITION = 1
@@ -46,7 +46,7 @@ class MotionGeneratorMode(IntEnum):
 
 
 class RobotMode(IntEnum):
-    """What the robot as a whole is doing."""
+    """Operating state of the robot."""
 
     OTHER = 0
     IDLE = 1
@@ -59,7 +59,7 @@ class RobotMode(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotState:
-    """Everything the robot reports in one cycle. Measured values plain, commanded ones end in `_c`."""
+    """Everything the robot reports in one cycle. Commanded values end in `_c`; all others are measured."""
 
     message_id: int
     """Number of the controller cycle; the command that answers this state carries it back."""
@@ -102,8 +102,8 @@ class RobotState:
     tau_ext_in_stiff: Array
     """External force and moment in the force-control frame, (6,), [N, N m]."""
     theta: JointVector
-    """Motor positions, motor side of the gear, [rad] (manual: theta_m). The virtual controller takes 101 motor turns
-    for one of the joint, a figure of ours: the manual gives none."""
+    """Motor positions, motor side of the gear, [rad] (manual: theta_m). The virtual controller assumes a gear ratio of
+    101, typical of strain-wave gears of this size: the manual gives none."""
     dtheta: JointVector
     """Motor velocities, motor side of the gear, [rad/s] (manual: theta_vel_m)."""
     motor_tau: JointVector
@@ -126,13 +126,13 @@ class RobotState:
 
 
 _Open: Any = make_dataclass("_Open", [field.name for field in fields(RobotState)], eq=False, repr=False, slots=True)
-"""A state that is not frozen yet: of the same fields, so that it can become one."""
+"""A state that is not frozen yet, with the same fields, so that its class can be changed."""
 
 
 def build_state(values: Iterable[object]) -> RobotState:
-    """Returns the state with these values, in the order of the fields, as many.
+    """Returns a state with these values, one per field, in the order of the fields.
 
-    For those who build one each millisecond: the constructor of a frozen dataclass takes six times as long.
+    For the 1 kHz path: the constructor of a frozen dataclass takes six times as long.
     """
     state = _Open(*values)
     state.__class__ = RobotState
@@ -167,7 +167,7 @@ def unknown_state(n: int) -> RobotState:
 
 
 def require_mode(mode: object) -> Mode:
-    """Returns `mode` if it is one to move in.
+    """Returns `mode` if it is a command mode.
 
     Raises:
         InvalidValueError: It is not; the message lists those that exist.

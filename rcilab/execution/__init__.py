@@ -1,4 +1,4 @@
-"""Our end of the wire: connect to a controller, read its states, run motions and callbacks at 1 kHz."""
+"""The client of a controller: connects, reads states, and runs motions and callbacks at 1 kHz."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["RobotSession", "Run", "connect"]
 
 
 def __getattr__(name: str) -> object:
-    """Imports a public name when it is first asked for: the control process must not pay for what it does not use."""
+    """Imports a public name on first use, so that the control process loads only what it needs."""
     from importlib import import_module
 
     if name not in _HOME:

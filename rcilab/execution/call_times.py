@@ -1,4 +1,4 @@
-"""How long a callback takes, call by call, and the sentence about one that is too slow for a cycle of 1 ms."""
+"""Durations of the calls of a callback, and the message about one that is too slow for the 1 ms cycle."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ class CallTimes:
         self._calls, self._slow, self._sum = 0, 0, 0.0
 
     def add(self, duration: float, t: float) -> None:
-        """Takes a call.
+        """Records a call.
 
         Args:
-            duration: What it took, [s].
+            duration: Its duration, [s].
             t: Its motion time, [s].
         """
         self._calls += 1
@@ -30,7 +30,7 @@ class CallTimes:
             self._slowest, self._slowest_t = duration, t
 
     def describe(self) -> str:
-        """Returns what a callback that held up the loop did and what helps; "" for one that was in time."""
+        """Returns a message about a callback that delayed the loop, with advice; "" for one that was in time."""
         missed = int(self._slowest / CYCLE_TIME)
         if self._slow >= _OFTEN and 2 * self._slow > self._calls:
             mean = self._sum / self._calls

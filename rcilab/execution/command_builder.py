@@ -1,4 +1,4 @@
-"""What is sent for a row of a motion in each of the five modes: joint angles, the pose they lead to, or torques.
+"""The command for a row of a motion in each of the five modes: joint angles, the tool pose, or torques.
 
 Joint position and joint impedance take the angles themselves, Cartesian position and Cartesian impedance the pose of
 the tool and, on a 7-axis arm, the arm angle. Torque mode takes the torques of a computed-torque controller around the
@@ -6,9 +6,9 @@ plan, with gravity and friction left to the robot as the manual has it (4.3):
 
     tau = M (ddq_d + 2 D w (dq_d - dq) + w^2 (q_d - q)) + C dq
 
-w = `TORQUE_FREQUENCY` and D = `TORQUE_DAMPING` are the same for every joint and small on purpose. This loop closes over
-the network: with the play-out of our own virtual controller a torque acts some 45 ms after the state that it answers,
-and what is much faster than 10 rad/s cannot be damped across that. The arm is soft: a push moves it, and it comes back.
+w = `TORQUE_FREQUENCY` and D = `TORQUE_DAMPING` are the same for every joint and deliberately small. This loop closes
+over the network: with the jitter buffer of the virtual controller a torque acts about 45 ms after the state that it
+answers, and a bandwidth much above 10 rad/s cannot be damped with that delay. The arm is compliant.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from rcilab.core.state import Mode, RobotState
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-TORQUE_FREQUENCY = 6.0  # [rad/s] A choice, see above.
-TORQUE_DAMPING = 0.9  # Of critical; a choice.
-TORQUE_SHARE = 0.95  # Part of the torque limits that is commanded at most; a choice.
+TORQUE_FREQUENCY = 6.0  # [rad/s] Below the 10 rad/s that the delay allows, see above.
+TORQUE_DAMPING = 0.9  # Of critical: the delay takes some phase, so almost critical.
+TORQUE_SHARE = 0.95  # Largest part of the torque limits that is commanded, so that rounding stays inside them.
 
 Commander: TypeAlias = Callable[[JointPath, int, RobotState], Command]
 """`(rows, k, state) -> command`: what to send for row k of rows, shape (N, n), [rad]."""
 
 
 def build_commander(mode: Mode, model: RobotModel) -> Commander:
-    """Returns what turns rows into commands of a mode.
+    """Returns the function that turns rows into commands of a mode.
 
     Args:
-        mode: How the arm is commanded.
+        mode: Command mode.
         model: The arm, with its tool and load as the controller knows them.
     """
     if mode == "torque":
@@ -79,9 +79,9 @@ def _torques(model: RobotModel) -> Commander:
 
 
 def _reference(rows: JointPath, k: int) -> tuple[Array, Array, Array]:
-    """Returns where row k is, how fast and how accelerated, by backward differences; before row 0 it stood there.
+    """Returns position, velocity and acceleration of row k by backward differences, with standstill before row 0.
 
-    So the first torque is that of an arm at rest: nothing, as the torque rate has it.
+    The first torque is then zero, as the torque rate requires.
     """
     now, before, far = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
     return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + far) / CYCLE_TIME**2

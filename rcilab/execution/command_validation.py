@@ -1,4 +1,4 @@
-"""What a callback returned, before it is sent: is it a command, and is it one the arm can follow from where it is?"""
+"""Validation of a callback's commands before they are sent: their type and values, and the start of the motion."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may norma
 
 
 def check_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
-    """Returns a command of ours with a copy of its numbers, so that the caller may go on writing into his array.
+    """Returns a valid command with copies of its arrays, so that the caller may reuse them.
 
     Args:
-        command: What a callback returned.
-        kind: What the mode asks for.
+        command: The return value of a callback.
+        kind: The type of command of the mode.
         n: Number of joints.
         t: Motion time it is for, [s], to name in an error.
 
@@ -50,7 +50,7 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
 
 
 def require_first(command: Command, state: RobotState, limits: Limits) -> None:
-    """Refuses a first command that is not the commanded state: the arm would jump.
+    """Rejects a first command that differs from the commanded state: the arm would jump.
 
     Args:
         command: The first command of a motion.
@@ -58,7 +58,7 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
         limits: Bounds of the arm: torques begin at zero, so the first ones are at most one cycle's rate away from it.
 
     Raises:
-        InvalidValueError: It is elsewhere; the message names the joint, both values and the tolerance.
+        InvalidValueError: It differs; the message names the joint, both values and the tolerance.
     """
     if isinstance(command, JointPosition):
         off = np.abs(command.q - state.q_c)
@@ -105,7 +105,7 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
 
 
 def distance_to(state: RobotState, command: Command) -> float:
-    """Returns how far the controller's commanded state is from a command; torques are always there.
+    """Returns the distance of the controller's commanded state from a command; 0 for torques.
 
     Returns:
         The largest difference of a joint angle or a commanded arm angle, [rad], or of an element of the pose, [m]; 0
@@ -128,7 +128,7 @@ def _turned(state: RobotState, command: CartesianPosition) -> float:
 
 
 def describe_distance(state: RobotState, command: Command) -> str:
-    """Returns what is how far from a command, in words: "joint 2 is 11.46 deg"."""
+    """Returns the distance from a command as text: "joint 2 is 11.46 deg"."""
     if isinstance(command, JointPosition):
         off = np.abs(state.q_c - command.q)
         joint = int(off.argmax())

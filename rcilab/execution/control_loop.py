@@ -1,4 +1,4 @@
-"""The 1 kHz loop: the robot's state is the clock, every state gets one answer, every surprise takes one way out."""
+"""The 1 kHz loop: the robot's state is the clock, every state gets one answer, and there is one stop path."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
 
-SILENCE = 0.1  # [s] without a state while moving means that the connection is lost; a choice.
+SILENCE = 0.1  # [s] without a state while moving means a lost connection: five times the loss a controller bridges.
 SILENCE_HERE = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
 CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
@@ -46,14 +46,14 @@ SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most whil
 ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
 _NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
 REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
-_FELT = 1e-3  # [N m] Torques below it are no different from none; a tuning value.
+_FELT = 1e-3  # [N m] Smaller torques have no effect on the arm.
 _NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
 RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
 
 Callback: TypeAlias = Callable[[RobotState, float], Command]
 """`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
 StopCheck: TypeAlias = Callable[[float], str | None]
-"""Asked in every cycle, with t; anything but None brings the motion to rest and is the reason."""
+"""Called in every cycle with t; returns the reason to stop the motion, or None."""
 
 _COMMANDS: dict[ControllerMode, type[Command]] = {
     ControllerMode.JOINT_POSITION: JointPosition,
@@ -72,11 +72,11 @@ class ControlLoop:
         limits: Bounds of the arm, for stopping.
         mode: How the controller shall follow.
         log: Where every cycle is written.
-        watch: Asked in every cycle whether to stop.
+        watch: Returns in every cycle whether to stop.
         model: The arm, for stopping a tool within what its joints allow.
-        filters: What every command of a callback passes before it is sent, in this order.
-        box: The safety box that the controller has, as far as it is known, for what is said of faults.
-        collision_thresholds: Those of the controller, shape (n,), [N m], as far as they are known, for the same.
+        filters: Filters of a callback's commands, in this order.
+        box: The controller's safety box, if known, for fault messages.
+        collision_thresholds: Those of the controller, shape (n,), [N m], if known, for fault messages.
         silence: Time without a state that counts as a lost connection, [s].
     """
 
@@ -95,7 +95,7 @@ class ControlLoop:
         silence: float = SILENCE,
     ) -> None:
         if mode not in _COMMANDS:
-            raise InvalidValueError("mode", mode, f"is no mode to move in; there are {[m.name for m in _COMMANDS]}")
+            raise InvalidValueError("mode", mode, f"must be one of {[m.name for m in _COMMANDS]}")
         self._driver = driver
         self._model = model
         self._limits = limits
@@ -120,18 +120,18 @@ class ControlLoop:
         """Runs a motion to its end.
 
         Args:
-            callback: Gives the command for each state; the one with `finished=True` is the last.
+            callback: Returns the command for each state; the one with `finished=True` is the last.
 
         Returns:
-            None when the motion ran to its end, or what `watch` said when it was brought to rest before.
+            None when the motion ran to its end, or the reason from `watch` when it was stopped before.
 
         Raises:
             ControlError: The controller set error bits or ended the motion by itself.
             ConnectionLostError: States stopped coming, or the TCP connection broke.
             CommandRejectedError: The controller refused to begin.
             DeadlineError: It agreed to begin and then did not.
-            InvalidValueError: The callback returned no usable command; the motion was brought to rest.
-            Exception: Whatever the callback raised, after the motion was brought to rest.
+            InvalidValueError: The callback returned an invalid command; the motion was stopped.
+            Exception: An exception of the callback, after the motion was stopped.
         """
         self._driver.begin(self._mode)
         try:
@@ -146,7 +146,7 @@ class ControlLoop:
         return reason
 
     def _await_modes(self) -> RobotState | str:
-        """Returns the newest state that shows the requested modes, or what `watch` said when it wants an end first."""
+        """Returns the newest state that shows the requested modes, or the reason of `watch` to stop before."""
         deadline = time.monotonic() + MODE_TIMEOUT
         while time.monotonic() < deadline:
             states = self._driver.poll(self._silence)
@@ -184,7 +184,7 @@ class ControlLoop:
             t = (state.message_id - self._first_id) * CYCLE_TIME
             reason = self._watch(t)
             if reason is not None:
-                self._pending.appendleft(state)  # Still without an answer: the way to rest begins with it.
+                self._pending.appendleft(state)  # Still without an answer: the stop begins with it.
                 return reason
             try:
                 begun_ns = time.monotonic_ns()
@@ -201,7 +201,7 @@ class ControlLoop:
             state = self._next()
 
     def _finish(self, wanted: Command, sent: Command) -> str | None:
-        """Lets the filters arrive at the last command, then the controller; returns what `watch` said, as `run`."""
+        """Waits until filters and controller reach the last command; returns the reason of `watch`, as `run`."""
         near = 0
         for _ in range(FILTER_CYCLES if self._filters else 0):
             near = near + 1 if is_near(sent, wanted) else 0
@@ -221,7 +221,7 @@ class ControlLoop:
                 f"last command at t = {self._t:.3f} s",
                 round(breach.value, 3),
                 f"{breach.condition.unit} is what standing still from there would take ({breach.text}), so the arm was "
-                "brought to rest within the limits, farther on; let the commands come to rest before finished=True",
+                "stopped within the limits, farther on; let the commands stop before finished=True",
             )
         state = self._hold(last)
         if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
@@ -237,8 +237,8 @@ class ControlLoop:
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.
 
-        After a hiccup of ours several wait. Each gets its answer in turn, because the controller's play-out buffer
-        still has use for those that are only a little late; what is older than `CATCH_UP` cycles is let go.
+        After a delay of this process several are waiting. Each is answered in turn, because the controller's jitter
+        buffer still uses slightly late commands; states older than `CATCH_UP` cycles are skipped.
         """
         deadline = time.monotonic() + self._silence
         while True:
@@ -257,7 +257,7 @@ class ControlLoop:
             for state in states[:-CATCH_UP]:
                 if state.message_id > self._answered_id:
                     self._log.write(state, self._driver.received_ns, self._time(state))
-            # A fault anywhere in the burst ends the motion: nothing before it is worth an answer any more.
+            # A fault anywhere in the burst ends the motion: no answer before it matters.
             faulty = [state for state in states if state.faults]
             self._pending.extend(faulty[:1] or states[-CATCH_UP:])
 
@@ -271,12 +271,12 @@ class ControlLoop:
         self._log.write(state, self._driver.received_ns, self._t, sent_ns, command)
 
     def _hold(self, command: Command) -> RobotState:
-        """Repeats the last command until the controller has played it: StopMove may overtake a queued one.
+        """Repeats the last command until the controller has executed it: StopMove may overtake a queued one.
 
-        A low pass of the controller's delays it: as long as the commanded state comes nearer, it is waited for.
+        A low-pass filter of the controller delays it: it waits as long as the commanded state comes closer.
 
         Returns:
-            The last state, there or as near as it came.
+            The last state, at the command or as close as it came.
         """
         before, cycle = math.inf, 0
         while True:
@@ -291,15 +291,15 @@ class ControlLoop:
                 before = off
 
     def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
-        """The one stop path: every end of a motion comes through here, the planned one too.
+        """The single stop path: every motion ends here, also one that ran to its end.
 
-        Brings the commands to rest within the limits where anything can still be commanded, then ends the motion over
-        TCP. After `ControlError` and `ConnectionLostError` nothing can be: the controller stops by itself.
+        Stops the commands within the limits if commands are still possible, then ends the motion over TCP. After
+        `ControlError` and `ConnectionLostError` the controller stops by itself.
         """
         surprise = error
         if brake and self._command is not None and not isinstance(error, ControlError | ConnectionLostError):
             try:
-                self._come_to_rest()
+                self._stop_commands()
             except BaseException as worse:
                 surprise = worse
         first = self._log.recorder.count
@@ -313,10 +313,10 @@ class ControlLoop:
         if surprise is not None and surprise is not error:
             raise surprise from error
 
-    def _come_to_rest(self) -> None:
+    def _stop_commands(self) -> None:
         try:
             way = self._brake.plan()
-        except PlanningError:  # The commands were beyond every bound: StopMove alone ends this.
+        except PlanningError:  # The commands were beyond every bound: only StopMove can end the motion.
             return
         self._log.braking = True
         last_id = self._answered_id
@@ -328,7 +328,7 @@ class ControlLoop:
         self._hold(way[-1])
 
     def _end_well(self) -> ControlError | None:
-        """Ends a motion that went well so far; returns what the controller found wrong with the last that it played."""
+        """Ends a motion without an error so far; returns an error of the controller in its last commands."""
         states: list[RobotState] = []
 
         def take(arrived: list[RobotState]) -> None:
@@ -347,7 +347,7 @@ class ControlLoop:
         return None if faulty is None else self._fault(faulty)
 
     def _is_running(self, states: list[RobotState]) -> bool:
-        """Returns whether the newest of these states still shows the motion without a fault, or there is none."""
+        """Returns whether the newest of these states shows the motion without a fault; True without a state."""
         return not states or (not any(state.faults for state in states) and self._driver.has_begun(states[-1]))
 
     def _end_badly(self, error: BaseException) -> None:
@@ -362,7 +362,7 @@ class ControlLoop:
             self._driver.on_states, self._log.braking = others, False
 
     def _watch_standstill(self) -> None:
-        """Records the controller's own stop, so that the record shows it and the next motion starts from rest."""
+        """Records the controller's own stop, so that the record shows it and the next motion starts at standstill."""
         deadline = time.monotonic() + REST_TIMEOUT
         before: RobotState | None = None
         while time.monotonic() < deadline:
@@ -377,11 +377,11 @@ class ControlLoop:
             self._log.write(state, self._driver.received_ns, self._time(state))
 
     def _checked(self, command: Any, state: RobotState) -> Command:
-        """Returns the callback's command once it is found good."""
+        """Returns the callback's command after validation."""
         return check_command(command, self._kind, self._driver.n, self._time(state))
 
     def _filtered(self, command: Command, state: RobotState) -> Command:
-        """Returns what is to be sent for a command; the first one starts the filters, and must be where the arm is."""
+        """Returns the filtered command; the first one starts the filters and must match the commanded state."""
         is_first = self._command is None
         for link in self._filters:
             if is_first:
@@ -433,12 +433,12 @@ class ControlLoop:
     def _has_power(self) -> bool:
         try:
             return self._driver.is_powered()
-        except RcilabError:  # Whoever is gone has another error.
+        except RcilabError:  # A lost connection has its own error.
             return True
 
     def _cut_off(self) -> ControlError:
         record = self._log.recorder.last(RECORD_CYCLES)
-        said = "the motors were switched off while the motion ran, and the brakes hold the arm; power_on() leads on"
+        said = "the motors were switched off while the motion ran, and the brakes hold the arm; call power_on()"
         return ControlError(f"{self._driver.name}: {said}", (), record)
 
     def _ended_by_controller(self, state: RobotState) -> ControlError:

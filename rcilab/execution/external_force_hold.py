@@ -1,12 +1,12 @@
-"""A push that lasts while it is held: whoever pushes says so again and again, and silence ends it.
+"""An external force that lasts while it is held: the caller renews it, and without renewal it ends.
 
-    with HeldPush(World(host, port)) as push:
+    with ExternalForceHold(SimulationControl(host, port)) as push:
         while the_button_is_down():
             push.hold([0, 20, 0, 0, 0, 0], link=4)
             time.sleep(0.1)
 
-Nobody who calls waits for the world port; a thread does. The virtual controller hears of pushes with a duration only:
-even if this process dies with a push in its hand, the push ends.
+A thread waits for the simulation port, not the caller. The virtual controller only receives pushes with a duration, so
+that a push ends even if this process dies.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from rcilab.core.closeable import Closeable
 from rcilab.core.errors import RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 
-HOLD_TIMEOUT = 0.4  # [s] without `hold` after which a push ends; a choice, as a page says it ten times a second.
-_LENGTH = 0.5  # [s] of each push that the controller hears of, in its own time; a choice above the next number.
+HOLD_TIMEOUT = 0.4  # [s] without `hold` after which a push ends: a page renews it ten times a second.
+_LENGTH = 0.5  # [s] Duration of each push in the controller's time; longer than the renewal below.
 _RENEWAL = 0.2  # [s] between two pushes when nothing changes.
 
 
@@ -35,10 +35,10 @@ class _Held:
 
 
 class ExternalForceHold(Closeable):
-    """Pushes one virtual arm while it is held.
+    """Pushes one virtual arm while the force is held.
 
     Args:
-        world: The arm's world port; closed with this object.
+        world: The arm's simulation port; closed with this object.
     """
 
     def __init__(self, world: SimulationControl) -> None:
@@ -52,7 +52,7 @@ class ExternalForceHold(Closeable):
         self._thread.start()
 
     def hold(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
-        """Pushes, or goes on pushing, for the next 0.4 s; returns at once.
+        """Applies or renews the force for the next 0.4 s; returns at once.
 
         Args:
             wrench: Force and moment, base axes, shape (6,), [N, N m].
@@ -69,19 +69,19 @@ class ExternalForceHold(Closeable):
             self._condition.notify()
 
     def release(self) -> None:
-        """Lets go; returns at once."""
+        """Removes the force; returns at once."""
         with self._condition:
             self._wanted = None
             self._condition.notify()
 
     def take_error(self) -> RcilabError | None:
-        """Returns what has gone wrong since the last call, such as a controller that is gone; None: nothing."""
+        """Returns an error since the last call, such as a lost controller, or None."""
         with self._condition:
             error, self._error = self._error, None
             return error
 
     def close(self) -> None:
-        """Lets go and ends the thread. May be called twice."""
+        """Removes the force and ends the thread. May be called twice."""
         with self._condition:
             self._wanted, self._is_ending = None, True
             self._condition.notify()

@@ -1,7 +1,7 @@
-"""What may stand between a callback and the wire: a low-pass filter, and a limiter of velocity, acceleration and jerk.
+"""Filters of a callback's commands: a low pass, and a limiter of velocity, acceleration and jerk.
 
-The vendor's client filters every command at 100 Hz whether one wants it or not, and ends a motion where the filter is;
-here both are options of `RobotSession.control`, and a motion ends when what is sent has arrived at the last command.
+The vendor's client always filters commands at 100 Hz and ends a motion before the filter has settled. Here both filters
+are options of `RobotSession.control`, and a motion ends when the sent command has reached the last one.
 """
 
 from __future__ import annotations
@@ -21,10 +21,8 @@ from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp
 
 FILTER_OFF = 1000.0  # [Hz] Cut-off frequency from which on nothing is filtered: the rate of the commands.
-_CATCH_UP = 300.0  # [1/s] What is behind is caught up with at most so much of itself a second; a choice.
-_BRAKING = (
-    0.7  # Part of the acceleration that braking counts on: the rest is for the delay of a limited jerk. A choice.
-)
+_CATCH_UP = 300.0  # [1/s] Largest rate at which a lag decays: about three cycles, slower than the 1 kHz sampling.
+_BRAKING = 0.7  # Part of the acceleration used for braking: the rest covers the delay of a limited jerk. Tuning value.
 _HALVINGS = 16  # Steps of a search: 1/65536 of the acceleration.
 _ROUNDING = 1.0 + 1e-6
 _NEAR = 1e-7  # [rad, m or N m] In one cycle that is a jerk of 100 units/s^3.
@@ -60,7 +58,7 @@ def low_pass_pose(u: Array, x: Array, k: float) -> Array:
 
 
 class Bounds(NamedTuple):
-    """What a rate limiter keeps: numbers for a vector's length, or arrays, one element a coordinate."""
+    """Bounds of a rate limiter: numbers for a vector's length, or arrays with one element per coordinate."""
 
     velocity: float | Array
     acceleration: float | Array
@@ -68,7 +66,7 @@ class Bounds(NamedTuple):
 
 
 class SignalState(NamedTuple):
-    """Where a limited signal is, by backward differences at 1 ms."""
+    """Velocity and acceleration of a limited signal, by backward differences at 1 ms."""
 
     velocity: Array
     acceleration: Array
@@ -110,7 +108,7 @@ def limit_vector_rate(behind: Array, wanted: Array, last: SignalState, bounds: B
     closing = rest * (float(_closing_speed(length, bounds)) / length) if length > 0.0 else rest
     velocity = _shortened(feed + closing, bounds.velocity)
     goal = _shortened((velocity - last.velocity) / CYCLE_TIME, bounds.acceleration)
-    # Letting go of the acceleration is always allowed; from there we go towards the goal as far as all bounds permit.
+    # Reducing the acceleration is always allowed; from there it moves towards the goal as far as all bounds permit.
     size = float(np.linalg.norm(last.acceleration))
     ease = last.acceleration * max(0.0, 1.0 - float(bounds.jerk) * CYCLE_TIME / size) if size > 0.0 else np.zeros(3)
     low, high = 0.0, 1.0
@@ -128,14 +126,14 @@ def limit_vector_rate(behind: Array, wanted: Array, last: SignalState, bounds: B
 
 
 class CommandFilter(Protocol):
-    """Stands between a callback and the wire. Owned by the control loop."""
+    """A filter of a callback's commands. Owned by the control loop."""
 
     def begin(self, command: Command) -> None:
-        """Starts at rest at the first command of a motion."""
+        """Starts at standstill at the first command of a motion."""
         ...
 
     def step(self, command: Command) -> Command:
-        """Returns what to send for a command, one a cycle."""
+        """Returns the filtered command; called once per cycle."""
         ...
 
 
@@ -143,7 +141,7 @@ class LowPass:
     """The first-order filter of the vendor's client, for every kind of command.
 
     Args:
-        cut_off: Cut-off frequency, [Hz]; the vendor's client uses 100 unless told otherwise.
+        cut_off: Cut-off frequency, [Hz]; the vendor's client uses 100 by default.
 
     Raises:
         InvalidValueError: The frequency is not above 0.
@@ -154,7 +152,7 @@ class LowPass:
         self._last: Command | None = None
 
     def begin(self, command: Command) -> None:
-        """Starts at rest at the first command of a motion."""
+        """Starts at standstill at the first command of a motion."""
         self._last = command
 
     def step(self, command: Command) -> Command:
@@ -195,7 +193,7 @@ class RateLimiter:
         self._rates: list[SignalState] = []
 
     def begin(self, command: Command) -> None:
-        """Starts at rest at the first command of a motion; torques start at zero."""
+        """Starts at standstill at the first command of a motion; torques start at zero."""
         self._command = self._sent = command
         if isinstance(command, JointPosition):
             self._rates = [_rest(len(command.q))]
@@ -250,7 +248,7 @@ class RateLimiter:
 
 
 def is_near(sent: Command, wanted: Command) -> bool:
-    """Returns whether what is sent is as good as what was wanted: the rest, in one cycle, is no jerk to speak of."""
+    """Returns whether the sent command is so close to the wanted one that the rest, in one cycle, is a small jerk."""
     if isinstance(sent, CartesianPosition) and isinstance(wanted, CartesianPosition):
         off = float(np.abs(sent.T_base_tool - wanted.T_base_tool).max())
         return max(off, abs((sent.psi or 0.0) - (wanted.psi or 0.0))) <= _NEAR
@@ -306,5 +304,5 @@ def _shortened(vector: Array, longest: float | Array) -> Array:
 
 
 def _snapped(x: Array, u: Array) -> Array:
-    """Returns the command itself where what is sent differs from it by rounding only."""
+    """Returns the command itself where the sent value differs from it only by rounding."""
     return u if float(np.abs(x - u).max()) <= _ARRIVED else x

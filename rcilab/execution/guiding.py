@@ -1,4 +1,4 @@
-"""Hand guiding: it is requested from the controller, which may also end it by itself."""
+"""Hand guiding, which the controller starts on request and may end by itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.makers.driver import Driver, GuideKind, GuideSpace
 
 
 def require_guidable(space: object, kind: object) -> None:
-    """Makes sure that an arm can be guided so.
+    """Requires a valid space and kind of guiding.
 
     Raises:
         InvalidValueError: The space or the kind does not exist; the message lists those that do.
@@ -33,7 +33,7 @@ class HandGuide:
         self._was_seen = False
 
     def start(self, space: GuideSpace, kind: GuideKind) -> None:
-        """Frees the arm.
+        """Starts hand guiding.
 
         Raises:
             CommandRejectedError: The controller refuses.
@@ -41,11 +41,11 @@ class HandGuide:
         self._driver.start_guiding(space, kind)
 
     def stop(self) -> None:
-        """Holds the arm again; returns once it stands still."""
+        """Ends hand guiding; returns once the arm stands still."""
         self._driver.stop_guiding()
 
     def has_ended(self, state: RobotState) -> bool:
-        """Returns whether the controller has left guiding by itself: a fault, an emergency stop, power taken away.
+        """Returns whether the controller has ended guiding by itself: a fault, an emergency stop, power off.
 
         States that were on their way before the arm was freed do not count.
         """

@@ -13,7 +13,7 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import RobotState
 from rcilab.model.dynamics.symmetric_solver import (
-    SymmetricSolver as SymmetricSolver,  # Loaded now, not as the arm waits.
+    SymmetricSolver as SymmetricSolver,  # Loaded now, not while the arm waits.
 )
 from rcilab.motion import Jog
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 JogKind: TypeAlias = Literal["joint", "base", "tool"]
-"""What the numbers are: joint velocities, or a twist of the tool in axes of the base or of the tool."""
+"""Meaning of the numbers: joint velocities, or a twist of the tool in axes of the base or of the tool."""
 
 _KINDS: tuple[JogKind, ...] = get_args(JogKind)
 _NO_TWIST = (0.0,) * 6
@@ -30,7 +30,7 @@ LINGER = 1.0  # [s] at standstill after which a jog ends; until then the next on
 
 @dataclass(frozen=True, slots=True)
 class JogCommand:
-    """How the arm shall move while it is held."""
+    """Motion of the arm while the jog is held."""
 
     kind: JogKind
     values: tuple[float, ...]
@@ -52,15 +52,15 @@ def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
 
 
 class JogSource(Protocol):
-    """Where the jog that is held comes from."""
+    """The source of the held jog."""
 
     def read(self, current: JogCommand | None) -> JogCommand | None:
-        """Returns the jog that is held now, `current` where it cannot be read just now; None: nothing is held."""
+        """Returns the held jog, `current` if it cannot be read now, or None if nothing is held."""
         ...
 
 
 class JogCallback:
-    """Gives the command of every cycle of a jog. Owned by the control loop's thread.
+    """Returns the command of every cycle of a jog. Owned by the control loop's thread.
 
     Args:
         source: Where the jog is read from.
@@ -94,7 +94,7 @@ class JogCallback:
         return JointPosition(q, finished=is_over and cycle > 0)
 
     def _lead(self) -> None:
-        """Follows what is held now."""
+        """Follows the held jog."""
         command = self._source.read(self._command) if self.is_wanted else None
         if command is None:
             if self._command is not None:

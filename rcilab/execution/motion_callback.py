@@ -26,7 +26,7 @@ def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Ca
 
     Args:
         rows: Joint angles, shape (N, n), [rad].
-        on_cycle: Told the number of every cycle.
+        on_cycle: Called with the number of every cycle.
     """
     last = len(rows) - 1
 
@@ -46,7 +46,7 @@ def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[
         path: The path.
         shares: From 0 to 1, shape (N,).
         with_psi: Whether to send the arm angle; if not, the controller holds its own.
-        on_cycle: Told the number of every cycle.
+        on_cycle: Called with the number of every cycle.
     """
     last = len(shares) - 1
 
@@ -61,7 +61,7 @@ def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[
 
 
 def report_progress(motion: Motion, progress: Progress | None) -> Callable[[int], None] | None:
-    """Returns what tells somebody about 20 times a second, and at the end, how far a motion is; None for nobody."""
+    """Returns a function that reports the progress about 20 times a second and at the end, or None."""
     if progress is None:
         return None
     last = len(motion.q) - 1

@@ -1,4 +1,4 @@
-"""What moves the arm over a driver: prepared motions and callbacks, with the conditions that stop them."""
+"""Executes prepared motions and callbacks over a driver, with the conditions that stop them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up: every cycle of it is recorded.
 HELD_TOO_LONG = "held for more than 120 s"
-"""Why a motion ends that is held for `LONGEST_PAUSE`."""
+"""Reason for the end of a motion that is held for `LONGEST_PAUSE`."""
 
 
 class MotionExecutor:
@@ -68,22 +68,22 @@ class MotionExecutor:
         """Runs a motion to its end.
 
         A `MotionStream` in torque mode passes a rate limiter, and stops along its reference: there is no commanded
-        place to brake, so the reference stops and the torques bring the arm after it.
+        position to brake, so the reference stops and the torques make the arm follow it.
 
         Args:
             callback: A `MotionStream`, or any other callback.
             mode: How the arm is commanded.
             model: The arm.
-            filters: What every command passes before it is sent.
-            box: The safety box that the controller has, as far as it is known, for the message of a fault.
-            collision_thresholds: Those of the controller, shape (n,), [N m], as far as they are known, for the same.
+            filters: Filters of every command.
+            box: The controller's safety box, if known, for fault messages.
+            collision_thresholds: Those of the controller, shape (n,), [N m], if known, for fault messages.
 
         Returns:
             None when it ran to its end, or why it stopped before.
 
         Raises:
             ControlError: The controller stopped it.
-            ConnectionLostError: The controller is gone.
+            ConnectionLostError: The connection to the controller is lost.
             Exception: What the callback raised; the arm was stopped.
         """
         self._stream = callback if isinstance(callback, MotionStream) else None

@@ -1,4 +1,4 @@
-"""How far a motion is while it is streamed."""
+"""Progress of a motion that is being streamed."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from rcilab.core.state import Mode
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionProgress:
-    """The motion that `RobotSession.execute` streams just now; see `RobotSession.progress`."""
+    """Progress of the motion that `RobotSession.execute` is streaming; see `RobotSession.progress`."""
 
     time: float
-    """Since its first command, [s]."""
+    """Time since its first command, [s]."""
     duration: float
-    """How long it takes at the pace that it has, [s]; of a motion that is held, until it stands."""
+    """Its duration with the present speed override, [s]; of a held motion, until it stands."""
     place: float
-    """Where in its plan it is, [s]; behind `time` when it ran slower or was held."""
+    """Time in its plan, [s]; less than `time` when it ran slower or was held."""
     planned: float
-    """Where its plan ends, [s]."""
+    """Duration of its plan, [s]."""
     pace: float
-    """Part of its planned speed that it runs at, or comes to; 0 when it is held."""
+    """Speed override: the part of its planned speed that it runs at or changes to; 0 when it is held."""
     mode: Mode
-    """How the arm is commanded in it."""
+    """Command mode."""
 
     def __repr__(self) -> str:
         return (

@@ -1,4 +1,4 @@
-"""One motion on a connection, from its start to its run."""
+"""Execution of motions on a connection, and their recorded runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.driver import ConfiguredArm, StreamingDriver
 from rcilab.realtime.cpu_affinity import one_core
-from rcilab.realtime.punctual import punctual
+from rcilab.realtime.scheduling import realtime_section
 from rcilab.recording.run import Run, build_run, describe_end
 from rcilab.recording.setup import Setup
 
@@ -88,19 +88,19 @@ class MotionRunner:
         filters: Sequence[CommandFilter] = (),
         override: SpeedOverride[bool] | None = None,
     ) -> Run:
-        """Runs a motion and returns what became of it.
+        """Runs a motion and returns its run.
 
         Args:
-            callback: Gives the command for each state.
-            mode: How the arm is commanded.
-            plan: What is to be commanded; None where only the callback knows.
-            filters: What every command passes before it is sent.
+            callback: Returns the command for each state.
+            mode: Command mode.
+            plan: The planned motion; None for a callback without one.
+            filters: Filters of every command.
             override: Changes the plan while it runs.
 
         Raises:
             ControlError: The controller stopped it.
-            ConnectionLostError: The controller is gone.
-            Exception: Whatever the callback raised; the arm was stopped.
+            ConnectionLostError: The connection to the controller is lost.
+            Exception: An exception of the callback; the arm was stopped.
         """
         model = self._arm.model
         time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held.
@@ -128,7 +128,7 @@ class MotionRunner:
             return run
 
         try:
-            with self._lock.move(), punctual(self._realtime), one_core(self.partner):
+            with self._lock.move(), realtime_section(self._realtime), one_core(self.partner):
                 stopped = executor.run(
                     callback,
                     mode,

@@ -1,4 +1,4 @@
-"""The flight recorder: one fixed-size row for every cycle, in memory that was allocated beforehand."""
+"""The recorder of cycles: one fixed-size row per cycle in preallocated memory."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.fault import FaultCode
 from rcilab.core.state import RobotState
 
-RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps unless told otherwise; a choice.
+RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps by default: longer than most motions, about 50 MB.
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
 _NO_POSE = (math.nan,) * 16
 _NUMBERS = struct.Struct("<4d")
-_GRID_CYCLES = 8  # A controller that slips counts as late for so many cycles, a hiccup of ours for as many at most.
+_GRID_CYCLES = 8  # A clock shift of the controller, or a delay here, counts as lateness for at most so many cycles.
 
 
 class Recorder:
@@ -128,10 +128,10 @@ class Recorder:
 
 
 class CycleLog:
-    """Writes states and answers as rows of a recorder, and judges how late each was. Owned by the loop's thread.
+    """Writes states and answers as rows of a recorder, with their lateness. Owned by the loop's thread.
 
-    Lateness is counted from the robot's own 1 ms grid, as the most punctual of the last `_GRID_CYCLES` states shows it.
-    So short a memory follows another computer's clock, and a controller that left a cycle out.
+    Lateness is relative to the robot's own 1 ms grid, estimated from the earliest of the last `_GRID_CYCLES` states.
+    This short history follows another computer's clock and a controller that skipped a cycle.
 
     Args:
         recorder: Where rows go.
@@ -142,13 +142,13 @@ class CycleLog:
         self.recorder = recorder
         self._on_row = on_row
         self.lateness = 0.0
-        """Of the newest row, [s]; NaN when nobody waited for it."""
+        """Lateness of the newest row, [s]; NaN when the loop did not wait for it."""
         self.lost_total = 0
-        """Controller cycles whose state never arrived."""
+        """Controller cycles whose state was not received."""
         self.state: RobotState | None = None
         """The state of the newest row."""
         self.braking = False
-        """Whether what is sent just now brings the arm to rest; the control loop says so."""
+        """Whether the present commands are part of a stop; set by the control loop."""
         self._last_id: int | None = None
         self._origins: deque[int] = deque(maxlen=_GRID_CYCLES)
         self._nothing = (math.nan,) * recorder.n
@@ -157,7 +157,7 @@ class CycleLog:
         self._idle_count = -1  # What the recorder counted when the newest row was one of no motion, and ours.
 
     def restart(self) -> None:
-        """Forgets the grid and the last number: another connection begins."""
+        """Resets the grid and the last number for a new connection."""
         self._last_id = None
         self.lost_total = 0
 
@@ -179,7 +179,7 @@ class CycleLog:
             t: Motion time, [s].
             sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
             command: What was sent in answer.
-            is_awaited: Whether somebody waited for it; of one that was found waiting nothing tells how late it is.
+            is_awaited: Whether the loop waited for it; the lateness of one that was already waiting is not known.
         """
         before, self.state = self.state, state
         number = state.message_id
@@ -244,7 +244,7 @@ class CycleLog:
 
 
 def _is_alike(state: RobotState, other: RobotState) -> bool:
-    """Returns whether a row shows the same of both: by identity, which is how a decoder gives what repeats."""
+    """Returns whether two states give the same row: by identity, because the decoder reuses repeated values."""
     return (
         state.q is other.q
         and state.q_c is other.q_c

@@ -1,4 +1,4 @@
-"""The session: one arm, connected. The same object for a real robot, `connect`, and a simulated one, `simulate`."""
+"""The session with one arm: the same object for a real robot, `connect`, and a simulated one, `simulate`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
 from rcilab.motion.path import build_arc, build_line
-from rcilab.motion.speed_scaling import require_pace
+from rcilab.motion.speed_scaling import require_speed_override
 from rcilab.recording.run import Run
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ _sessions_lock = threading.Lock()
 
 
 def open_sessions() -> list[RobotSession]:
-    """Returns the sessions of this process that are not closed; for any thread."""
+    """Returns the open sessions of this process; thread-safe."""
     with _sessions_lock:
         sessions = list(_sessions)
     return [session for session in sessions if not session.is_closed]
@@ -64,15 +64,15 @@ def connect(
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` when the robot takes commands at another UDP port,
             `?client_port=M` when it sends states to another port of ours; `?world_port=W` for `world`.
-        model: The arm, with its tool and load; None takes the arm that the controller says it is. The tool is the
-            controller's: where it has another one, a warning says so, and `robot.set_coor` sets yours.
-        timeout: How long to wait for the connection, for the first state, and for every answer, [s].
-        record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
+        model: The arm, with its tool and load; None uses the arm that the controller reports. The tool is the
+            controller's: if it differs from the model's, a warning says so, and `robot.set_tool` sets yours.
+        timeout: Timeout of the connection, of the first state, and of every response, [s].
+        record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
 
     Raises:
-        ConnectionLostError: Nobody answers there, or states do not arrive; the message says what to check.
-        ModelError: The model is another arm than the controller's, or none was given and that one is not known.
-        InvalidValueError: The address, the model or the timeout is none.
+        ConnectionLostError: The robot does not respond, or states do not arrive; the message says what to check.
+        ModelError: The model is another arm than the controller's, or the controller's arm is not known.
+        InvalidValueError: The address, the model or the timeout is not valid.
     """
     return open_session(address, model, timeout, record_all=record_all)
 
@@ -89,18 +89,18 @@ def open_session(
     world: SimulationControl | None = None,
     partner: int | None = None,
 ) -> RobotSession:
-    """Returns a session as `connect` does, with what only a simulation sets.
+    """Returns a session as `connect` does, with further options for a simulation.
 
     Args:
         address: See `connect`, as the next three.
         model: The arm.
         timeout: [s].
-        record_all: Also as of `connect`.
+        record_all: As for `connect`.
         realtime: False for a controller in lock-step, where timing means nothing.
         silence: Time without a state, while moving, that counts as a lost connection, [s]; None is `SILENCE`, or
             `SILENCE_HERE` for a controller on this machine: there is no cable to lose, and a busy machine pauses it.
         on_close: Called once when the session is closed, such as to end a private controller.
-        world: What surrounds a virtual robot; None where nothing of the kind is known.
+        world: The simulation control of a virtual robot; None without one.
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
     require_timeout(timeout)
@@ -137,16 +137,16 @@ class RobotSession(Closeable):
     The commands of the maker's own protocol are in the attribute named like the scheme of its addresses:
     `robot.rci.set_filters(...)` for `rci://`.
 
-    While a motion runs, `stop`, `close`, `state`, `power_off`, which ends the motion, and those commands that the
-    controller answers then may be called, from any thread and from a callback. All else is refused and does not
-    disturb the motion. A session stays usable after faults: `recover()`.
+    While a motion runs, `stop`, `close`, `state`, `power_off`, which ends the motion, and the commands that the
+    controller accepts during a motion may be called, from any thread and from a callback. Other calls are refused
+    without effect on the motion. A session stays usable after faults: call `recover()`.
 
     Args:
         driver: The connection.
         arm: What is configured on the robot.
-        lock: Who may use the connection; closes it with the session.
+        lock: The lock of the connection; closes it with the session.
         runner: Runs motions on it.
-        simulation: What surrounds a virtual robot; None where no simulation port is known.
+        simulation: The simulation control of a virtual robot; None without a simulation port.
     """
 
     def __init__(
@@ -164,7 +164,7 @@ class RobotSession(Closeable):
         self._simulation = simulation
         self._commands = driver.open_commands(arm, lock)
         self._streamed: tuple[MotionStream, SpeedOverride[bool]] | None = None
-        """What `execute` streams just now."""
+        """The stream of the running `execute`."""
         with _sessions_lock:
             _sessions.add(self)
 
@@ -180,7 +180,7 @@ class RobotSession(Closeable):
 
     @property
     def model(self) -> RobotModel:
-        """The arm, with the tool, the load and the soft limits that this session has set."""
+        """The arm, with the tool, the load and the soft limits set by this session."""
         return self._arm.model
 
     @property
@@ -190,20 +190,20 @@ class RobotSession(Closeable):
 
     @property
     def safety_box(self) -> SafetyBox | None:
-        """The box that the tool must stay in, as far as this session has set one; motions are checked with it."""
+        """The safety box of the tool, if this session has set one; motions are checked with it."""
         return self._arm.safety_box
 
     @property
     def address(self) -> str:
-        """Where the robot is."""
+        """Address of the robot."""
         return self._driver.name
 
     @property
     def simulation(self) -> SimulationControl:
-        """What surrounds a virtual robot: `robot.simulation.push([0, 0, -20, 0, 0, 0])`.
+        """Control of a virtual robot's simulation: `robot.simulation.push([0, 0, -20, 0, 0, 0])`.
 
         Raises:
-            UsageError: It is a real robot, or the world port of the virtual one is not known.
+            UsageError: It is a real robot, or the simulation port of the virtual one is not known.
         """
         if self._simulation is None:
             raise UsageError(
@@ -219,12 +219,12 @@ class RobotSession(Closeable):
 
     @property
     def is_moving(self) -> bool:
-        """Whether a motion runs, in whichever thread; `progress` says more of a motion of `execute`."""
+        """Whether a motion runs, in any thread; see also `progress` for a motion of `execute`."""
         return self._lock.is_moving
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed; a new one is needed then."""
+        """Whether it was closed; open a new one then."""
         return self._lock.is_closing
 
     def on_run(self, listener: RunListener) -> Callable[[], None]:
@@ -237,20 +237,20 @@ class RobotSession(Closeable):
 
     @property
     def state(self) -> RobotState:
-        """The state of this very millisecond; inside a callback, the one that it was given."""
+        """The newest state; inside a callback, the one passed to it."""
         with self._lock.take_unless_moving() as is_mine:
             if is_mine or self._driver.latest is None:
                 return self.receive_state()
         return self._driver.latest
 
     def receive_states(self, timeout: float = 1.0) -> list[RobotState]:
-        """Returns every state that has arrived since the last look, oldest first; waits for the first one.
+        """Returns every state received since the last call, oldest first; waits for the first one.
 
         Args:
-            timeout: How long to wait for it, [s].
+            timeout: Timeout, [s].
 
         Raises:
-            ConnectionLostError: None came.
+            ConnectionLostError: No state was received.
             UsageError: The session is closed, or a motion runs.
         """
         require_timeout(timeout)
@@ -261,15 +261,15 @@ class RobotSession(Closeable):
         return states
 
     def receive_state(self, timeout: float = 1.0, max_age: float = 0.0) -> RobotState:
-        """Returns a state that was sent after this call; older ones that waited in the socket are dropped.
+        """Returns a state that was sent after this call; older ones in the socket are dropped.
 
         Args:
-            timeout: How long to wait for it, [s].
-            max_age: How long ago it may have been sent, [s]: a state that is certainly no older is returned without
-                waiting. 0 takes only one that is sent after the call.
+            timeout: Timeout, [s].
+            max_age: Largest age of the state, [s]: a state that is certainly not older is returned without waiting. 0
+                accepts only one that is sent after the call.
 
         Raises:
-            ConnectionLostError: None came.
+            ConnectionLostError: No state was received.
             UsageError: The session is closed, or a motion runs: `state` is the newest then.
         """
         require_timeout(timeout)
@@ -291,7 +291,7 @@ class RobotSession(Closeable):
             self._driver.power(True)
 
     def power_off(self) -> None:
-        """Switches the motors off; a motion that runs ends with it."""
+        """Switches the motors off, which ends a running motion."""
         with self._lock.take_unless_moving() as is_mine:
             if is_mine:
                 self._driver.power(False)
@@ -318,7 +318,7 @@ class RobotSession(Closeable):
         self._commands.set_load(mass, center_of_mass, inertia)
 
     def set_safety_box(self, box: SafetyBox) -> None:
-        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        """Sets the safety box that the origin of the tool must stay in, and whether it is active."""
         self.configure(RobotConfiguration(box=require_box(box)))
 
     def configure(self, configuration: RobotConfiguration) -> None:
@@ -339,30 +339,30 @@ class RobotSession(Closeable):
         mode: Mode = "joint_position",
         pace: float = 1.0,
     ) -> Run:
-        """Streams a motion and returns what became of it. Checks it first, by the conditions of the mode.
+        """Checks a motion by the conditions of the mode, streams it and returns its run.
 
-        From another thread, `pause`, `resume` and `set_pace` change how fast it runs, and `progress` tells how far it
-        is. In torque mode the arm follows softly, see `rcilab.execution.command_builder`.
+        From another thread, `pause`, `resume` and `set_pace` change its speed, and `progress` returns its progress. In
+        torque mode the arm is compliant, see `rcilab.execution.command_builder`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
-            certificate: From an earlier `check(motion, model, mode=mode)`; then only its freshness is verified.
-            progress: Told how far it is, about 20 times a second.
-            mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques.
-            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
+            certificate: From an earlier `check(motion, model, mode=mode)`; then only its validity is verified.
+            progress: Called with time and duration about 20 times a second.
+            mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques.
+            pace: Initial speed override, 0.1 to 1; `set_pace` changes it later.
 
         Raises:
-            InvalidValueError: The pace is out of range; nothing moved.
-            PlanningError: At this pace it would break a condition that it keeps as planned; nothing moved.
-            ConformanceError: The motion breaks a condition; nothing moved.
-            CertificateError: The certificate is for something else; nothing moved.
-            UsageError: The motion starts elsewhere than the arm is; nothing moved.
-            ControlError: The controller stopped it; `.faults` and `.record` say why. `recover()` leads on.
-            ConnectionLostError: The controller is gone.
+            InvalidValueError: The speed override is out of range; nothing moved.
+            PlanningError: With this override it would violate a condition; nothing moved.
+            ConformanceError: The motion violates a condition; nothing moved.
+            CertificateError: The certificate does not match; nothing moved.
+            UsageError: The motion does not start at the arm's position; nothing moved.
+            ControlError: The controller stopped it; see `.faults` and `.record`, and call `recover()`.
+            ConnectionLostError: The connection to the controller is lost.
         """
         require_motion(motion, certificate)
         require_mode(mode)
-        require_pace(pace)
+        require_speed_override(pace)
         with self._lock.begin_motion("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
@@ -385,7 +385,7 @@ class RobotSession(Closeable):
 
     @property
     def progress(self) -> MotionProgress | None:
-        """Place and pace of the motion that `execute` runs in another thread; None while it runs none."""
+        """Progress of the motion that `execute` runs in another thread; None without one."""
         if (streamed := self._streamed) is None:
             return None
         stream, override = streamed
@@ -396,12 +396,12 @@ class RobotSession(Closeable):
             duration=scaled.duration,
             place=scaled.place_at(cycle),
             planned=scaled.motion.duration,
-            pace=scaled.pace,
+            pace=scaled.override,
             mode=override.mode,
         )
 
     def pause(self) -> None:
-        """Holds the motion that `execute` runs in another thread, along its way and within all limits.
+        """Holds the motion that `execute` runs in another thread, on its path and within all limits.
 
         Raises:
             UsageError: No such motion runs.
@@ -410,21 +410,21 @@ class RobotSession(Closeable):
         self._change_pace(0.0)
 
     def resume(self, pace: float = 1.0) -> None:
-        """Goes on with a motion that is held; see `set_pace`."""
+        """Resumes a held motion; see `set_pace`."""
         self.set_pace(pace)
 
     def set_pace(self, pace: float) -> None:
-        """Runs the motion of `execute`, in another thread, at part of its planned speed, judged as the motion was.
+        """Sets the speed override of the motion that `execute` runs in another thread, checked as the motion was.
 
         Args:
             pace: 0.1 to 1.
 
         Raises:
-            InvalidValueError: The pace is out of range.
+            InvalidValueError: The override is out of range.
             UsageError: No such motion runs.
-            PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
+            PlanningError: The change is not possible within the limits from here; the motion continues unchanged.
         """
-        self._change_pace(require_pace(pace))
+        self._change_pace(require_speed_override(pace))
 
     def _change_pace(self, pace: float) -> None:
         if (streamed := self._streamed) is None:
@@ -446,12 +446,12 @@ class RobotSession(Closeable):
         cycles since the first call, in seconds, so a lost packet does not stretch time. With a filter or a limiter the
         motion ends when what is sent has arrived at the last command.
 
-        A tool that starts outside its safety box may only be led into it, as with `execute`: the controller stops a
-        motion that goes farther out, or past a face that it did not start beyond.
+        A tool that starts outside its safety box may only move inwards, as with `execute`: the controller stops a
+        motion that moves farther out, or past a face that it did not start beyond.
 
         Args:
             callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, as the mode asks for.
-            mode: How the controller shall follow.
+            mode: Command mode.
             cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the vendor's client has one at 100.
                 None sends them as they are.
             rate_limit: Keeps the commands inside the limits of velocity, acceleration, jerk or torque rate: those of
@@ -459,35 +459,35 @@ class RobotSession(Closeable):
                 need not be enough for the joints. None leaves all of it to the callback.
 
         Raises:
-            ControlError: The controller stopped the motion; `.faults` and `.record` say why. `recover()` leads on.
-            ConnectionLostError: The controller is gone.
-            InvalidValueError: A command was unusable; the arm was brought to rest.
-            Exception: Whatever the callback raised; the arm was brought to rest.
+            ControlError: The controller stopped the motion; see `.faults` and `.record`, and call `recover()`.
+            ConnectionLostError: The connection to the controller is lost.
+            InvalidValueError: A command was not valid; the arm was stopped.
+            Exception: An exception of the callback; the arm was stopped.
         """
         require_mode(mode)
         filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
         if rate_limit is not None:
             filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit)))
         if not callable(callback):
-            raise InvalidValueError("callback", described(callback), "is no function (state, t) -> command")
+            raise InvalidValueError("callback", described(callback), "must be a function (state, t) -> command")
         with self._lock.begin_motion("control"):
             return self._runner.run(callback, mode, filters=filters)
 
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
 
-        From the commanded angles, not from a start that the caller has to know; a move to where the arm is ends at
-        once; the speed has a range; the motion is checked before it begins.
+        Unlike the vendor's, it starts at the commanded angles; a move to the present angles ends at once; the speed has
+        a range; the motion is checked before it starts.
 
         Args:
             goal: Joint angles, shape (n,), [rad].
             speed: Part of 1 rad/s (1.25 for the last three joints) and 2.5 rad/s^2, 0.001 to 1.
-            progress: Told how far it is, about 20 times a second.
+            progress: Called with time and duration about 20 times a second.
 
         Raises:
             PlanningError: The goal, or the arm, is outside the joint limits.
-            ConformanceError: The motion breaks a condition; nothing moved.
-            ControlError: The controller stopped it. `recover()` leads on.
+            ConformanceError: The motion violates a condition; nothing moved.
+            ControlError: The controller stopped it; call `recover()`.
         """
         with self._lock.begin_motion("move_j"):
             state = self.receive_state()
@@ -508,12 +508,12 @@ class RobotSession(Closeable):
             goal: Pose of the tool in base.
             speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1; of 1 rad/s and 2.5 rad/s^2 where the tool only turns.
             psi: Arm angle of a 7-axis arm at the goal, [rad], 0 too; None leaves it to the controller, which holds it.
-            progress: Told how far it is, about 20 times a second.
+            progress: Called with time and duration about 20 times a second.
 
         Raises:
             PlanningError: A pose on the way is out of reach or singular; the message says where and why.
-            ConformanceError: The joints would break a condition; nothing moved.
-            ControlError: The controller stopped it. `recover()` leads on.
+            ConformanceError: The joints would violate a condition; nothing moved.
+            ControlError: The controller stopped it; call `recover()`.
         """
         with self._lock.begin_motion("move_l"):
             state = self.receive_state()
@@ -534,12 +534,12 @@ class RobotSession(Closeable):
             goal: Pose of the tool in base.
             speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1.
             psi: Arm angle of a 7-axis arm at the goal, [rad]; None leaves it to the controller, which holds it.
-            progress: Told how far it is, about 20 times a second.
+            progress: Called with time and duration about 20 times a second.
 
         Raises:
             PlanningError: The positions make no circle, or a pose on the way is out of reach or singular.
-            ConformanceError: The joints would break a condition; nothing moved.
-            ControlError: The controller stopped it. `recover()` leads on.
+            ConformanceError: The joints would violate a condition; nothing moved.
+            ControlError: The controller stopped it; call `recover()`.
         """
         with self._lock.begin_motion("move_c"):
             state = self.receive_state()
@@ -548,12 +548,12 @@ class RobotSession(Closeable):
             return self._move_along(path, state, speed, psi is not None, progress)
 
     def stop(self, reason: str = "on request") -> None:
-        """Brings a running motion to rest within the limits; `execute` or `control` then returns its run.
+        """Stops a running motion within the limits; `execute` or `control` then returns its run.
 
-        May be called from another thread, or from a callback. Does nothing when nothing runs, or is about to.
+        May be called from another thread or from a callback. Does nothing if no motion runs or is about to.
 
         Args:
-            reason: What the run says in `stopped`; the first one counts.
+            reason: Reason for `Run.stopped`; the first one counts.
         """
         self._lock.stop(reason)
 
@@ -562,13 +562,13 @@ class RobotSession(Closeable):
 
         Raises:
             CommandRejectedError: The controller refuses; the message says what it waits for.
-            DeadlineError: It agreed, and the faults stayed.
+            DeadlineError: It accepted, and the faults remained.
         """
         with self._lock.take("recover"):
             self._driver.recover()
 
     def close(self) -> None:
-        """Brings a running motion to rest within the limits and ends the connection. May be called twice.
+        """Stops a running motion within the limits and ends the connection. May be called twice.
 
         The call that runs the motion returns its run. From inside a callback, the connection ends with the motion.
         """
@@ -589,7 +589,7 @@ class RobotSession(Closeable):
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
     ) -> Run:
-        """Streams a path in Cartesian position mode once its joint motion is found good."""
+        """Streams a path in Cartesian position mode after checking its joint motion."""
         motion = follow_path(self.model, state.q_c, path, speed)
         self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))

@@ -17,7 +17,7 @@ class SessionLock:
     """Threads take it in turn for requests; while one runs a motion, only `stop` and `close` are accepted.
 
     Attributes:
-        is_closing: Whether nothing may take it any more.
+        is_closing: Whether it cannot be taken any more.
 
     Args:
         disconnect: Ends the connection, once it is not in use; may be called twice.
@@ -37,7 +37,7 @@ class SessionLock:
         return self._mover is not None
 
     def reason_to_stop(self, t: float) -> str | None:
-        """Returns why the motion that runs is to stop; its control loop asks in every cycle."""
+        """Returns why the running motion is to stop, or None; its control loop calls it in every cycle."""
         if self.is_closing:
             return _CLOSED
         return self._reason
@@ -47,7 +47,7 @@ class SessionLock:
         """Takes the connection: waits for another thread's request, not for a motion.
 
         Args:
-            what: What it is needed for.
+            what: Purpose, for the error.
 
         Raises:
             UsageError: A motion runs, or the connection closes.
@@ -90,7 +90,7 @@ class SessionLock:
 
     @contextmanager
     def move(self) -> Iterator[None]:
-        """Runs the motion of `begin_motion`: others are refused from here on, its callback's too."""
+        """Runs the motion of `begin_motion`: other uses are refused from here on, also by its callback."""
         self._mover = threading.get_ident()
         try:
             yield
@@ -103,7 +103,7 @@ class SessionLock:
         """Stops the motion that runs or is about to; does nothing when there is none.
 
         Args:
-            reason: What its run says; the first one counts.
+            reason: Reason for its run; the first one counts.
         """
         if self._can_stop:
             self._reason = self._reason or reason

@@ -1,10 +1,10 @@
-"""The world of a virtual robot: push it, put a box in its way, press its emergency stop, spoil its network.
+"""Control of a virtual robot's simulation: external forces, obstacles, emergency stop, network faults.
 
     with rcilab.simulate(model, plant="mujoco") as robot:
         robot.world.push([0, 0, -20, 0, 0, 0], link=4, duration=0.5)
 
-Nothing of it goes over the RCI: a virtual controller has a port of its own for it, a real one has none. Every method
-may be called from any thread, while a motion runs and from inside a callback, and returns once it is done.
+It does not use the RCI: a virtual controller has a separate simulation port, a real one does not. Every method may be
+called from any thread, while a motion runs and from inside a callback, and returns when it is done.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ TIMEOUT = LONGEST_STALL + 5.0  # [s] A controller that stalls on request answers
 
 
 class SimulationControl(Closeable):
-    """What surrounds one virtual robot. Connects when it is first used; `close` ends that.
+    """Client of one virtual robot's simulation port. Connects on first use; `close` ends the connection.
 
     Args:
-        host: Where the world port is.
-        port: Its number.
-        timeout: How long to wait for the connection and for every answer, [s].
+        host: Host of the simulation port.
+        port: Port number.
+        timeout: Timeout of the connection and of every response, [s].
     """
 
     def __init__(self, host: str, port: int, timeout: float = TIMEOUT) -> None:
@@ -84,7 +84,7 @@ class SimulationControl(Closeable):
         point: ArrayLike | None = None,
         duration: float | None = None,
     ) -> None:
-        """Lets something press on the arm; it replaces what pressed before.
+        """Applies an external force to the arm; it replaces an earlier one.
 
         Args:
             wrench: Force and moment, base axes, shape (6,), [N, N m].
@@ -96,11 +96,11 @@ class SimulationControl(Closeable):
         self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration))
 
     def release(self) -> None:
-        """Takes away whatever presses on the arm."""
+        """Removes the external force."""
         self.ask(Release())
 
     def press(self, button: SafetyButton) -> None:
-        """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" puts both right again."""
+        """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" resets both."""
         self.ask(Press(button))
 
     def set_input(self, signal: int, level: bool) -> None:
@@ -112,34 +112,34 @@ class SimulationControl(Closeable):
         self.ask(LoopBack(on))
 
     def set_auto_limit(self, on: bool = True) -> None:
-        """Has commands led to rest inside the soft joint limits instead of raising a fault beyond them, or not."""
+        """Makes commands stop inside the soft joint limits instead of raising a fault beyond them, or not."""
         self.ask(AutoLimit(on))
 
     def set_limits(self, table: LimitTable) -> None:
-        """Chooses the Cartesian limits that commands are judged by: "manual", or "sdk" for the vendor's SDK."""
+        """Selects the Cartesian limits of commands: "manual", or "sdk" for those of the vendor's SDK."""
         self.ask(Limits(table))
 
     def set_network(self, faults: NetworkFaults | None = None, direction: Direction = "both") -> None:
-        """Makes the network bad.
+        """Simulates network faults.
 
         Args:
-            faults: What is wrong with it; None: nothing.
+            faults: The faults; None: none.
             direction: "commands", "states" (and answers over TCP), or "both".
         """
         self.ask(Network(NetworkFaults() if faults is None else faults, direction))
 
     def stall(self, duration: float, after: float = 0.0, period: float | None = None) -> None:
-        """Has the controller's clock stand still; a new call replaces what was asked for before.
+        """Stops the controller's clock for a while; a new call replaces an earlier request.
 
         Args:
-            duration: For how long, [s]; 0 takes back what is still to come.
-            after: When, [s] from now.
-            period: And again so long after, [s]; None: once.
+            duration: Duration, [s]; 0 cancels pending stalls.
+            after: Time from now, [s].
+            period: Time between repetitions, [s]; None: once.
         """
         self.ask(StallClock(duration, after, period))
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Puts a box that cannot move beside the arm, or moves the one of that name; MuJoCo only.
+        """Places a fixed box next to the arm, or moves the one of that name; MuJoCo only.
 
         Args:
             name: Its name.
@@ -151,11 +151,11 @@ class SimulationControl(Closeable):
         self.ask(PlaceBox(name, _numbers(size, 3, "size", "m"), position, wxyz))
 
     def remove_box(self, name: str) -> None:
-        """Takes a box away."""
+        """Removes a box."""
         self.ask(RemoveBox(name))
 
     def set_floor(self, on: bool = True) -> None:
-        """Puts a floor under the base that the arm can hit, or takes it away; MuJoCo only."""
+        """Adds a solid floor under the base, or removes it; MuJoCo only."""
         self.ask(Floor(on))
 
     def set_walls(self, on: bool = True) -> None:
@@ -163,7 +163,7 @@ class SimulationControl(Closeable):
         self.ask(Walls(on))
 
     def mount(self, load: Payload | None) -> None:
-        """Fixes a real load to the flange, whatever set_load says of it; None: again the one of set_load."""
+        """Attaches a physical load to the flange, independent of set_load; None: that of set_load again."""
         if load is None:
             self.ask(Mount())
             return
@@ -171,14 +171,14 @@ class SimulationControl(Closeable):
         self.ask(Mount(load.mass, tuple(load.center_of_mass.tolist()), inertia))
 
     def status(self) -> WorldStatus:
-        """Returns how the controller is: what its state does not say."""
+        """Returns the status of the simulation, which is not part of the robot's state."""
         answer = self.ask(GetStatus())
         if not isinstance(answer, WorldStatus):
             raise ProtocolError(f"{self}: asked for the status, it answered {answer}")
         return answer
 
     def close(self) -> None:
-        """Ends the connection; a later call makes a new one. May be called twice."""
+        """Ends the connection; a later call opens a new one. May be called twice."""
         with self._lock:
             self._disconnect()
 
@@ -191,7 +191,7 @@ class SimulationControl(Closeable):
         Raises:
             InvalidValueError: A value cannot be used; raised before anything is sent.
             UsageError: The controller refuses; the message says why.
-            ConnectionLostError: There is no world port, or it does not answer.
+            ConnectionLostError: The simulation port does not exist or does not respond.
         """
         with self._lock:
             self._last_id += 1
@@ -212,7 +212,7 @@ class SimulationControl(Closeable):
 
     def _connect(self) -> socket.socket:
         if self._socket is not None and _is_over(self._socket):
-            self._disconnect()  # We have said nothing for long, and somebody else wanted the place.
+            self._disconnect()  # The server closed this idle connection in favour of another client.
         if self._socket is None:
             self._socket = socket.create_connection(self._address, self._timeout)
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

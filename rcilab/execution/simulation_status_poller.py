@@ -1,8 +1,8 @@
-"""A world port that nobody has to wait for: requests go out one after the other, its status comes in now and then.
+"""Asynchronous use of a simulation port: requests are sent in a thread, which also polls the status.
 
-with SimulationStatusPoller(World(host, port)) as watch:
-    watch.ask(Press("estop"))
-    watch.status
+with SimulationStatusPoller(SimulationControl(host, port)) as poller:
+    poller.ask(Press("estop"))
+    poller.status
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from rcilab.core.errors import RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.sim.api import WorldRequest, WorldStatus
 
-PERIOD = 0.3  # [s] between two looks at the status; a choice, as fast as one reads.
+PERIOD = 0.3  # [s] between two polls of the status: as fast as a person reads it.
 
 
 class SimulationStatusPoller(Closeable):
-    """Talks to one world port in a thread of its own.
+    """Uses one simulation port in a thread of its own.
 
     Args:
-        world: The world port; closed with this object.
+        world: The simulation port; closed with this object.
     """
 
     def __init__(self, world: SimulationControl) -> None:
@@ -33,12 +33,12 @@ class SimulationStatusPoller(Closeable):
         self._is_ending = False
         self._is_asking = False
         self.status: WorldStatus | None = None
-        """How the controller was at the last look; None before the first, and when it does not answer."""
+        """The last polled status; None before the first poll and without a response."""
         self._thread = threading.Thread(target=self._run, name="world watch", daemon=True)
         self._thread.start()
 
     def ask(self, request: WorldRequest) -> None:
-        """Sends a request and returns at once; it replaces one of its kind that is still waiting to go out."""
+        """Queues a request and returns at once; it replaces a queued one of its kind."""
         with self._condition:
             self._requests = deque(other for other in self._requests if _kind(other) != _kind(request))
             self._requests.append(request)
@@ -46,18 +46,18 @@ class SimulationStatusPoller(Closeable):
 
     @property
     def is_settled(self) -> bool:
-        """Whether every request has gone out; a status that is read after this counts them."""
+        """Whether every request was sent; a status read afterwards includes them."""
         with self._condition:
             return not self._requests and not self._is_asking
 
     def take_error(self) -> RcilabError | None:
-        """Returns why a request was not carried out, since the last call; None: nothing went wrong."""
+        """Returns the error of a request since the last call, or None."""
         with self._condition:
             error, self._error = self._error, None
             return error
 
     def close(self) -> None:
-        """Sends what is waiting and ends the thread. May be called twice."""
+        """Sends queued requests and ends the thread. May be called twice."""
         with self._condition:
             self._is_ending = True
             self._condition.notify()

@@ -1,4 +1,4 @@
-"""Is it a motion, with its proof, that begins where the arm is? Asked before anything is sent."""
+"""Checks before a motion is sent: its type, its certificate, and its start position."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.core.errors import InvalidValueError
 
 
 def require_motion(motion: object, certificate: object) -> None:
-    """Makes sure that what is to run is a motion, and its proof a certificate or None.
+    """Requires a motion, and a certificate or None.
 
     Raises:
         InvalidValueError: It is something else, such as a report; the message says what to pass.
@@ -22,7 +22,7 @@ def require_motion(motion: object, certificate: object) -> None:
     from rcilab.motion import Motion
 
     if not isinstance(motion, Motion):
-        raise InvalidValueError("motion", motion, "is no motion; make one with plan_joint or Motion.from_cycles")
+        raise InvalidValueError("motion", motion, "must be a motion; use plan_joint or Motion.from_cycles")
     if isinstance(certificate, Report):
         raise InvalidValueError("certificate", "report", "is not the proof: pass report.certificate, not the report")
     if certificate is not None and not isinstance(certificate, Certificate):
@@ -30,10 +30,10 @@ def require_motion(motion: object, certificate: object) -> None:
 
 
 def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
-    """Returns what is wrong with starting a motion here, in a sentence, or None when it begins where the arm is.
+    """Returns why a motion cannot start here, as a sentence, or None if it starts at the arm's position.
 
     Args:
-        start: Where the motion begins, shape (n,), [rad].
+        start: Start of the motion, shape (n,), [rad].
         q_c: Commanded joint angles of the arm, [rad].
     """
     if len(start) != len(q_c):
@@ -48,6 +48,6 @@ def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
         f"the motion starts elsewhere than the arm is: joint {joint + 1} would start at "
         f"{math.degrees(start[joint]):.4f} deg and stands at {math.degrees(q_c[joint]):.4f} deg, "
         f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
-        "plan the motion from robot.state.q_c, or bring the arm to its start first: "
+        "plan the motion from robot.state.q_c, or move the arm to its start first: "
         "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
     )

@@ -1,4 +1,4 @@
-"""How a stream of commands comes to rest from wherever it is, one brake for each kind of command."""
+"""Stop planners: one per type of command, from any point of a stream."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rcilab.motion import LIMIT_MARGIN, plan_stop
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk that a stop of the tool uses; a choice.
+_JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk for a stop of the tool: the rest is for their motion.
 _STEP = 1e-6  # [rad] Of a difference.
 _SINGULAR = 1e-3  # Part of the largest singular value below which a direction counts as lost.
 _FLOOR = 1e-9  # So that a joint with nothing to do asks for no division by zero.
@@ -33,27 +33,27 @@ _FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
 
 
 class StopPlanner(Protocol):
-    """Remembers what was commanded and knows how to end it. Owned by the control loop."""
+    """Stores the last commands and plans the stop. Owned by the control loop."""
 
     def begin(self, state: RobotState) -> None:
         """Starts from the arm standing at its commanded state."""
         ...
 
     def remember(self, command: Any, cycle: int, state: RobotState) -> None:
-        """Takes note of a command that was sent in answer to a controller cycle's state."""
+        """Stores a command that was sent in answer to a controller cycle's state."""
         ...
 
     def plan(self) -> Sequence[Command]:
-        """Returns the commands that lead to rest within the limits, one a cycle after the last; at least one."""
+        """Returns the commands that stop within the limits, one per cycle after the last; at least one."""
         ...
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns what the last command breaks when it is repeated, because it still moved; None: it may stand."""
+        """Returns the violation when the last command is repeated although it still moved, or None."""
         ...
 
 
 class StreamStopPlanner:
-    """Brings sampled coordinates to rest, whatever they are.
+    """Stops a stream of sampled coordinates.
 
     The past is taken as the parabola through the last three samples: its continuation by a curve that keeps the
     limits keeps them in backward differences too, because those are means of that curve's derivatives.
@@ -76,7 +76,7 @@ class StreamStopPlanner:
             self._past = [*self._past[-2:], (cycle, x)]
 
     def rows(self) -> Array:
-        """Returns the samples from the one after the last to rest, shape (N, n)."""
+        """Returns the samples after the last until standstill, shape (N, n)."""
         near, ddq = self.differences()
         dq = near + ddq * ((self._past[-1][0] - self._past[-2][0]) * CYCLE_TIME / 2.0)
         rows = plan_stop(self._limits, self.last, dq, ddq).q
@@ -95,7 +95,7 @@ class StreamStopPlanner:
 
 
 class JointStopPlanner:
-    """Brings commanded joint angles to rest.
+    """Stops commanded joint angles.
 
     Args:
         limits: Bounds of the joints.
@@ -112,27 +112,27 @@ class JointStopPlanner:
         self._stream.begin(*((cycle, state.q_c) for cycle in (-3, -2, -1)))
 
     def remember(self, command: JointPosition, cycle: int, state: RobotState) -> None:
-        """Takes note of a command."""
+        """Stores a command."""
         self._stream.remember(command.q, cycle)
 
     def plan(self) -> Sequence[Command]:
-        """Returns the angles that lead to rest."""
+        """Returns the angles of the stop."""
         return [JointPosition(row) for row in self._stream.rows()]
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns what the last command breaks when it is repeated; None: it may stand."""
+        """Returns the violation when the last command is repeated, or None."""
         q = self._stream.last.tolist()
         monitor = JointMonitor(self._limits)
         monitor.reset(q, *(difference.tolist() for difference in self._stream.differences()))
-        return _first_breach(monitor, lambda: monitor.step(q, self._period))
+        return _first_violation(monitor, lambda: monitor.step(q, self._period))
 
 
 class CartesianStopPlanner:
-    """Brings a commanded pose to rest: position, rotation about the last orientation, and arm angle each by itself.
+    """Stops a commanded pose: position, rotation about the last orientation, and arm angle independently.
 
-    The controller judges the joints that it computes, too, and they are often the narrower bound: a tool stopped with
-    10 m/s^2 asks more of an elbow than it may give. So acceleration and jerk are taken down to what the joints allow
-    where the arm is.
+    The controller also checks the joints that it computes, and they are often more restrictive: stopping a tool with
+    10 m/s^2 can exceed the limits of the elbow. Acceleration and jerk are therefore reduced to what the joints allow at
+    this configuration.
 
     Args:
         limits: Bounds of the arm.
@@ -154,13 +154,13 @@ class CartesianStopPlanner:
         self._q = state.q_c
 
     def remember(self, command: CartesianPosition, cycle: int, state: RobotState) -> None:
-        """Takes note of a command."""
+        """Stores a command."""
         self._q = state.q_c
         if cycle > self._poses[-1][0]:
             self._poses = [*self._poses[-2:], (cycle, command)]
 
     def plan(self) -> Sequence[Command]:
-        """Returns the poses that lead to rest."""
+        """Returns the poses of the stop."""
         last = self._poses[-1][1]
         R = last.T_base_tool[:3, :3]
         past: list[tuple[int, Array]] = []
@@ -179,7 +179,7 @@ class CartesianStopPlanner:
         return way
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns what the last command breaks when it is repeated; None: it may stand. Joints are not computed."""
+        """Returns the violation when the last command is repeated, or None. Joints are not computed."""
         monitor = CartesianMonitor(self._limits)
         (before, first), *later = self._poses
         monitor.reset(Pose.from_matrix(first.T_base_tool), first.psi)
@@ -188,7 +188,7 @@ class CartesianStopPlanner:
             before = cycle
         last = self._poses[-1][1]
         pose = Pose.from_matrix(last.T_base_tool)
-        return _first_breach(monitor, lambda: monitor.step(pose, last.psi, self._period))
+        return _first_violation(monitor, lambda: monitor.step(pose, last.psi, self._period))
 
     def _bounds(self) -> JointLimits:
         """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""
@@ -212,7 +212,7 @@ class CartesianStopPlanner:
 
 
 class TorqueStopPlanner:
-    """Takes commanded torques back to zero at the allowed rate; what is left is the controller's own compensation.
+    """Reduces commanded torques to zero at the allowed rate; the controller's compensation remains.
 
     Args:
         limits: Bounds of the joints.
@@ -227,11 +227,11 @@ class TorqueStopPlanner:
         self._tau = np.zeros_like(self._step)
 
     def remember(self, command: JointTorque, cycle: int, state: RobotState) -> None:
-        """Takes note of a command."""
+        """Stores a command."""
         self._tau = command.tau
 
     def plan(self) -> Sequence[Command]:
-        """Returns the torques that lead to zero."""
+        """Returns the torques of the stop."""
         way = [JointTorque(self._tau)]
         while way[-1].tau.any():
             tau = way[-1].tau
@@ -243,7 +243,7 @@ class TorqueStopPlanner:
         return None
 
 
-def _first_breach(
+def _first_violation(
     monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], list[LimitViolation]]
 ) -> LimitViolation | None:
     """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""

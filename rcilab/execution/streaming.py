@@ -1,4 +1,4 @@
-"""The stream of a motion whose rows may be exchanged while it runs: for another pace, a pause, a stop along the way."""
+"""The stream of a motion whose rows can be replaced while it runs: for speed override, pause, or a stop on its path."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rcilab.motion import plan_stop
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-SETTLING = 300  # Cycles that torque mode stays at its end, for the soft arm to come there; a choice.
+SETTLING = 300  # Cycles that torque mode stays at its end: two time constants of the compliant arm.
 
 
 class MotionStream:
@@ -29,7 +29,7 @@ class MotionStream:
         rows: Joint angles, shape (N, n), [rad].
         mode: How the arm is commanded.
         model: The arm, with its tool and load.
-        on_cycle: Told the number of every cycle.
+        on_cycle: Called with the number of every cycle.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class MotionStream:
         self.cycle = 0
         """Of the newest command."""
         self.held = 0
-        """Cycles that the arm has been held for; 0: it is on its way."""
+        """Cycles for which the arm has been held; 0: it moves."""
 
     def __call__(self, state: RobotState, t: float) -> Command:
         """Returns the command that answers a state."""
@@ -65,12 +65,12 @@ class MotionStream:
         return replace(command, finished=True) if is_over else command
 
     def switch(self, first: int, rows: JointPath, *, holds: bool) -> bool:
-        """Goes on with other rows, whatever was to come; returns False, and does not, when they do not fit on.
+        """Replaces the following rows; returns False, without effect, if they do not continue the stream.
 
         Args:
             first: Cycle of their first row, which must be ahead; they continue what is streamed until then.
             rows: Shape (N, n), [rad].
-            holds: Whether the last one is no goal but a place to wait at.
+            holds: Whether the arm is held in the last row, before the goal.
         """
         if first <= self.cycle + 1 or not self._fits(first, rows):
             return False
@@ -78,7 +78,7 @@ class MotionStream:
         return True
 
     def _fits(self, first: int, rows: JointPath) -> bool:
-        """Returns whether no joint would have to jump: whoever sends rows may be wrong about what is streamed."""
+        """Returns whether no joint would have to jump: the caller may have planned from outdated rows."""
         begun, before, _ = self._next if self._next is not None else (math.inf, self._rows, False)
         if first <= begun:
             begun, before = self._first, self._rows
@@ -86,10 +86,10 @@ class MotionStream:
         return bool((np.abs(step) <= CYCLE_TIME * self._model.limits.joint.velocity).all())
 
     def stop(self) -> None:
-        """Comes to rest from here, every joint as fast as its limits allow, and ends there.
+        """Stops from here, every joint as fast as its limits allow, and ends there.
 
-        For torque mode, where there is no commanded place to brake: the reference is brought to rest, and the torques
-        bring the arm after it.
+        For torque mode, without a commanded position to brake: the reference stops, and the torques make the arm follow
+        it.
         """
         rows, k = self._rows, min(self.cycle - self._first, len(self._rows) - 1)
         before, far = rows[max(k - 1, 0)], rows[max(k - 2, 0)]

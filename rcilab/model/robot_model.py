@@ -1,4 +1,4 @@
-"""RobotModel: one arm with its tool and its load, as a read-only face of geometry, kinematics and dynamics."""
+"""RobotModel: one arm with its tool and its load: geometry, kinematics and dynamics, read-only."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.friction import JointFriction, simulated_friction
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.model.kinematics.frames import Frame
-from rcilab.model.kinematics.manipulability import Manipulability, ManipulabilityPath, dexterity, dexterity_path
+from rcilab.model.kinematics.manipulability import Manipulability, ManipulabilityPath, dexterity_path, manipulability_of
 from rcilab.model.kinematics.reaching_arm import ReachingArm
 from rcilab.model.kinematics.workspace import Workspace, sample_workspace
 from rcilab.robots import RobotDescription, describe_robot
@@ -41,26 +41,26 @@ def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = No
     Args:
         name: Name of the robot.
         tool: Pose of the tool in the flange frame (RCI setCoor); the flange itself when absent.
-        load: What is fixed to the flange (RCI setLoad); nothing when absent.
+        load: The load at the flange (RCI setLoad); none when absent.
 
     Raises:
         ModelError: No robot has this name; the message lists those that exist.
-        InvalidValueError: The tool is no `Pose`, the load no `Payload`, or it is heavier than the arm is rated for.
+        InvalidValueError: The tool is not a `Pose`, the load not a `Payload`, or it exceeds the rated payload.
     """
     return RobotModel(describe_robot(name), IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
 
 
 def require_model(model: object) -> RobotModel:
-    """Returns `model` if it is a robot model: for borders where its name is an easy slip.
+    """Returns `model` if it is a robot model and not, by mistake, its name.
 
     Raises:
-        InvalidValueError: It is a name, or something else that is no model; the message says what to write.
+        InvalidValueError: It is a name or something else; the message says what to write.
     """
     if isinstance(model, RobotModel):
         return model
     if isinstance(model, str):
         raise InvalidValueError("model", model, f"is a name; use load_model({model!r})")
-    raise InvalidValueError("model", described(model), "is no robot model; load_model makes one")
+    raise InvalidValueError("model", described(model), "must be a robot model; use load_model")
 
 
 class RobotModel(ReachingArm):
@@ -80,7 +80,7 @@ class RobotModel(ReachingArm):
         super().__init__(description, tool, stiffness_frame)
         if not isinstance(load, Payload):
             raise InvalidValueError(
-                "load", described(load), "is no Payload; Payload(mass=...) makes one, Payload() is no load"
+                "load", described(load), "must be a Payload; use Payload(mass=...), or Payload() for no load"
             )
         if load.mass > description.rated_payload:
             bound = f"{description.rated_payload:g} kg for {description.name}"
@@ -102,19 +102,19 @@ class RobotModel(ReachingArm):
 
     @property
     def limits(self) -> Limits:
-        """Every bound, each with its source."""
+        """Every limit, each with its source."""
         return self.description.limits
 
     @property
     def home(self) -> JointVector:
-        """A comfortable pose away from limits and singularities, shape (n,), [rad]."""
+        """Joint angles away from limits and singularities, shape (n,), [rad]."""
         return self.description.home
 
     def with_tool(self, tool: Pose) -> RobotModel:
         """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
 
         Raises:
-            InvalidValueError: It is no `Pose`.
+            InvalidValueError: It is not a `Pose`.
         """
         return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
 
@@ -122,14 +122,14 @@ class RobotModel(ReachingArm):
         """Returns this arm with another load (SetLoad).
 
         Raises:
-            InvalidValueError: It is no `Payload`, or heavier than the arm is rated for.
+            InvalidValueError: It is not a `Payload`, or exceeds the rated payload.
         """
         return RobotModel(self.description, self.T_flange_tool, load, self.T_tool_stiffness)
 
     def with_joint_limits(self, lower: ArrayLike, upper: ArrayLike) -> RobotModel:
         """Returns this arm with other bounds of its joint angles, such as soft limits (SetJointLimit).
 
-        Planners, solvers and `check` keep inside them, and a certificate is for them.
+        Planners, solvers and `check` use them, and a certificate is valid for them only.
 
         Args:
             lower: Shape (n,), [rad].
@@ -141,7 +141,7 @@ class RobotModel(ReachingArm):
         low, high = as_vector(lower, self.n, "lower", "rad"), as_vector(upper, self.n, "upper", "rad")
         for joint in np.flatnonzero(low >= high).tolist():
             raise InvalidValueError(
-                f"lower, joint {joint + 1}", float(low[joint]), f"rad must be below {high[joint]:g}"
+                f"lower, joint {joint + 1}", float(low[joint]), f"must be below {high[joint]:g} [rad]"
             )
         limits = self.limits
         sources = {**limits.sources, "joint.lower": _SOFT_LIMIT, "joint.upper": _SOFT_LIMIT}
@@ -153,30 +153,30 @@ class RobotModel(ReachingArm):
     def with_stiffness_frame(self, T_tool_stiffness: Pose) -> RobotModel:
         """Returns this arm with another stiffness frame, given by its pose in the tool frame (SetCoor).
 
-        No limit and no plan depends on it: it is one more frame to ask about, by the name "stiffness".
+        No limit and no plan depends on it; it is available as the frame "stiffness".
 
         Raises:
-            InvalidValueError: It is no `Pose`.
+            InvalidValueError: It is not a `Pose`.
         """
         return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
 
     def elbow(self, q: ArrayLike) -> tuple[float, int]:
-        """Returns the elbow as Franka counts it: the angle of joint 3, [rad], and on which side of its flip joint 4 is.
+        """Returns the elbow as Franka defines it: the angle of joint 3, [rad], and the side of its flip joint 4 is on.
 
         The side is +1 above the angle at which the arm is stretched, and -1 below.
 
         Raises:
-            KinematicsError: The maker of this arm knows no such flip.
+            KinematicsError: The maker of this arm defines no flip.
         """
         flip = self.description.elbow_flip
         if flip is None:
-            raise KinematicsError(f"{self.name} has no elbow that flips; arm_angle(q) tells where its elbow is")
+            raise KinematicsError(f"{self.name} has no elbow flip; arm_angle(q) returns its elbow angle")
         angles = self._floats(q)
         return angles[2], 1 if angles[3] > flip else -1
 
     def dexterity(self, q: ArrayLike) -> Manipulability:
-        """Returns how well the tool can be moved here: manipulability, smallest singular value, condition."""
-        return dexterity(self.jacobian(q))
+        """Returns manipulability, smallest singular value and condition of the Jacobian."""
+        return manipulability_of(self.jacobian(q))
 
     def dexterity_path(self, q: ArrayLike, frame: Frame = "tool") -> ManipulabilityPath:
         """Returns the measures of `dexterity` along a path, each of shape (N,), for q of shape (N, n), [rad]."""
@@ -186,15 +186,15 @@ class RobotModel(ReachingArm):
         """Returns where the tool is at joint angles that are uniformly random inside the limits.
 
         Args:
-            count: How many configurations to try, up to 1 000 000.
+            count: Number of configurations to try, up to 1 000 000.
             seed: The same seed gives the same samples.
-            box: Only samples with the tool in it are kept; all when absent.
+            box: Keeps only samples with the tool in it; all when absent.
 
         Returns:
             `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
 
         Raises:
-            InvalidValueError: `count` is out of range, or the box is none.
+            InvalidValueError: `count` is out of range, or the box is not valid.
         """
         joint = self.limits.joint
         return sample_workspace(self, joint.lower, joint.upper, count, seed, box)
@@ -213,20 +213,20 @@ class RobotModel(ReachingArm):
     ) -> TorqueTerms:
         """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
 
-        The rotors of the drives are not in them: with these torques the arm behind the gears moves as wanted.
+        They do not include the rotors of the drives: they are the torques behind the gears.
 
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
-            dq: Joint velocities, of q's shape, [rad/s]; at rest when absent.
-            ddq: Joint accelerations, of q's shape, [rad/s^2]; none when absent.
-            friction: Whether `.full` holds the joints' friction, too. True takes that of the MuJoCo plant; figures
-                identified on a real arm go into a `rcilab.model.dynamics.friction.JointFriction`.
+            dq: Joint velocities, of q's shape, [rad/s]; zero when absent.
+            ddq: Joint accelerations, of q's shape, [rad/s^2]; zero when absent.
+            friction: Whether `.full` includes joint friction. True uses that of the MuJoCo plant; pass coefficients
+                identified on a real arm as a `rcilab.model.dynamics.friction.JointFriction`.
 
         Returns:
             Terms of q's shape, [N m].
 
         Raises:
-            InvalidValueError: q, dq or ddq has another shape or is not finite, or the friction is none of this arm.
+            InvalidValueError: q, dq or ddq has another shape or is not finite, or the friction is for another arm.
         """
         angles = as_rows(q, self.n, "q", "rad")
         zeros = np.zeros(angles.shape)
@@ -237,18 +237,18 @@ class RobotModel(ReachingArm):
             return terms
         law = simulated_friction(self.limits.joint) if friction is True else friction
         if not isinstance(law, JointFriction):
-            raise InvalidValueError("friction", described(friction), "is neither True nor False nor a JointFriction")
+            raise InvalidValueError("friction", described(friction), "must be True, False or a JointFriction")
         return terms.with_friction(law.torque(speeds))
 
     def clearance(self, q: ArrayLike, distance: ClearanceLimit = STANDARD_DISTANCE) -> Clearance:
-        """Returns how near the links come to each other and to the floor, and which: distances between their capsules.
+        """Returns the smallest distance between links, or to the floor, and the two links, from their capsules.
 
-        Neighbouring links always touch and are not compared, nor is the tool with the last two links. The capsules are
-        those of the URDF; rims of caps and collars stand out of them by 12 mm at most.
+        Neighbouring links always touch and are not checked, nor is the tool against the last two links. The capsules
+        are those of the URDF; rims of caps and collars protrude from them by at most 12 mm.
 
         Args:
-            q: Joint angles, shape (n,) or (N, n), [rad]; limits are not looked at.
-            distance: Where the floor is, and whether the tool has a body; what it asks for is not looked at.
+            q: Joint angles, shape (n,) or (N, n), [rad]; limits are not checked.
+            distance: The floor and the tool's radius; its minimum distances have no effect here.
 
         Returns:
             `.distance`, shape () or (N,), [m], below 0 where they overlap; `.links`, the numbers of the two.
@@ -263,7 +263,7 @@ class RobotModel(ReachingArm):
         return found if angles.ndim > 1 else Clearance(found.distance[0], found.links[0])
 
     def collision_geometry(self, distance: ClearanceLimit = STANDARD_DISTANCE) -> CollisionGeometry:
-        """Returns what `clearance` compares, for a floor and a tool with or without a body."""
+        """Returns the capsules and pairs of `clearance`, for a floor and a tool with or without a body."""
         from rcilab.model.kinematics.collision import collision_geometry
 
         tool = self.T_flange_tool.parts[1]
@@ -278,7 +278,7 @@ class RobotModel(ReachingArm):
 
     @cached_property
     def fingerprint(self) -> Mapping[str, str]:
-        """Hashes of what a judgement depends on: model, limits, tool and load, each a SHA-256 in hex."""
+        """Hashes of what a check depends on: model, limits, tool and load, each a SHA-256 in hex."""
         d = self.description
         joint, cartesian = d.limits.joint, d.limits.cartesian
         geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]

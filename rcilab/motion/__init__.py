@@ -1,4 +1,4 @@
-"""Motions: values that planners return and everybody else reads."""
+"""Motions and their planners."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The only file that knows ruckig: time-optimal, jerk-limited profiles as exact piecewise polynomials.
+"""Time-optimal, jerk-limited profiles by ruckig, as exact piecewise polynomials. No other file imports ruckig.
 
 `intermediate_positions` is never set: a non-empty list would send the problem to a cloud service. Position bounds are
-not given to ruckig either (its free edition does not enforce them), and its `position_extrema` overlooks what happens
-while a joint brakes back inside its bounds (seen with 0.19.4); `plan_joint` looks at the curve instead.
+not given to ruckig either (its free edition does not enforce them), and its `position_extrema` ignores the time in
+which a joint brakes back inside its bounds (seen with 0.19.4); `plan_joint` checks the curve instead.
 
 Imported with this module and not at the first call (3 ms), because the first call may be a stop inside a cycle.
 """
@@ -36,11 +36,11 @@ def plan_profile(
     start_velocity: JointVector,
     start_acceleration: JointVector,
 ) -> PiecewisePolynomial:
-    """Returns the fastest curve from a moving start to rest at the goal with all joints arriving together.
+    """Returns the fastest curve from a moving start to standstill at the goal, with all joints arriving together.
 
-    Where the joints start at rest, or on the straight way to the goal, they stay on it: the curve is then the fastest
-    one of the way as a single coordinate, bounded by whichever joint allows least. ruckig's own phase synchronisation
-    gives up the straight line where one joint bounds the velocity and another one the acceleration or the jerk.
+    If the joints start at standstill, or move along the straight line to the goal, they stay on it: the curve is the
+    fastest one along the line as a single coordinate, with the bounds of the most restrictive joint. ruckig's own phase
+    synchronisation leaves the straight line where one joint bounds the velocity and another the acceleration or jerk.
 
     Args:
         start: Joint angles at t = 0, shape (n,), [rad].
@@ -72,7 +72,7 @@ def plan_profile(
 def plan_standstill(
     q: JointVector, dq: JointVector, ddq: JointVector, acceleration: JointVector, jerk: JointVector
 ) -> PiecewisePolynomial:
-    """Returns the curve on which every joint for itself stops as fast as its bounds allow.
+    """Returns the curve on which every joint stops independently, as fast as its bounds allow.
 
     Args:
         q: Joint angles, shape (n,), [rad].
@@ -96,10 +96,10 @@ def plan_standstill(
 
 
 class Stepper:
-    """Leads every axis for itself towards a velocity or a position, one cycle a call, always the fastest way.
+    """Moves every axis independently and time-optimally towards a velocity or a position, one cycle per call.
 
-    Owned by the thread that runs the cycle. Ruckig computes a curve only when something was changed since the last
-    call; a call without a change follows the last curve.
+    Owned by the thread that runs the cycle. Ruckig computes a new curve only after a change; a call without one follows
+    the last curve.
 
     Attributes:
         q: Positions now, plain floats, [rad].
@@ -170,7 +170,7 @@ class Stepper:
         if not self._update():
             self._lead_by_velocity(self._standstill)
             if not self._update():
-                raise PlanningError("no way to stand still from this state; it is beyond any robot's")
+                raise PlanningError("no stop exists from this state; its values are beyond any robot's")
         out = self._out
         self.q, self.dq, self.ddq = out.new_position, out.new_velocity, out.new_acceleration
         out.pass_to_input(self._problem)

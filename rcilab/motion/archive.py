@@ -1,4 +1,4 @@
-"""Arrays in numpy's files, of which nobody knows yet whether they are sound, nor how large they are unpacked."""
+"""Safe reading of numpy's files: untrusted bytes of unknown size."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import require_bytes
 
 SINGLE_ARRAY = "a single array"
-"""The name of the array in a file that holds one without a name."""
+"""Name for the array of a file that stores an unnamed one."""
 
 _DAMAGE = (
     *(BadZipFile, zlib.error, EOFError, OSError, RuntimeError, struct.error),  # The archive; encrypted; other methods.
     *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError),  # A header of an array.
 )
-"""What numpy and those it reads with raise on foreign or damaged bytes; a mistake in the code is none of them."""
+"""Exceptions of numpy and its readers for foreign or damaged bytes."""
 
 
 Shapes: TypeAlias = Mapping[str, tuple[int, ...]]
@@ -41,10 +41,10 @@ def read_arrays(
 
     Args:
         content: The file's.
-        what: What the file is, for the error.
+        what: Kind of file, for the error.
         name: The file's name.
-        problem: What the error says of it.
-        max_rows: How much there may be in it, as of `file_bounds`.
+        problem: Text of the error.
+        max_rows: Bound of the content, see `file_bounds`.
         require_shapes: Called with the arrays' shapes by name before anything is unpacked; raises where they do not
             fit.
 
@@ -68,7 +68,7 @@ def read_arrays(
 
 
 def _read_headers(content: bytes) -> tuple[int, Shapes]:
-    """Returns what the arrays will take, [bytes], and their shapes, by the headers of archive and arrays."""
+    """Returns the unpacked size of the arrays, [bytes], and their shapes, from the headers of archive and arrays."""
     if not content.startswith(b"PK"):
         size, shape = _read_header(BytesIO(content))
         return size, {SINGLE_ARRAY: shape}
@@ -83,7 +83,7 @@ def _read_headers(content: bytes) -> tuple[int, Shapes]:
 
 
 def _read_header(stream: IO[bytes]) -> tuple[int, tuple[int, ...]]:
-    """Returns what an array takes by its own header, [bytes], and its shape."""
+    """Returns the size of an array, [bytes], and its shape, from its header."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(stream)

@@ -3,8 +3,8 @@
 A corner is cut where the tool is a radius away from it, on either side, and a quintic leads from cut to cut with the
 segments' own direction and curvature there. Between paths of the tool it runs in position, orientation (as rotation
 vector from that of the corner, in which both slerps are straight) and arm angle: in the plane of two lines, inside
-their triangle. Beside a joint move it runs in joint space. Either way it stays inside the sphere around the corner,
-which is looked at, and the cuts come closer where it would not.
+their triangle. Next to a joint move it runs in joint space. In both cases it must stay inside the sphere around the
+corner; this is checked, and the cuts are moved closer if necessary.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Blend:
     corner: Pose | None
     """Pose of the tool at the corner; None where the curve runs in joint space."""
     powers: tuple[Array, ...]
-    """Of the quintic over the whole blend: joint angles, (n,), or position, rotation vector and arm angle, (7,)."""
+    """Coefficients of the quintic: joint angles, (n,), or position, rotation vector and arm angle, (7,)."""
 
     def poses(self, parts: Array) -> tuple[Array, Array]:
         """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), at parts of the blend."""
@@ -63,8 +63,8 @@ class Blend:
 def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
     """Returns the blend at the waypoint of `before`, with the radius that it asks for or the longest that fits.
 
-    Half of either segment is the most that a blend takes, as on an industrial controller; the radius is then the same
-    on both sides of the corner, unless the tool stands on one.
+    A blend takes at most half of either segment, as on an industrial controller; the radius is then the same on both
+    sides of the corner, unless the tool does not move on one.
     """
     radius = before.waypoint.blend
     corner = after.positions(model, np.zeros(1))[0]
@@ -81,10 +81,10 @@ def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
         back, ahead = closer * back, closer * ahead
 
 
-def turn(model: RobotModel, before: Segment, after: Segment) -> float:
-    """Returns by how much the way turns where two segments meet, [rad]: 0 goes straight on, pi turns back.
+def turn_angle(model: RobotModel, before: Segment, after: Segment) -> float:
+    """Returns the change of direction where two segments meet, [rad]: 0 is straight, pi is a reversal.
 
-    It is the turn of the tool's path or, beside a joint move, of the joints'; 0 where one of them stands.
+    It is that of the tool's path or, next to a joint move, of the joints'; 0 if nothing moves on one of them.
     """
     if before.path is not None and after.path is not None:
         near = np.array([0.0, _NUDGE])

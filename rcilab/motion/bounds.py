@@ -1,4 +1,4 @@
-"""The bounds that planners keep: joint ranges, and how far under the limits a planned motion stays."""
+"""The bounds of planners: joint ranges, and the margin of planned motions to the limits."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ margin for lost packets: that one belongs to the side that streams.
 """
 
 RECOVERY_RANGE = radians(20.0)
-"""How far outside its range a joint may start to be led back, [rad]. A tuning value: from their highest speed the arms
-stop within 18 degrees. Where a joint is farther out, more is wrong than a stop that came late."""
+"""Largest distance of a joint from its range at which a recovery may start, [rad]. The arms stop within 18 degrees from
+full speed, so a larger distance has another cause than a late stop."""
 _ROUNDING = 1e-6  # [rad] How far outwards rounding may move a joint that starts outside.
 
 
 def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
-    """Makes sure that joint angles are strictly inside their limits.
+    """Requires joint angles to be strictly inside their limits.
 
     Args:
-        what: What they are: "start", from which `plan_recovery` leads back, or another word.
+        what: Name of the angles: "start", for which the error mentions `plan_recovery`, or another one.
         q: Joint angles, shape (n,), [rad].
         limits: Of each joint.
 
@@ -46,7 +46,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
-        soft, back = limits.soft_bound_passed(i + 1, angle), "plan_recovery(model, q) leads back inside"
+        soft, back = limits.soft_bound_passed(i + 1, angle), "plan_recovery(model, q) moves back inside"
         if soft is None and what == "start":
             raise PlanningError(f"{said}where the arm is there, {back}").coded("range_start", **facts)
         if soft is None:
@@ -93,7 +93,7 @@ def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[
 
 
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:
-    """Returns the limits of a motion that starts at `q`: a joint that starts outside may lead back, not farther out.
+    """Returns the limits of a motion that starts at `q`: a joint that starts outside may only move inwards.
 
     Args:
         limits: Of each joint.
@@ -110,5 +110,5 @@ def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointL
 
 
 def angle_text(value: float) -> str:
-    """Returns an angle, [rad], as errors have it: in degrees, and as it was given."""
+    """Returns an angle, [rad], for an error: in degrees and radians."""
     return f"{degrees(value):.2f}° ({value:.4f} rad)"

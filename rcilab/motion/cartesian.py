@@ -35,13 +35,13 @@ from rcilab.motion.time_parametrization import TimeParametrization
 from rcilab.motion.torque_rate import plan_within_torque_rate
 
 PathLaw: TypeAlias = JointLaw
-"""How a path is followed: by the same laws as a joint motion, the S profile being that of MOVEL (manual 3.5)."""
+"""Time law of a path: the same as for a joint motion; the S profile is that of MOVEL (manual 3.5)."""
 
 
 _WAYS: tuple[Way, ...] = get_args(Way)
 
 S_PROFILE_PATH_VELOCITY = 1.0
-"""Speed of the vendor's path generator at speed 1, [m/s]; of a mere turn, [rad/s]."""
+"""Speed of the vendor's path generator at speed 1, [m/s]; of a pure rotation, [rad/s]."""
 S_PROFILE_PATH_ACCELERATION = 2.5
 """Acceleration of the vendor's path generator at speed 1, [m/s^2] or [rad/s^2]."""
 
@@ -61,9 +61,9 @@ def plan_line(
     psi: float | None = None,
     law: PathLaw = "jerk_limited",
 ) -> Motion:
-    """Returns the motion on which the tool goes straight from where it is at `start` to `goal`.
+    """Returns the motion on which the tool moves in a straight line from its pose at `start` to `goal`.
 
-    Position linear, orientation by slerp and arm angle linear, all in proportion to the way, from rest to rest.
+    Position and arm angle are linear and the orientation a slerp in the path length, from standstill to standstill.
 
     Args:
         model: The arm, with its tool.
@@ -73,12 +73,12 @@ def plan_line(
             0.001 to 1.
         psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
             +-pi too. None holds the one of the start.
-        law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with `LIMIT_MARGIN` to spare, as
-            the controller judges them; the jerk limits are used in full. "torque_rate_limited": the same with lowered
+        law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with a margin of `LIMIT_MARGIN`,
+            as the controller checks them; the jerk limits are used in full. "torque_rate_limited": the same with lower
             jerk limits, see `plan_joint`. "s_profile": the vendor's MOVEL, with at most `speed` times 1 m/s and 2.5
-            m/s^2. So a turn on a short way is fast, and that profile knows neither the joints' limits nor the tool's:
-            `rcilab.check` judges them. Unlike the vendor's, a line from a pose to itself is a motion of no length, and
-            a mere turn takes its angle for the way about every axis.
+            m/s^2. A rotation on a short path is therefore fast, and that profile ignores the limits of joints and tool:
+            use `rcilab.check`. Unlike the vendor's, a line from a pose to itself is a motion of zero length, and a pure
+            rotation about any axis uses its angle as path length.
 
     Raises:
         PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way; the message
@@ -100,9 +100,9 @@ def plan_arc(
     law: PathLaw = "jerk_limited",
     orientation: ArcOrientation = "through_via",
 ) -> Motion:
-    """Returns the motion on which the tool goes on the arc from where it is at `start` over `via` to `goal`.
+    """Returns the motion on which the tool moves on the arc from its pose at `start` over `via` to `goal`.
 
-    As on the vendor's MOVEC the way is the arc's length.
+    As on the vendor's MOVEC, the path length is that of the arc.
 
     Args:
         model: The arm, with its tool.
@@ -142,7 +142,7 @@ def plan_circle(
     law: PathLaw = "jerk_limited",
     orientation: CircleOrientation = "held",
 ) -> Motion:
-    """Returns the motion on which the tool goes round a circle.
+    """Returns the motion on which the tool moves on a circle.
 
     The circle is given either by two more poses on it (`through`; only their positions count), or by `center` and
     `axis`.
@@ -150,7 +150,7 @@ def plan_circle(
     Args:
         model: The arm, with its tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
-        through: The second and the third pose on the circle, in the order in which the tool shall pass them.
+        through: The second and the third pose on the circle, in the order of the motion.
         center: Centre of the circle in base, shape (3,), [m].
         axis: Direction of its axis in base, shape (3,), of any length; the tool goes around it by the right-hand rule.
         angle: How far, more than 0 and up to 2 pi (all around), [rad].
@@ -160,7 +160,7 @@ def plan_circle(
             +-pi too. None holds the one of the start.
         law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
-            and by the same angle, so that it shows the centre always the same side.
+            and by the same angle, so that the same side of it faces the centre.
 
     Raises:
         PlanningError: The positions make no circle, start is not on it, a pose on the way is out of reach, or a joint
@@ -171,12 +171,12 @@ def plan_circle(
     T = model.forward(q)
     if through is not None:
         if center is not None or axis is not None:
-            raise InvalidValueError("center", described(center), "and axis say the same as through; give only one")
+            raise InvalidValueError("center", described(center), "and axis must not be combined with through")
         if not isinstance(through, tuple) or len(through) != 2:  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InvalidValueError("through", described(through), "must be a tuple of two poses on the circle")
         center, axis = circle_through(T, *through)
     elif center is None or axis is None:
-        raise InvalidValueError("center", described(center), "and axis are both needed, or two poses as through")
+        raise InvalidValueError("center", described(center), "and axis are both required, or two poses as through")
     angles = arm_angles(model, q, psi, "shorter")
     return plan_path(model, q, build_circle(T, center, axis, angle, *angles, orientation=orientation), speed, law)
 
@@ -190,7 +190,7 @@ def plan_nullspace(
     law: PathLaw = "jerk_limited",
     way: Way = "shorter",
 ) -> Motion:
-    """Returns the motion on which the tool stays where it is at `start` and only the elbow moves, to arm angle `psi`.
+    """Returns the motion on which the tool keeps its pose at `start` and only the elbow moves, to arm angle `psi`.
 
     Args:
         model: A 7-axis arm, with its tool.
@@ -199,8 +199,8 @@ def plan_nullspace(
         speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
             0.001 to 1.
         law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
-        way: Which way round the elbow goes, "shorter" or "longer"; both may lead across +-pi, where the arm angle
-            begins anew and the elbow just goes on. The longer way to the arm angle of the start is a full turn.
+        way: Direction of the elbow, "shorter" or "longer"; both may cross +-pi, where the arm angle wraps around. The
+            longer way to the arm angle of the start is a full turn.
 
     Raises:
         PlanningError: The arm angle has no meaning at the start, or a joint limit or a singularity is in the way; the
@@ -221,7 +221,7 @@ def plan_nullspace(
         try:
             require_path(model, q, build_line(T, T, *arm_angles(model, q, psi, other)))
         except PlanningError:
-            advice = f"the {other} way round is not free either; model.feasible_arcs tells which arm angles are"
+            advice = f"the {other} way round is not free either; model.feasible_arcs returns the feasible arm angles"
         else:
             advice = f'the {other} way round is free: way="{other}"'
         raise PlanningError(f"{error}; {advice}", share=error.share).coded(error.code, **error.facts) from error
@@ -235,13 +235,13 @@ def arm_angles(
     Args:
         model: The arm.
         q: Joint angles at the start, shape (n,), [rad].
-        psi: Arm angle wanted at the end, from -pi to pi, [rad]; None holds the one of the start.
-        way: Which way round; the angle at the end is then beyond +-pi where the way leads across it. None is the way
-            that never does, as the vendor's generator takes it.
+        psi: Arm angle at the end, from -pi to pi, [rad]; None holds the one of the start.
+        way: Direction; the angle at the end is beyond +-pi if the way crosses it. None is the direction that never
+            crosses it, as in the vendor's generator.
 
     Raises:
         PlanningError: The arm angle has no meaning at the start.
-        InvalidValueError: `psi` is no angle within +-pi, or the arm has none.
+        InvalidValueError: `psi` is not within +-pi, or the arm has no arm angle.
     """
     if not model.redundancy:
         if psi is not None:
@@ -264,7 +264,7 @@ def arm_angles(
 
 
 def schedule(path: Path, speed: float) -> Array:
-    """Returns the shares of the way, 0 to 1, at every cycle of the S profile, shape (N,).
+    """Returns the shares of the path length, 0 to 1, at every cycle of the S profile, shape (N,).
 
     Args:
         path: The path.

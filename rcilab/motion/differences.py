@@ -1,8 +1,8 @@
-"""Between the derivatives of a curve and the backward differences that a controller forms from its samples.
+"""Conversion between the derivatives of a curve and the backward differences of its samples.
 
 A difference over the last cycle lags the derivative at its end. Over one cycle h of constant jerk j:
-dq_b = dq - ddq h / 2 + j h^2 / 6 and ddq_b = ddq - j h. Whoever continues a stream of commands from differences as
-if they were derivatives makes a jump of half a cycle's acceleration, a jerk of thousands of rad/s^3.
+dq_b = dq - ddq h / 2 + j h^2 / 6 and ddq_b = ddq - j h. Continuing a stream of commands from differences as if they
+were derivatives causes a step of half a cycle's acceleration, a jerk of thousands of rad/s^3.
 """
 
 from __future__ import annotations

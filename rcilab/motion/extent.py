@@ -1,4 +1,4 @@
-"""How far and how fast a motion goes, in the few numbers that a person needs before it runs."""
+"""The extent of a motion: ranges and top speeds, to show before it runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STILL = 1e-6  # [rad] A joint that turns less stands still.
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MotionExtent:
-    """Ranges and top speeds along the whole way: a program that returns to its start moves, too."""
+    """Ranges and top speeds over the whole motion, not only between its ends."""
 
     duration: float
     """[s]."""
@@ -46,7 +46,7 @@ class MotionExtent:
 
 
 def measure_extent(motion: Motion, model: RobotModel) -> MotionExtent:
-    """Returns how far and how fast a motion goes.
+    """Returns ranges and top speeds of a motion.
 
     Args:
         motion: On the 1 ms grid.

@@ -15,7 +15,7 @@ def inverse_path(
 ) -> tuple[JointPath, BranchEnd | None]:
     """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
 
-    Joint limits are not looked at. About 2 us a row; 20 us with offsets, where the inverse is no closed form.
+    Joint limits are not checked. About 2 us per row; 20 us with offsets, without a closed-form inverse.
 
     Args:
         model: The arm, with its tool.
@@ -24,8 +24,8 @@ def inverse_path(
         start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None; from that row on
-        the angles mean nothing.
+        Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None; the angles are
+        meaningless from that row on.
     """
     (rotation, (x, y, z)), R, p = model.T_flange_tool.inverse().parts, T[:, :3, :3], T[:, :3, 3]
     if not model.T_flange_tool.is_close(IDENTITY, 0.0):

@@ -1,4 +1,4 @@
-"""Whether a moving arm can still be kept inside its limits."""
+"""Check that a moving arm can still stop inside its limits."""
 
 from __future__ import annotations
 

@@ -23,8 +23,8 @@ JointLaw = Literal["jerk_limited", "torque_rate_limited", "s_profile"]
 JOINT_LAWS: tuple[JointLaw, ...] = get_args(JointLaw)
 
 MIN_SPEED = 0.001
-"""Slowest speed to plan with. A choice: a full turn then takes most of an hour and its rows 200 MB; a motion of more
-than about two hours is beyond what ruckig counts."""
+"""Lowest speed to plan with: a full turn then takes most of an hour and its rows 200 MB; ruckig cannot represent a
+motion of more than about two hours."""
 
 S_PROFILE_VELOCITY = {7: (1.0, 1.0, 1.0, 1.0, 1.25, 1.25, 1.25), 6: (1.0, 1.0, 1.0, 1.25, 1.25, 1.25)}
 """Speeds of the vendor's joint generator at speed 1, by number of joints, [rad/s]; six joints: without joint 3."""
@@ -33,7 +33,7 @@ S_PROFILE_ACCELERATION = 2.5
 
 
 class Arm(Protocol):
-    """What planning needs to know of a robot; a RobotModel and a RobotDescription both know it."""
+    """What planning needs of a robot; implemented by RobotModel and RobotDescription."""
 
     @property
     def n(self) -> int:
@@ -56,29 +56,29 @@ def plan_joint(
     start_velocity: ArrayLike | None = None,
     start_acceleration: ArrayLike | None = None,
 ) -> Motion:
-    """Returns a motion to rest at `goal` on which all joints start and arrive together.
+    """Returns a motion to standstill at `goal` on which all joints start and arrive together.
 
     Args:
-        model: The arm: a RobotModel, or whatever else has `n` and `limits`.
+        model: The arm: a RobotModel, or another object with `n` and `limits`.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
-        goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot demands.
+        goal: Joint angles at the end, shape (n,), [rad]; strictly inside the limits, as the robot requires.
         speed: Part of the velocity and acceleration limits to use, from `MIN_SPEED` = 0.001 to 1; the
             jerk limit is used in full.
-        law: "jerk_limited": the fastest motion inside the limits, with `LIMIT_MARGIN` to spare. From rest, or moving
-            straight towards or away from `goal`, it is the fastest one on the straight line in joint space; with
-            another start velocity or acceleration there is no such line, and each joint goes its own way in the same
-            time. "torque_rate_limited": the same with the jerk limits lowered until the torques change no faster than
-            the manual recommends (4.4), which takes some hundredths of a second; it needs a RobotModel. "s_profile":
-            exactly the motion of the vendor's joint generator (manual 3.5). That one
-            has speeds of its own and does not know the robot's limits: `rcilab.check` judges it. A joint that is to
-            move less than 1e-6 rad stays, so the motion may end that far from `goal`.
-        start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is rest. Derivatives of the running
+        law: "jerk_limited": the fastest motion inside the limits, with a margin of `LIMIT_MARGIN`. From standstill, or
+            moving straight towards or away from `goal`, it is the fastest one on the straight line in joint space; with
+            another start velocity or acceleration there is no such line, and each joint takes the same time on its own
+            curve. "torque_rate_limited": the same with jerk limits lowered until the torques change no faster than the
+            manual recommends (4.4), which takes some hundredths of a second to plan; it needs a RobotModel.
+            "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one has its own speeds
+            and ignores the robot's limits: use `rcilab.check`. A joint with less than 1e-6 rad to move stays, so the
+            motion may end that far from `goal`.
+        start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is zero. Derivatives of the running
             motion, not the backward differences that a robot reports (`derivatives_from_differences`).
         start_acceleration: Joint accelerations at the start, shape (n,), [rad/s^2]; None is zero.
 
     Raises:
-        InvalidValueError: Wrong shape, not finite, an unknown law, a speed out of range, or what is no arm.
-        PlanningError: A joint is, or cannot help getting, outside its limits.
+        InvalidValueError: Wrong shape, not finite, an unknown law, a speed out of range, or not an arm.
+        PlanningError: A joint is outside its limits, or cannot stay inside them.
     """
     if not hasattr(model, "limits"):
         require_model(model)
@@ -167,7 +167,7 @@ def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) ->
             i = int(beyond[0])
             raise PlanningError(
                 f"joint {i + 1}: {name} {value[i]:.4g} {unit} exceeds {bound[i]:.4g} {unit}; "
-                f"slow down first (plan_stop answers from any state)"
+                f"slow down first (plan_stop works from any state)"
             )
 
 

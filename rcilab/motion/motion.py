@@ -1,4 +1,4 @@
-"""A motion as a value: planners return it, the checker checks it, views draw it, the control process streams it."""
+"""The motion, an immutable value that planners return, `check` checks and the control process streams."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from rcilab.motion.samples import is_on_grid, read_samples
 from rcilab.motion.spline import spline_through
 
 TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
-"""How a motion runs along its path: as fast as all limits allow, the same with the recommended torque rate kept too, by
-the manual's S profile (3.5), as the fastest stop, or through rows that somebody else made."""
+"""Time law of a motion: as fast as all limits allow, the same within the recommended torque rate, the manual's S
+profile (3.5), the fastest stop, or given samples."""
 
 LAWS: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
 
@@ -34,10 +34,10 @@ _CARD: dict[Language, tuple[str, str, str]] = {
     "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
     "zh": ("运动，{law}：{duration:.3f} s，速度 {speed:g}（角度以 ° 计）", "起点", "目标"),
 }
-"""How a motion shows itself in a notebook: its caption, and what its rows are called."""
+"""Caption and row names of a motion in a notebook."""
 
 _ROUNDING = 1e-9
-"""A duration that passes a cycle by less than this part of a cycle is that cycle, not the next one."""
+"""A duration that exceeds a cycle by less than this part of a cycle is rounded down to it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,22 +62,22 @@ class MotionSample:
 class Motion:
     """Joint angles as a function of time, exact at every instant, with rows on the controller's 1 ms grid.
 
-    Rows: `.times`, `.q`, `.dq`, `.ddq`, `.jerk`, computed at the first look and kept. Row 0 is the start; the last row
-    is the goal at rest, at the first cycle that is not before the exact `.duration`. Derivatives are the true ones of
-    the curve; what the controller judges are backward differences of `.q`, and `rcilab.check` computes those.
+    Rows: `.times`, `.q`, `.dq`, `.ddq`, `.jerk`, computed on first access and cached. Row 0 is the start; the last row
+    is the standstill at the goal, at the first cycle not before the exact `.duration`. Derivatives are those of the
+    curve; the controller checks backward differences of `.q`, and `rcilab.check` computes those.
     """
 
     polynomial: PiecewisePolynomial
     """The curve."""
     goal: JointVector
-    """Where it ends and holds, shape (n,), [rad]."""
+    """Joint angles at the end, shape (n,), [rad]."""
     law: TimeLaw
     speed: float = 1.0
     """The speed it was planned with, as a part of the limits, in (0, 1]."""
     segment_starts: Array = field(default_factory=lambda: np.zeros(1))
-    """When each segment of a program begins, shape (S,), first 0, [s]; any other motion is one."""
+    """Start time of each segment of a program, shape (S,), first 0, [s]; any other motion has one."""
     notes: tuple[str, ...] = ()
-    """What whoever planned it has to say about it, a sentence each: such as a blend that had to be shortened."""
+    """Notes of the planner, one sentence each, such as a blend that had to be shortened."""
     _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])
 
     def __post_init__(self) -> None:
@@ -96,8 +96,8 @@ class Motion:
     def from_samples(cls, q: ArrayLike, *, dt: float | None = None, times: ArrayLike | None = None) -> Motion:
         """Returns the motion through joint samples at any rate, even or not: a cubic spline through every sample.
 
-        It starts and ends at rest. Nothing is slowed down or smoothed; `check` says whether it keeps the limits. Rows
-        that are one a controller cycle, such as those of a recording, go into `from_cycles`.
+        It starts and ends at standstill. Nothing is slowed down or smoothed; use `check` for the limits. For rows at
+        the controller's cycle, such as those of a recording, use `from_cycles`.
 
         Args:
             q: Joint angles, shape (N, n), N >= 1, [rad].
@@ -120,9 +120,9 @@ class Motion:
 
     @classmethod
     def from_cycles(cls, q: ArrayLike) -> Motion:
-        """Returns the motion through given rows, one a controller cycle of 1 ms: those of a recording or a motion.
+        """Returns the motion through given rows, one per controller cycle of 1 ms: those of a recording or a motion.
 
-        Between the rows it runs as cubic pieces with the slopes of central differences, at the ends of one-sided ones.
+        Between the rows it is cubic, with slopes from central differences, one-sided at the ends.
 
         Args:
             q: Joint angles, shape (N, n), N >= 1, [rad].
@@ -206,13 +206,13 @@ class Motion:
         return math.ceil(self.duration / CYCLE_TIME - _ROUNDING) + 1
 
     def at(self, t: float) -> MotionSample:
-        """Returns the motion at any time: before the start it is the start, from the end on the goal at rest.
+        """Returns the motion at any time: the start before it begins, standstill at the goal from the end on.
 
         Args:
             t: Time since the start, [s].
 
         Raises:
-            InvalidValueError: t is no number, or NaN.
+            InvalidValueError: t is not a number, or NaN.
         """
         t = as_number(t, "t", "s")
         if math.isnan(t):
@@ -223,20 +223,20 @@ class Motion:
         return _sample(self.polynomial.at(t))
 
     def end(self) -> MotionSample:
-        """Returns how the curve arrives: the limits from the left at the end. A good motion arrives at rest."""
+        """Returns the limits from the left at the end of the curve; a valid motion ends at standstill."""
         return _sample(self.polynomial.at_end())
 
     def slowed(self, factor: float) -> Motion:
-        """Returns the motion that runs the same way `factor` times slower: q(t / factor), on its own 1 ms grid.
+        """Returns the motion on the same path `factor` times slower: q(t / factor), on its own 1 ms grid.
 
-        Velocities shrink by the factor, accelerations by its square, jerks by its cube. Law and speed stay those it was
-        planned with.
+        Velocities are divided by the factor, accelerations by its square, jerks by its cube. Law and speed stay those
+        it was planned with.
 
         Args:
             factor: Times slower, 1 or more; the duration grows by it.
 
         Raises:
-            InvalidValueError: The factor is no finite number of at least 1.
+            InvalidValueError: The factor is not a finite number of at least 1.
         """
         factor = as_number(factor, "factor")
         if not 1.0 <= factor < math.inf:
@@ -245,10 +245,10 @@ class Motion:
         return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts)
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
-        """Writes the motion to a file that `Motion.load` reads; the ending of its name chooses the format.
+        """Writes the motion to a file that `Motion.load` reads; the file's ending selects the format.
 
-        .npz holds everything, to the last bit. .csv holds the rows of the 1 ms grid, `t [s]`, `q1 [rad]`, ...: the
-        motion that comes back has the same `.times` and `.q`, to the last bit, and the law "samples".
+        .npz stores everything exactly. .csv stores the rows of the 1 ms grid, `t [s]`, `q1 [rad]`, ...: the motion that
+        is loaded again has exactly the same `.times` and `.q`, and the law "samples".
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
@@ -263,10 +263,10 @@ class Motion:
 
         Args:
             file: Its name, or an open binary file.
-            max_rows: How many cycles of 1 ms it may hold, and with 1 KiB each how many bytes, unpacked: 17 minutes.
+            max_rows: Largest number of 1 ms cycles, 17 minutes by default, of 1 KiB each when unpacked.
 
         Raises:
-            InvalidValueError: There is no such file, it holds no sound motion, or too much.
+            InvalidValueError: There is no such file, it does not contain a valid motion, or it is too large.
             VersionMismatchError: It was written by another version of this format.
         """
         if not storage.is_csv(file):
@@ -285,24 +285,24 @@ class Motion:
         unit: Literal["rad", "deg"] = "rad",
         max_rows: int = MOST_ROWS,
     ) -> Motion:
-        """Returns the motion through joint samples from elsewhere, at any rate, even or not, to be checked.
+        """Returns the motion through joint samples of another program, at any rate, even or not.
 
-        A cubic spline through every sample, which starts and ends at rest; on the 1 ms grid like every motion.
-        `check` checks it: nothing is slowed down or smoothed.
+        A cubic spline through every sample, which starts and ends at standstill, on the 1 ms grid like every motion.
+        Nothing is slowed down or smoothed: use `check`.
 
-        A CSV file has a row a sample. With a header line, columns are found by name, and others passed over: `t`, with
-        its unit if that is not seconds (`t [ms]`), and `q1`, `q2`, ... (also `q[1]`, `joint_1`), with theirs
-        (`q1 [deg]`). Without one, the first column is the time, or, when `rate_hz` is given, all are joints. An NPZ
-        file has the angles as `q`, shape (N, n), and the times as `t`, shape (N,).
+        A CSV file has one row per sample. With a header line, columns are found by name and others ignored: `t`, with
+        a unit other than seconds as `t [ms]`, and `q1`, `q2`, ... (also `q[1]`, `joint_1`), in degrees as `q1 [deg]`.
+        Without a header, the first column is the time, or with `rate_hz` all columns are joints. An NPZ file has the
+        angles as `q`, shape (N, n), and the times as `t`, shape (N,).
 
         Args:
             file: Name of the file, ending in .csv or .npz.
-            rate_hz: Samples a second, for a file without times, [Hz].
-            unit: Of the angles that do not say theirs.
-            max_rows: How much it may hold, as of `load`.
+            rate_hz: Samples per second, for a file without times, [Hz].
+            unit: Unit of angles without one.
+            max_rows: As for `load`.
 
         Raises:
-            InvalidValueError: There is no such file, or it holds no sound samples, or too many; the message names the
+            InvalidValueError: There is no such file, or its samples are not valid, or too many; the message names the
                 line.
         """
         return _short_enough(motion_through(*read_samples(file, rate_hz, unit, max_rows)), max_rows, file)
@@ -347,7 +347,7 @@ class Motion:
             derivative = ("q", "dq", "ddq", "jerk").index(name)
             array = self.polynomial.sample(self.times, derivative)
             array[-1] = 0.0 if derivative else self.goal
-        # Rows of bytes: what was judged cannot be made writable again, as an array of its own could.
+        # Backed by bytes: a motion that was checked cannot be made writable again, as an array with own data could.
         return np.frombuffer(array.tobytes()).reshape(array.shape)
 
 
@@ -373,14 +373,14 @@ def _short_enough(motion: Motion, max_rows: int, file: str | PathLike[str]) -> M
 
 
 def require_motion(motion: object) -> Motion:
-    """Returns `motion` if it is one: for borders where model and motion are easily swapped.
+    """Returns `motion` if it is a `Motion`, where model and motion are easily swapped.
 
     Raises:
         InvalidValueError: It is something else; the message says how to make one.
     """
     if isinstance(motion, Motion):
         return motion
-    raise InvalidValueError("motion", described(motion), "is no motion; plan_joint or Motion.from_samples makes one")
+    raise InvalidValueError("motion", described(motion), "must be a motion; use plan_joint or Motion.from_samples")
 
 
 def standing(q: ArrayLike, *, law: TimeLaw = "jerk_limited", speed: float = 1.0) -> Motion:

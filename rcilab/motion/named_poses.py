@@ -1,4 +1,4 @@
-"""Named poses: joint angles that a person stores under a name, recalls and deletes, a few lines of JSON a user."""
+"""Named poses: joint angles stored under a name in a JSON file of the user."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rcilab.model.robot_model import RobotModel, require_model
 
 FORMAT = "rcilab poses"
 VERSION = 1
-LONGEST_NAME = 40  # Characters; tuning value: what a list shows whole.
+LONGEST_NAME = 40  # Characters that fit into a list.
 
 
 def default_file() -> Path:
@@ -27,7 +27,7 @@ def default_file() -> Path:
 
 
 class NamedPoseStore:
-    """The stored poses of one arm. Every call reads the file anew: other programs may have written to it.
+    """The stored poses of one arm. Every call reads the file again: other programs may have written to it.
 
     Args:
         model: The arm; poses of other arms stay in the same file, untouched.
@@ -37,13 +37,13 @@ class NamedPoseStore:
     def __init__(self, model: RobotModel, file: Path | None = None) -> None:
         self._model = require_model(model)
         self.file = default_file() if file is None else file
-        """Where the poses are."""
+        """The file of the poses."""
 
     def names(self) -> tuple[str, ...]:
         """Returns the names of the stored poses, in the order in which they were stored.
 
         Raises:
-            InvalidValueError: The file cannot be read, or is no file of poses.
+            InvalidValueError: The file cannot be read, or is not a file of poses.
             VersionMismatchError: It was written by another version.
         """
         return tuple(self._own(self._read()))
@@ -52,7 +52,7 @@ class NamedPoseStore:
         """Returns the joint angles of a stored pose, shape (n,), [rad].
 
         Raises:
-            InvalidValueError: There is no such pose, or what is stored is no pose of this arm; see also `names`.
+            InvalidValueError: There is no such pose, or it does not fit this arm; see also `names`.
             VersionMismatchError: See `names`.
         """
         own = self._own(self._read())
@@ -78,32 +78,32 @@ class NamedPoseStore:
         """Stores joint angles under a name that is not taken, and returns the name as it is stored.
 
         Args:
-            name: 1 to 40 characters; spaces around it are left away.
+            name: 1 to 40 characters; surrounding spaces are removed.
             q: Shape (n,), [rad].
 
         Raises:
-            InvalidValueError: The name is no name or taken, q is not n finite numbers, or the file cannot be written.
+            InvalidValueError: The name is not valid or already used, q is not n finite numbers, or writing failed.
             VersionMismatchError: See `names`.
         """
         name = name.strip()
         if not name or len(name) > LONGEST_NAME or not name.isprintable():
-            problem = f"is no name for a pose: 1 to {LONGEST_NAME} printable characters"
+            problem = f"must be 1 to {LONGEST_NAME} printable characters"
             raise InvalidValueError("name", described(name), problem).coded("pose_name", most=LONGEST_NAME)
         angles = as_vector(q, self._model.n, "q", "rad")
         content = self._read()
         own = self._own(content)
         if name in own:
-            problem = "is taken: delete that pose first, or take another name"
+            problem = "is already used: delete that pose first, or use another name"
             raise InvalidValueError("name", described(name), problem).coded("pose_taken", name=name)
         own[name] = [round(float(angle), 9) for angle in angles]
         self._write(content, own)
         return name
 
     def delete(self, name: str) -> None:
-        """Deletes a stored pose; one that is not there is no error.
+        """Deletes a stored pose; a missing one is not an error.
 
         Raises:
-            InvalidValueError: The file cannot be read or written, or is no file of poses.
+            InvalidValueError: The file cannot be read or written, or is not a file of poses.
             VersionMismatchError: See `names`.
         """
         content = self._read()
@@ -139,7 +139,7 @@ class NamedPoseStore:
         return found
 
     def _write(self, content: dict[str, Any], own: dict[str, Any]) -> None:
-        """Exchanges the file as a whole, so that whoever reads meets the old one or the new one."""
+        """Replaces the file atomically."""
         content = {**content, "poses": {**content["poses"], self._model.name: own}}
         try:
             write_whole(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")

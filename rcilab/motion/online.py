@@ -1,4 +1,4 @@
-"""On-line re-planning: a joint state that follows commands cycle by cycle and never leaves the limits."""
+"""On-line motion generation: joint angles that follow commands cycle by cycle and never leave the limits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.twist import Frame, TwistController
 
-POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint is brought to rest. Tuning value.
+POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint stops: more than the rounding of the curve.
 
 _LONGEST = 1000.0  # [s] Ruckig counts to 7600 s; a joint that would creep longer towards its limit stops first.
 _STILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Below these a joint is at rest: rounding of the curve.
@@ -25,10 +25,10 @@ _STILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Below these a joint is at rest: roun
 class Jog:
     """Moves an arm by commands that may change in every cycle: a velocity, a twist of the tool, a target, a stop.
 
-    Owned by the thread that runs the cycle: one `step` a cycle of 1 ms gives the joint angles to command. Whatever is
-    asked for, and whenever, velocity, acceleration and jerk of every joint stay `LIMIT_MARGIN` inside the limits, and
-    a joint that is led towards the end of its range stops `POSITION_MARGIN` inside it. A command that asks for
-    more is not refused: it is followed as far as the limits allow, and `part` and `is_damped` say how far.
+    Owned by the thread that runs the cycle: one `step` per cycle of 1 ms returns the joint angles to command. For any
+    command at any time, velocity, acceleration and jerk of every joint stay `LIMIT_MARGIN` inside the limits, and a
+    joint that moves towards the end of its range stops `POSITION_MARGIN` inside it. A command that exceeds a limit is
+    not refused: it is followed as far as the limits allow; see `part` and `is_damped`.
 
         jog = Jog(model, robot.state.q_c)
         jog.set_twist([0.05, 0, 0, 0, 0, 0], frame="tool")
@@ -46,7 +46,7 @@ class Jog:
 
     Raises:
         InvalidValueError: Not a model, not n finite numbers each, or a speed out of range.
-        PlanningError: A joint is, or cannot help getting, outside its limits: there is only `plan_stop` then.
+        PlanningError: A joint is outside its limits, or cannot stay inside them: use `plan_stop`.
     """
 
     def __init__(
@@ -74,11 +74,15 @@ class Jog:
         self._speeds: list[float] = (LIMIT_MARGIN * speed * limits.velocity).tolist()
         a: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
         j: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()
-        let_go = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and take back a.
-        self._joints = list(zip(self._lower, self._upper, a, let_go, j, strict=True))
+        reversal = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and remove a.
+        self._joints = list(zip(self._lower, self._upper, a, reversal, j, strict=True))
         self._ranges = list(zip(self._lower, self._upper, strict=True))
         # Of all joints: the smallest acceleration, the longest time to let go, the largest change of speed by that.
-        self._slowest = min(a), max(let_go), float((limits.acceleration**2 / (2.0 * LIMIT_MARGIN * limits.jerk)).max())
+        self._slowest = (
+            min(a),
+            max(reversal),
+            float((limits.acceleration**2 / (2.0 * LIMIT_MARGIN * limits.jerk)).max()),
+        )
         self._tool = TwistController(model, self._lower, self._upper, self._speeds, a, j, speed)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
         self._rest = [0.0] * n
@@ -103,7 +107,7 @@ class Jog:
 
     @property
     def is_at_rest(self) -> bool:
-        """True when no joint moves; after `stop`, the arm may be left alone then."""
+        """True when no joint moves; after `stop` no further steps are needed."""
         slow, weak = _STILL
         return all(-slow < v < slow for v in self._axes.dq) and all(-weak < a < weak for a in self._axes.ddq)
 
@@ -111,21 +115,21 @@ class Jog:
     def part(self) -> float:
         """Part of the commanded velocity that the limits allowed in the last cycle, from 0 to 1; 1 for a target.
 
-        The way up to speed does not count. A joint velocity is cut by the limits of the velocities, a twist also on
-        the way to the end of a joint's range, so that the tool keeps its direction until it stands there.
+        Acceleration to the speed does not count. Joint velocities are reduced by the velocity limits, a twist also near
+        the end of a joint's range, so that the tool keeps its direction until it stops there.
         """
         return self._part
 
     @property
     def is_damped(self) -> bool:
-        """True when the arm was so close to a singularity in the last cycle that the tool left the asked twist."""
+        """True when the arm was so close to a singularity in the last cycle that the tool left the commanded twist."""
         return self._advance == self._follow_twist and self._tool.is_damped
 
     def set_joint_velocity(self, dq: ArrayLike) -> None:
         """Moves with these joint velocities from now on.
 
-        Velocities above the limits are lowered all by one factor. Every joint goes up to speed for itself, as fast as
-        its limits allow; one that reaches the end of its range stays there while the others move on.
+        Velocities above the limits are all reduced by one factor. Every joint accelerates independently, as fast as its
+        limits allow; one that reaches the end of its range stays there while the others move on.
 
         Args:
             dq: Joint velocities, shape (n,), [rad/s].
@@ -141,13 +145,12 @@ class Jog:
     def set_twist(self, twist: ArrayLike, *, frame: Frame = "base") -> None:
         """Moves the tool with this twist from now on.
 
-        From one twist to the next the tool goes along the straight line between them, at half of what the joints can
-        accelerate; from rest it moves in the asked direction at once. Where joints would pass a velocity limit or come
-        to the end of their range, all are slowed down by one factor; what comes up too suddenly for that, at high
-        speed near a singularity, bends the tool's way for a moment, never a joint's limits. Closer still, the
-        direction that is lost is damped (`is_damped`), and a tool that would leave its line for that stops: at the
-        edge of the reach it stands, and goes back as it came. A 7-axis arm takes the smallest joint velocities that
-        give the twist.
+        From one twist to the next the tool's twist changes linearly, with half of the joints' acceleration limits; from
+        standstill it moves in the commanded direction at once. Where joints would exceed a velocity limit or reach the
+        end of their range, all are slowed down by one factor. If that comes too late, at high speed near a singularity,
+        the tool briefly leaves its path, and the joints keep their limits. Closer still, the lost direction is damped
+        (`is_damped`), and a tool that would leave its line stops: at the edge of the reach it stops and can move back.
+        A 7-axis arm uses the smallest joint velocities for the twist.
 
         Args:
             twist: Velocity of the tool tip and angular velocity, shape (6,), linear first, [m/s, rad/s]; lowered as a
@@ -162,10 +165,10 @@ class Jog:
         self._advance = self._follow_twist
 
     def set_target(self, q: ArrayLike) -> None:
-        """Moves to these joint angles, to rest there; call it as often as the target moves.
+        """Moves to these joint angles and stops there; call it again whenever the target moves.
 
-        Every joint goes for itself as fast as its limits allow, so that a joint that is near waits for nobody; a
-        straight line in joint space is what `plan_joint` gives. A target outside the range is followed to its end.
+        Every joint moves independently, as fast as its limits allow; use `plan_joint` for a straight line in joint
+        space. A target outside the range is followed to the end of the range.
 
         Args:
             q: Joint angles, shape (n,), [rad].
@@ -181,15 +184,15 @@ class Jog:
         self._advance = self._go_to_target
 
     def stop(self) -> None:
-        """Comes to rest from now on, every joint for itself as fast as its limits allow: the way `plan_stop` gives."""
+        """Stops from now on, every joint independently as fast as its limits allow, as in `plan_stop`."""
         self._part = 1.0
         self._advance = self._brake
 
     def step(self) -> JointVector:
-        """Goes on by one cycle and returns the joint angles to command, shape (n,), [rad].
+        """Advances one cycle and returns the joint angles to command, shape (n,), [rad].
 
         Raises:
-            PlanningError: The planner found no way to stand still; seen with no state that the limits contain.
+            PlanningError: The planner found no stop; never seen with a state inside the limits.
         """
         self._advance()
         return np.array(self._axes.q)
@@ -210,11 +213,12 @@ class Jog:
         self._lead(wanted)
 
     def _lead(self, wanted: Sequence[float]) -> None:
-        """Goes on towards joint velocities.
+        """Advances one cycle towards joint velocities.
 
-        Far from the end of its range a joint is led by velocity alone. Where it could not reach the wanted velocity
-        and stop again, it is led to rest at the end of its range, with the wanted velocity as a bound. By induction
-        the fastest stop from every state stays inside: it does at the start, and each kind of step keeps it so.
+        Far from the end of its range a joint is controlled by velocity alone. Where it could not reach the commanded
+        velocity and stop again, its target is standstill at the end of its range, with the commanded velocity as a
+        bound. By induction the fastest stop from every state stays inside: it does at the start, and each kind of step
+        preserves it.
         """
         axes = self._axes
         if self._is_far_inside(wanted):
@@ -223,14 +227,14 @@ class Jog:
         ends: list[float | None] = []
         velocities: list[float] = []
         by_velocity = True
-        for v_c, q, v, a, (low, high, a_max, let_go, j_max) in zip(
+        for v_c, q, v, a, (low, high, a_max, reversal, j_max) in zip(
             wanted, axes.q, axes.dq, axes.ddq, self._joints, strict=True
         ):
             end, room = (high, high - q) if v_c > 0.0 else (low, q - low)
             speed = abs(v_c)
             peak = max(speed, abs(v)) + a * a / (2.0 * j_max)
             # No longer than it takes to let go of a, to change over to v_c and to stop from there.
-            if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + let_go):
+            if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + reversal):
                 ends.append(None)
                 velocities.append(v_c)
             elif room <= 0.0 or speed * _LONGEST < room:
@@ -246,15 +250,15 @@ class Jog:
             axes.towards_ends(ends, velocities)
 
     def _is_far_inside(self, wanted: Sequence[float]) -> bool:
-        """Returns whether every joint has more room than any may need to get to its wanted velocity and to stop.
+        """Returns whether every joint has more range left than it may need to reach its velocity and stop.
 
-        Then each is led by velocity alone: what `_lead` finds joint by joint, at a fifth of the cost.
+        Then each is controlled by velocity alone, as in `_lead`, at a fifth of the cost.
         """
         axes = self._axes
-        a_max, let_go, more = self._slowest
+        a_max, reversal, more = self._slowest
         speed = max(max(wanted), -min(wanted), max(axes.dq), -min(axes.dq))
         peak = speed + more
-        room = peak * ((2.0 * speed + peak) / a_max + let_go)
+        room = peak * ((2.0 * speed + peak) / a_max + reversal)
         for q, (low, high) in zip(axes.q, self._ranges, strict=True):
             if not low + room < q < high - room:
                 return False

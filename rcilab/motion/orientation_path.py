@@ -1,4 +1,4 @@
-"""How the tool turns on its way: orientations as smooth functions of the share of the way, 0 to 1."""
+"""Orientation paths: smooth functions of the share of a path, 0 to 1."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.spatial import Rotation9, turn_between
 
 _LOOKS = 200
-"""Where on the way a turn through a middle orientation is looked at for its fastest rate, evenly. Tuning value."""
+"""Evenly spaced points at which the largest rate of a rotation through a middle orientation is searched."""
 _STEEPEST = 1.5
 """Slope at the middle, in mean slopes of the slower part, up to which a cubic that is straight there does not overshoot
 its other end."""
@@ -20,7 +20,7 @@ its other end."""
 
 @dataclass(frozen=True, slots=True)
 class Slerp:
-    """A turn about one axis in proportion to the way; between two orientations it is their slerp."""
+    """A uniform rotation about one axis; between two orientations it is their slerp."""
 
     start: Rotation9
     """Orientation at the start, row-major."""
@@ -48,7 +48,7 @@ class Slerp:
 
 @dataclass(frozen=True, slots=True)
 class ViaOrientation:
-    """A turn that passes exactly through an orientation at a place on the way, with continuous acceleration.
+    """A rotation exactly through a middle orientation at a share of the path, with continuous acceleration.
 
     The orientation is R_middle exp(p(u)) with a rotation vector p(u) in the axes of the middle one: on each side of
     the middle a cubic whose slope there is the same on both sides and whose bend is zero. So the rotation velocity and

@@ -1,7 +1,6 @@
 """Paths of the tool as geometry, without time: the straight line and the arc of the manual's blocking moves (3.5).
 
-Where nothing else is asked for, the orientation turns from start to goal by slerp, in proportion to the way; the arm
-angle always changes in proportion.
+By default the orientation is a slerp from start to goal in the path length; the arm angle is always linear in it.
 """
 
 from __future__ import annotations
@@ -30,11 +29,11 @@ _OUT_OF_PLANE = 1e-6
 Point: TypeAlias = tuple[float, float, float]
 
 ArcOrientation = Literal["through_via", "start_to_goal"]
-"""How the tool turns on an arc: through the orientation of via, or by one slerp that ignores it, as the vendor's."""
+"""Orientation of the tool on an arc: through that of via, or one slerp that ignores it, as in the vendor's."""
 CircleOrientation = Literal["held", "turning"]
-"""What the tool does on a circle: it keeps its orientation, or turns with the circle, about its axis."""
+"""Orientation of the tool on a circle: constant, or turning with the circle, about its axis."""
 Way: TypeAlias = Literal["shorter", "longer"]
-"""Which way round the arm angle goes: on the circle there are two, and one of them may lead across +-pi."""
+"""Direction of the arm angle on its circle; one of the two may cross +-pi."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,24 +57,24 @@ class Path:
     start: Pose
     goal: Pose
     psi_start: float | None
-    """Arm angle at the start, [rad]; None leaves it to whoever follows the path."""
+    """Arm angle at the start, [rad]; None: not part of the path."""
     psi_goal: float | None
     """[rad]."""
     circle: Circle | None
     """None for a straight line."""
     distance: float
-    """The way that a profile of speed runs along: the tool's, [m]; that of a mere turn, or of the arm angle when the
-    tool stands still, [rad]. 0 where start and goal are the same."""
+    """Path length: of the tool, [m]; of a pure rotation, or of the arm angle if the tool does not move, [rad]. 0 if
+    start and goal are the same."""
     unit: str
     """m or rad."""
     turn: float
-    """Fastest rate of the tool's turn by the share of the way; where it turns evenly, the whole angle, [rad]."""
+    """Largest rate of the tool's rotation by the share; the whole angle for a uniform rotation, [rad]."""
     turning: Turning | None = None
-    """How the tool turns; None is the slerp from start to goal."""
+    """Orientation of the tool; None is the slerp from start to goal."""
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """Name in messages."""
         if self.circle is not None:
             return "circle" if self.circle.angle == math.tau else "arc"
         return "line" if self.unit == "m" or self.turn > STANDSTILL_DISTANCE else "null-space motion"
@@ -143,7 +142,7 @@ def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal
         psi_goal: Arm angle at the end, [rad]; it changes in proportion to the way, never across +-pi.
 
     Raises:
-        InvalidValueError: A pose is none, or not finite.
+        InvalidValueError: A pose is not valid.
     """
     start, goal = as_pose(start, "start"), as_pose(goal, "goal")
     turn = _angle_between(start, goal)
@@ -169,11 +168,11 @@ def build_arc(
         psi_goal: Arm angle at the end, [rad].
         orientation: "start_to_goal": by slerp from start to goal; that of `via` is ignored, as the vendor's helper does
             it. "through_via": exactly through that of `via` at its place, the shorter way to it and on from it, with
-            continuous angular velocity and acceleration (`TurnThrough`).
+            continuous angular velocity and acceleration (`ViaOrientation`).
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.
-        InvalidValueError: A pose is none, or not finite, or the orientation is unknown.
+        InvalidValueError: A pose is not valid, or the orientation is unknown.
     """
     start, via, goal = as_pose(start, "start"), as_pose(via, "via"), as_pose(goal, "goal")
     _require_word("orientation", orientation, get_args(ArcOrientation))
@@ -208,11 +207,11 @@ def build_circle(
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
         orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
-            and by the same angle, so that it shows the centre always the same side.
+            and by the same angle, so that the same side of it faces the centre.
 
     Raises:
         PlanningError: Start is the centre, or not in the plane through the centre at right angles to the axis.
-        InvalidValueError: `start` is no pose, a number is not finite or out of range, or the orientation is unknown.
+        InvalidValueError: `start` is not a pose, a number is not finite or out of range, or the orientation is unknown.
     """
     start = as_pose(start, "start")
     _require_word("orientation", orientation, get_args(CircleOrientation))
@@ -254,7 +253,7 @@ def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.
-        InvalidValueError: A pose is none, or not finite.
+        InvalidValueError: A pose is not valid.
     """
     start, second, third = as_pose(start, "start"), as_pose(second, "second"), as_pose(third, "third")
     circle = _circle(start.position, second.position, third.position)

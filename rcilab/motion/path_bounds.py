@@ -1,4 +1,4 @@
-"""What a path allows: bounds on how fast its parameter s may change, at knots along the way."""
+"""Bounds of a path on the rate of its parameter s, at knots along the path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ANGLES = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PathBounds:
-    """What a path allows at K + 1 knots: s'' between tilt x -+ reserve, for each of m rows, and x = s'^2 up to most."""
+    """Bounds at K + 1 knots: s'' between tilt x -+ reserve, for each of m rows, and x = s'^2 up to most."""
 
     knots: Array
     """Values of s, increasing, first 0, shape (K + 1,)."""
@@ -32,7 +32,7 @@ class PathBounds:
     """Largest x, shape (K + 1,), [1/s^2]."""
 
     def slowed(self, factor: Array) -> PathBounds:
-        """Returns what is left when each knot is passed that much slower: 1 or more, shape (K + 1,)."""
+        """Returns the bounds when each knot is passed slower by a factor of 1 or more, shape (K + 1,)."""
         squares = factor**2
         return PathBounds(
             knots=self.knots, reserve=self.reserve / squares, tilt=self.tilt, most=self.most / squares
@@ -40,7 +40,7 @@ class PathBounds:
 
 
 def path_bounds(knots: Array, first: Array, second: Array, acceleration: Array, fastest: Array) -> PathBounds:
-    """Returns what m rows allow whose acceleration is first s'' + second s'^2.
+    """Returns the bounds of m rows whose acceleration is first s'' + second s'^2.
 
     Args:
         knots: Values of s, increasing, first 0, shape (K + 1,).

@@ -1,4 +1,4 @@
-"""What keeps a path of the tool from being followed, found before anything is planned: the place and the reason."""
+"""Feasibility of a tool path before planning: the first point that cannot be followed, and the reason."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def examine(
         path: The path.
         shares: Shares of the way, shape (N,), the first 0.
         longest: Turns of the joints from row to row that are no jump yet, shape (N - 1, n) or (n,), [rad].
-        span: What lies between two rows, for people.
+        span: Distance between two rows, for the message.
     """
     T, psi = path.sample(shares)
     rows, loss = inverse_path(model, T, psi, q)
@@ -70,13 +70,13 @@ def examine(
 
 
 def refusal(path: Path, share: float, reason: RcilabError, when: str = "") -> PlanningError:
-    """Returns the error that tells where a path cannot be followed, and why.
+    """Returns the error that says where a path cannot be followed, and why.
 
     Args:
         path: The path.
-        share: Where, as a share of the way.
-        reason: Why.
-        when: At what time that would have been, for people.
+        share: The point, as a share of the path length.
+        reason: The cause.
+        when: Its time, for the message.
     """
     x, y, z = path.at(share)[0].parts[1]
     return PlanningError(

@@ -34,17 +34,17 @@ _KNOTS = 500
 _FINE_KNOTS = 4000
 """The same close to a singularity, where joints turn fast on a short way. Tuning value: the law then takes 50 ms."""
 _STEP = 0.1
-"""Turn of a joint from knot to knot beyond which it does not follow the tool but a singularity is in the way, [rad]. A
-choice: 50 rad on the whole way; no arm has that."""
+"""Rotation of a joint from knot to knot that can only be caused by a singularity, [rad]: 50 rad on the whole path, more
+than any arm can turn."""
 _ROUNDS = 8
-"""How often to slow down a law in places where it passes a limit, and then as a whole. Seen: 1 to 5 in places."""
+"""How often to slow down a law locally where it exceeds a limit, and then as a whole. Measured: 1 to 5 locally."""
 _SLOWEST = 4.0
-"""Beyond this a limit is not passed by what happens between the knots, but by a jump. Tuning value."""
+"""A larger excess of a limit is caused by a jump, not by the interpolation between the knots. Tuning value."""
 _INSTANTS = (0.25, 0.5, 0.75)
-"""Where in a cycle the curve is looked at, besides its start, in cycles."""
+"""Instants of a cycle at which the curve is checked besides its start, in cycles."""
 _HASTE = 1.002
-"""To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
-few rounds do: 1 or 2 on nine of ten paths. Tuning value; it makes motions 0.06 % longer."""
+"""Factor on the square of the required slowdown, applied also closely below a limit, so that few rounds are needed: 1
+or 2 on nine of ten paths. Tuning value; motions become 0.06 % longer."""
 _NUDGE = 1e-4
 """Share of the way over which derivatives by the way are formed. Tuning value: both their errors are below 1e-7."""
 
@@ -61,9 +61,9 @@ class _Bounds:
 
 
 def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
-    """Returns the fastest motion along a path from rest to rest, all bounds on joints, tool and arm angle kept.
+    """Returns the fastest motion along a path, from standstill to standstill, within all limits.
 
-    Bounds are kept as the controller judges them, by backward differences at 1 ms, with `LIMIT_MARGIN`.
+    The limits hold as the controller checks them, by backward differences at 1 ms, with `LIMIT_MARGIN`.
 
     Args:
         model: The arm, with its tool.
@@ -116,13 +116,13 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
 
 
 def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeParametrization) -> PiecewisePolynomial:
-    """Returns the curve through joint angles along a path, from rest to rest, with continuous acceleration.
+    """Returns the curve through joint angles along a path, between standstills, with continuous acceleration.
 
     Args:
         model: The arm, with its tool.
         path: The path.
         rows: Joint angles at every cycle of the law, shape (N, n), N >= 2, [rad].
-        law: Where on the path each row is, and how fast.
+        law: Position and rate of each row on the path.
     """
     coefficients = np.empty((len(rows) - 1, model.n, 6))
     for block, powers in _quintics(model, path, rows, law):
@@ -246,7 +246,7 @@ def _turn_rows(path: Path, shares: Array) -> tuple[Array, Array]:
 
 
 def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Array:
-    """Returns how much slower each row must be passed to keep every bound, shape (N,); 1 or less keeps them."""
+    """Returns the slowdown that each row needs to keep every bound, shape (N,); 1 or less keeps them."""
     last = len(rows) - 1
     excess = np.zeros(len(rows) + 3)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
@@ -271,12 +271,12 @@ def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Arra
 
 
 def _raise(excess: Array, ratio: Array, order: int) -> None:
-    """Takes in how much too large differences are that look back; those of order n grow with the speed to the n."""
+    """Includes the excess of backward differences; one of order n grows with the speed to the power n."""
     np.maximum(excess, ratio[3 - order :] ** (1.0 / order), out=excess)
 
 
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
-    """Returns how much slower each cycle must be to keep the joints' bounds at its start and in it, shape (N - 1,)."""
+    """Returns the slowdown that each cycle needs to keep the joints' bounds, shape (N - 1,)."""
     excess = np.zeros(len(powers[0]))
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
         powers = [float(p) * powers[p] for p in range(1, len(powers))]

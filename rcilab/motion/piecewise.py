@@ -1,4 +1,4 @@
-"""A function of time made of polynomial pieces, one set of pieces for all joints: what every motion is built on."""
+"""A piecewise polynomial of time for all joints: the curve of every motion."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class PiecewisePolynomial:
         return (angles[low, joint], times[low, joint]), (angles[high, joint], times[high, joint])
 
     def at_end(self) -> tuple[JointVector, JointVector, JointVector, JointVector]:
-        """Returns the limits from the left at the end of the last piece: does it arrive at rest?"""
+        """Returns the limits from the left at the end of the last piece."""
         return self._at_piece(-1, float(self.breaks[-1]) - self._starts[-1])
 
     def slowed(self, factor: float) -> PiecewisePolynomial:
@@ -173,7 +173,7 @@ class PiecewisePolynomial:
 
 
 def join_pieces(starts: Array, coefficients: Array, duration: float) -> PiecewisePolynomial:
-    """Returns the curve of joints that each have their own pieces, on the union of all breaks.
+    """Returns the curve of joints with pieces of their own, on the union of all breaks.
 
     Args:
         starts: When each piece of each joint begins, shape (n, m), not decreasing along a joint, first 0, [s]. The last

@@ -1,4 +1,4 @@
-"""Programs planned: one motion through all waypoints, as fast as the limits allow, corners rounded as asked for."""
+"""The planner of programs: one motion through all waypoints, as fast as the limits allow, with blended corners."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import MOST_ROWS, require_max_rows
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel, require_model
-from rcilab.motion.blend import Blend, build_blend, turn
+from rcilab.motion.blend import Blend, build_blend, turn_angle
 from rcilab.motion.cartesian import plan_path
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
@@ -33,11 +33,11 @@ from rcilab.motion.waypoint import MOST_WAYPOINTS, label
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
 _SHARP = math.radians(150.0)
-"""Turn of the way at a waypoint from which on it is looked whether to stop takes less time than to blend. A choice."""
+"""Change of direction at a waypoint from which stopping is compared with blending: close to a cusp, blends are slow."""
 _BLENDS = 0.3
-"""Part of the work on a blended run that it takes to find the blends; about what was seen."""
+"""Share of the work on a blended run that finding the blends takes, as measured."""
 _GEOMETRY = 0.3
-"""Part of the work that it takes to find the ways; about what was seen."""
+"""Share of the work that building the segments takes, as measured."""
 
 
 def plan_program(
@@ -51,31 +51,31 @@ def plan_program(
     progress: Callable[[float], None] | None = None,
     max_rows: int = MOST_ROWS,
 ) -> Motion:
-    """Returns the motion through the waypoints of a program, from rest to rest.
+    """Returns the motion through the waypoints of a program, from standstill to standstill.
 
     On lines, arcs, circles and null-space moves, and on blends between them, the limits on joints, tool and arm angle
-    are kept; on joint moves and on the blends beside them those on the joints, as by `plan_joint`. A blend uses the
+    are kept; on joint moves and on the blends next to them those on the joints, as by `plan_joint`. A blend uses the
     lower speed of its neighbours. Without blends the motion is that of `plan_joint`, `plan_line` and so on, one after
-    the other, each from a whole cycle on.
+    the other, each starting at a whole cycle.
 
-    Which segment a row belongs to is in `motion.segment`, counted from 0: a segment ends in the middle of its blend,
-    or, where the tool stops, with its dwell. A blend takes no more than half of a neighbouring segment; where the
-    radius is longer, it is shortened to what fits, and `motion.notes` says so; as it does where the way turns by 150
-    degrees or more and it is quicker to stop there than to blend, which is what is done then.
+    `motion.segment` is the segment of each row, counted from 0: a segment ends in the middle of its blend, or, if the
+    tool stops, with its dwell. A blend takes at most half of a neighbouring segment; a longer radius is shortened. At a
+    change of direction of 150 degrees or more the tool stops instead if that is faster than the blend. Both are noted
+    in `motion.notes`.
 
     Args:
         model: The arm; with its own tool, unless the program has one.
         program: The waypoints.
-        speed: What to multiply the speed of every waypoint by, above 0 to 1.
-        start: Joint angles of the standing arm, shape (n,), [rad]: where they are not those of the program's start, a
-            joint move leads there first, at the speed of the first waypoint, and is segment 0. None begins at the
-            program's start.
-        rounds: How often to go through the waypoints. Between two rounds a joint move, a segment of its own, leads
-            back to the program's start.
+        speed: Factor on the speed of every waypoint, above 0 to 1.
+        start: Joint angles of the standing arm, shape (n,), [rad]: if they are not those of the program's start, a
+            joint move there comes first, at the speed of the first waypoint, as segment 0. None begins at the program's
+            start.
+        rounds: Number of passes through the waypoints. Between two passes a joint move, a segment of its own, returns
+            to the program's start.
         law: How every segment runs, see `plan_joint`. By the S profile the tool stops at every waypoint, so that there
             can be no blends.
-        progress: Called now and then with the part of the work that is done, 0 to 1; what it raises ends the planning.
-        max_rows: How many cycles of 1 ms the motion may take: 17 minutes, as judging it takes 1.1 KB a cycle.
+        progress: Called with the progress, 0 to 1; an exception that it raises ends the planning.
+        max_rows: Largest number of 1 ms cycles: 17 minutes by default, as a check takes 1.1 KB per cycle.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
@@ -84,7 +84,7 @@ def plan_program(
     """
     require_model(model)
     if not isinstance(program, Program):
-        raise InvalidValueError("program", described(program), "is no Program; Program.load reads one")
+        raise InvalidValueError("program", described(program), "must be a Program; use Program.load")
     if program.model != model.name:
         raise InvalidValueError(
             "program", program.model, f"is the arm it is for, not {model.name}; load that model"
@@ -114,16 +114,16 @@ def plan_program(
         model = model.with_tool(program.T_flange_tool)
     done = 0.0
 
-    def tell(part: float) -> None:
+    def report(part: float) -> None:
         nonlocal done
-        done = max(done, part)  # What is planned a second time, more gently, does not take the work back.
+        done = max(done, part)  # Planning a second time with lower limits does not reduce the progress.
         if progress is not None:
             progress(done)
 
     approach = None if start is None else as_vector(start, model.n, "start", "rad")
     if approach is not None and np.abs(approach - program.start).max() <= STANDSTILL_DISTANCE:
         program, approach = replace(program, start=tuple(approach.tolist())), None
-    segments = build_segments(model, program, lambda part: tell(_GEOMETRY * part))
+    segments = build_segments(model, program, lambda part: report(_GEOMETRY * part))
     there, slow = np.array(program.start), speed * program.waypoints[0].speed
     track = _Track()
     if approach is not None:
@@ -132,8 +132,8 @@ def plan_program(
     stops_at = partial(_is_quicker_to_stop, model, scale=speed, law=law, notes=track.notes)
     for run in _runs(segments, stops_at):
         of_all = partial(_part_of_all, run[0].number, run[-1].number, count)
-        curves.append(_plan_run(model, run, speed, track.notes, law, lambda part, of_all=of_all: tell(of_all(part))))
-        tell(of_all(1.0))
+        curves.append(_plan_run(model, run, speed, track.notes, law, lambda part, of_all=of_all: report(of_all(part))))
+        report(of_all(1.0))
     back = None if rounds == 1 else _plan_move(model, curves[-1].goal, there, slow, "the way back to the start", law)
     for number in range(int(rounds)):
         for curve in (back, *curves) if back is not None and number else curves:
@@ -148,7 +148,7 @@ def plan_program(
 
 
 def _part_of_all(first: int, last: int, count: int, part: float) -> float:
-    """Returns which part of the work is done when a part of the waypoints from `first` to `last`, of `count`, is."""
+    """Returns the total progress for a progress on the waypoints from `first` to `last` of `count`."""
     return _GEOMETRY + (1.0 - _GEOMETRY) * (first - 1 + (last - first + 1) * part) / count
 
 
@@ -178,7 +178,7 @@ def _require_stops(program: Program) -> None:
 
 
 def _runs(segments: list[Segment], stops_at: Callable[[Segment, Segment], bool]) -> list[list[Segment]]:
-    """Returns the segments between full stops; asked is where a blend could be left out."""
+    """Returns the segments between full stops; `stops_at` decides where a blend could be omitted."""
     runs: list[list[Segment]] = []
     goes_on = False
     for number, segment in enumerate(segments):
@@ -196,9 +196,9 @@ def _is_quicker_to_stop(
 ) -> bool:
     """Returns whether a sharp corner takes less time without its blend, and notes that.
 
-    So it is where the way turns back: the blend comes close to a cusp.
+    This happens at reversals, where the blend is close to a cusp.
     """
-    angle = turn(model, before, after)
+    angle = turn_angle(model, before, after)
     if angle < _SHARP:
         return False
 
@@ -207,7 +207,7 @@ def _is_quicker_to_stop(
 
     try:
         is_quicker = duration([before, after]) > duration([before]) + duration([after])
-    except PlanningError:  # What the blend cannot do; what the ways cannot do, is told when they are planned.
+    except PlanningError:  # Of the blend; an error of the segments is raised when they are planned.
         is_quicker = True
     if is_quicker:
         said = f"{before.label}: no blend, as the way turns by {math.degrees(angle):.0f} deg there: to stop is quicker"
@@ -218,7 +218,7 @@ def _is_quicker_to_stop(
 def _plan_move(
     model: RobotModel, start: JointVector, goal: JointVector, speed: float, what: str, law: JointLaw
 ) -> _Curve:
-    """Returns a joint move that is no waypoint's."""
+    """Returns a joint move that does not belong to a waypoint."""
     if np.abs(goal - start).max() <= STANDSTILL_DISTANCE:
         return _stand(goal)
     with naming(what):
@@ -236,7 +236,7 @@ def _plan_run(
     scale: float,
     notes: list[str],
     law: JointLaw,
-    tell: Callable[[float], None],
+    report: Callable[[float], None],
 ) -> _Curve:
     segment = run[0]
     speed = scale * segment.waypoint.speed
@@ -244,7 +244,7 @@ def _plan_run(
         blends: list[Blend] = []
         for before, after in pairwise(run):
             blends.append(build_blend(model, before, after))
-            tell(_BLENDS * len(blends) / len(run))
+            report(_BLENDS * len(blends) / len(run))
         for before, blend in zip(run[:-1], blends, strict=True):
             asked = before.waypoint.blend
             if blend.radius < asked - _SHORTENED:
@@ -256,7 +256,7 @@ def _plan_run(
         chain, last = build_chain(model, run, blends, scale), run[-1]
 
         def blended(arm: RobotModel) -> _Curve:
-            coefficients, corners = plan_chain(chain, arm.limits, lambda part: tell(_BLENDS + (1.0 - _BLENDS) * part))
+            coefficients, corners = plan_chain(chain, arm.limits, lambda part: report(_BLENDS + (1.0 - _BLENDS) * part))
             breaks = np.arange(len(coefficients) + 1, dtype=np.float64) * CYCLE_TIME
             return _Curve(breaks, coefficients, last.goal, last.waypoint.dwell, tuple(corners))
 

@@ -1,4 +1,4 @@
-"""Programs: waypoints in a row, as values that can be planned, saved and made a script."""
+"""Programs: sequences of waypoints that can be planned, saved and exported as a script."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rcilab.robots import describe_robot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """Waypoints in a row, for one model, from one start. `plan_program` makes the motion.
+    """A sequence of waypoints for one model, from one start. `plan_program` plans its motion.
 
     Raises:
         InvalidValueError: A number is out of range, or the angles are not as many as the arm has axes.
@@ -30,7 +30,7 @@ class Program:
     """Joint angles at the start, n of them, [rad]."""
     waypoints: tuple[Waypoint, ...]
     name: str = ""
-    """What people call it."""
+    """Name for display."""
     tool: Floats | None = None
     """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of the planner."""
 
@@ -43,13 +43,13 @@ class Program:
         object.__setattr__(self, "start", angles_of(self.start, "start", n, robot.name))
         if not isinstance(self.waypoints, Iterable):
             raise InvalidValueError(
-                "waypoints", described(self.waypoints), "are no list; give [Waypoint.line(...), ...]"
+                "waypoints", described(self.waypoints), "must be a list; use [Waypoint.line(...), ...]"
             )
         object.__setattr__(self, "waypoints", tuple(self.waypoints))
         require_count(len(self.waypoints))
         for number, waypoint in enumerate(self.waypoints, 1):
             if not isinstance(waypoint, Waypoint):
-                raise InvalidValueError(f"waypoint {number}", described(waypoint), "is none; Waypoint.line makes one")
+                raise InvalidValueError(f"waypoint {number}", described(waypoint), "must be a Waypoint")
             try:
                 require_fit(waypoint, robot)
             except InvalidValueError as error:
@@ -64,7 +64,7 @@ class Program:
         return None if self.tool is None else Pose(self.tool[:3], self.tool[3:])
 
     def to_json(self) -> str:
-        """Returns the program as JSON, which `from_json` reads back to the last bit."""
+        """Returns the program as JSON, which `from_json` reads back exactly."""
         return program_text(self)
 
     @classmethod
@@ -76,7 +76,7 @@ class Program:
             name: What to call it in an error.
 
         Raises:
-            InvalidValueError: It holds no sound program; the message names the line, the key and what to do.
+            InvalidValueError: The program is not valid; the message names the line, the key and what to do.
             VersionMismatchError: It was written for another version of this format.
         """
         content = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
@@ -95,7 +95,7 @@ class Program:
         """Returns the program in a file.
 
         Raises:
-            InvalidValueError: There is no such file, or it holds no sound program; the message names the line.
+            InvalidValueError: There is no such file, or its program is not valid; the message names the line.
             VersionMismatchError: It was written for another version of this format.
         """
         return load_program(file, cls)

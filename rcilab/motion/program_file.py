@@ -1,4 +1,4 @@
-"""Programs in JSON: exact there and back, and for every file that holds none a sentence with its line."""
+"""Programs as JSON: an exact round trip, and errors that name the line."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ VERSION = 1
 SCHEMA = Path(__file__).with_name("program.schema.json")
 """The JSON schema (draft 2020-12) of a program."""
 
-_SHOWN = 40  # Characters of a value that a face repeats.
+_SHOWN = 40  # Characters of a value that a UI repeats.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")
 
 
 def program_text(program: Program) -> str:
-    """Returns a program as JSON, a waypoint a line."""
+    """Returns a program as JSON, one waypoint per line."""
     head = {"format": FORMAT, "version": VERSION, "name": program.name, "model": program.model}
     lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
     if program.tool is not None:
@@ -51,7 +51,7 @@ def save_program(program: Program, file: str | PathLike[str]) -> None:
         InvalidValueError: The name does not end in .json, or the file cannot be written.
     """
     if not isinstance(file, str | PathLike):
-        raise InvalidValueError("program file", described(file), "is no file name")
+        raise InvalidValueError("program file", described(file), "must be a file name")
     if Path(fspath(file)).suffix.lower() != ".json":
         raise InvalidValueError("program file", fspath(file), "must end in .json")
     try:
@@ -67,11 +67,11 @@ def load_program(file: str | PathLike[str], build: Callable[..., P]) -> P:
     """Returns the program in a file; arguments as of `read_program`.
 
     Raises:
-        InvalidValueError: There is no such file, or it holds no sound program.
+        InvalidValueError: There is no such file, or its program is not valid.
         VersionMismatchError: It was written for another version of this format.
     """
     if not isinstance(file, str | PathLike):
-        raise InvalidValueError("program file", described(file), "is no file name")
+        raise InvalidValueError("program file", described(file), "must be a file name")
     path = Path(fspath(file))
     content = read_whole(path, "program file", LONGEST + 1)
     return read_program(content, path.name, build)
@@ -83,10 +83,10 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
     Args:
         content: JSON in UTF-8.
         name: What to call it in an error.
-        build: Makes the program, and raises InvalidValueError where a value is not sound.
+        build: Builds the program; raises InvalidValueError for an invalid value.
 
     Raises:
-        InvalidValueError: It holds no sound program; one sentence with line, key, value, bound and what to do.
+        InvalidValueError: The program is not valid; the message has line, key, value, bound and what to do.
         VersionMismatchError: It was written for another version of this format.
     """
     try:
@@ -106,7 +106,7 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
         value = found[key].value
         if key == "version" and value != expected:
             what = f"{name}, line {found[key].line}, version"
-            raise VersionMismatchError(what, value, VERSION, "write it anew with the rcilab that reads it")
+            raise VersionMismatchError(what, value, VERSION, "write it again with the rcilab that reads it")
         if value != expected:
             raise InvalidValueError(_at(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
                 "file_no_program", file=name, line=found[key].line

@@ -1,4 +1,4 @@
-"""The script of a program: Python that plans the same motion, prints its report and saves it if asked to."""
+"""The script of a program: Python that plans the same motion, prints its report and optionally saves it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if __name__ == "__main__":
 
 
 def program_script(program: Program) -> str:
-    """Returns the script; every number stands in it to the last bit, and text only as a literal."""
+    """Returns the script; its numbers are exact, and text is only in literals."""
     head = [("name", program.name), ("model", program.model), ("tool", program.tool), ("start", program.start)]
     lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)

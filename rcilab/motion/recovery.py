@@ -1,4 +1,4 @@
-"""The way back inside the joint ranges and the safety box, for an arm that was stopped beyond them."""
+"""The motion back inside joint ranges and safety box, for an arm that was stopped outside them."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 
 RECOVERY_MARGIN = radians(1.0)
-"""How far inside its range a joint is led, [rad]. A tuning value: far enough that the next motion starts inside where
-a compliant arm yields a little."""
+"""How far inside its range a joint is moved, [rad]: enough that the next motion starts inside although a compliant arm
+deflects a little."""
 RECOVERY_DEPTH = 0.01
-"""How far inside its safety box the tool is led, [m]. A tuning value, as `RECOVERY_MARGIN`."""
+"""How far inside its safety box the tool is moved, [m], for the same reason."""
 RECOVERY_SPEED = 0.05
-"""Part of the velocity and acceleration limits. A tuning value: slow, for an arm that has just been stopped."""
+"""Part of the velocity and acceleration limits: low, for an arm that has just been stopped."""
 
 
 def plan_recovery(
     model: RobotModel, q: ArrayLike, box: SafetyBox | None = None, *, speed: float = RECOVERY_SPEED
 ) -> Motion:
-    """Returns the motion that leads joints that are outside their range back inside, 1 degree deep, and stops there.
+    """Returns the motion that moves joints outside their range back inside, by 1 degree, and stops there.
 
-    Each of these joints moves straight inwards; all others stay. Where all are inside and the tool is outside its
-    safety box, the tool is led straight back in, 1 cm deep. `check` accepts the motion, and `execute` runs it. Where
-    there is nothing to lead back, it is a motion without length. A controller that has stopped for a joint limit
-    also switches motor power off: `power_off()`, `power_on()`, then this motion. `recover()` in place of `power_off()`
-    is refused where a joint is more than 1 degree outside.
+    Each of these joints moves straight inwards; all others stay. If all are inside and the tool is outside its safety
+    box, the tool moves straight back in, by 1 cm. `check` accepts the motion, and `execute` runs it. If nothing is
+    outside, the motion has zero length. A controller that has stopped for a joint limit also switches motor power off:
+    call `power_off()`, `power_on()`, then run this motion. `recover()` instead of `power_off()` is refused if a joint
+    is more than 1 degree outside.
 
     Args:
         model: The arm; with soft limits, their range counts.
         q: Where the arm is, shape (n,), [rad]: `state.q_c`. A joint may be outside by at most `RECOVERY_RANGE`, 20
             degrees.
-        box: The safety box that the controller has, such as `robot.safety_box`; None: no box is looked at.
+        box: The controller's safety box, such as `robot.safety_box`; None: no box.
         speed: Part of the velocity and acceleration limits to use, 0.001 to 1.
 
     Raises:
-        PlanningError: A joint is farther outside; lead the arm by hand (`start_drag`) or by the maker's panel.
+        PlanningError: A joint is farther outside; move the arm by hand (`robot.rci.start_drag()`) or by its panel.
         InvalidValueError: Wrong shape, not finite, or a speed out of range.
     """
     limits = require_model(model).limits.joint

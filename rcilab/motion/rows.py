@@ -1,4 +1,4 @@
-"""Rows of long motions: in blocks that stay in the cache, and how much slower to pass where a limit is exceeded."""
+"""Rows of long motions in blocks that fit into the cache, and the slowdown at rows that exceed a limit."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from rcilab.core.arrays import Array
 
 _BLOCK = 4096
-"""Rows that are computed together. Tuning value: a table of them, of 7 joints, has 230 kB and is neither given back to
-the system nor fetched from memory again and again, which would make motions of 100 s half as slow again."""
+"""Rows that are computed together. A table of them for 7 joints has 230 kB: it stays in the cache and is not returned
+to the system. With larger tables, motions of 100 s took half as long again."""
 
 
 def blocks(count: int) -> Iterator[slice]:
@@ -20,13 +20,13 @@ def blocks(count: int) -> Iterator[slice]:
 
 
 def spread(factor: Array, s: Array, knots: Array, reach: int) -> Array:
-    """Returns by how much to slow down at each knot, shape (K + 1,), given by how much to do so at each row.
+    """Returns the slowdown at each knot, shape (K + 1,), from the slowdown at each row.
 
     Args:
-        factor: How much slower to pass each row, 1 or more, shape (N,).
-        s: Where each row is, not decreasing, shape (N,).
-        knots: Where the knots are, increasing, shape (K + 1,).
-        reach: How many rows before and after a row it concerns as well.
+        factor: Slowdown of each row, 1 or more, shape (N,).
+        s: Parameter of each row, not decreasing, shape (N,).
+        knots: Parameters of the knots, increasing, shape (K + 1,).
+        reach: Number of rows before and after a row that are slowed down as well.
     """
     factor = largest_around(factor, reach)
     result = np.interp(knots, s, factor)

@@ -1,4 +1,4 @@
-"""The manual's S profile (3.5) as mathematics: one coordinate from rest to rest along a smooth hump of speed.
+"""The manual's S profile (3.5): one coordinate from standstill to standstill with a smooth speed profile.
 
 Formulas: interoperability notes on the vendor's generators, reproduced independently. The speed rises as
 V (3 u^2 - 2 u^3), u = t / t1, stays at V, and falls by the mirrored law; so the acceleration is continuous, with peak
@@ -142,5 +142,5 @@ def synchronize(curves: list[SCurve]) -> list[SCurve]:
 
 
 def _shortest_time(length: float, a0: float, a1: float) -> float:
-    """Returns the time over a length when no speed bound is in the way: rise and fall meet, [s]."""
+    """Returns the time over a length without a speed bound, when rise and fall meet, [s]."""
     return sqrt(3.0 * length * (a0 + a1) / (a0 * a1))

@@ -1,4 +1,4 @@
-"""Joint samples from elsewhere: times and angles in a CSV or NPZ file at any rate."""
+"""Joint samples of other programs: times and angles in a CSV or NPZ file at any rate."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def read_samples(
     Arguments are those of `Motion.load_samples`.
 
     Raises:
-        InvalidValueError: There is no such file, or it holds no sound samples; one sentence with the line.
+        InvalidValueError: There is no such file, or its samples are not valid; the message names the line.
     """
     require_max_rows(max_rows)
     if unit not in get_args(AngleUnit):
@@ -54,10 +54,10 @@ def read_samples(
     if rate_hz is not None and not 0.0 < (rate_hz := as_number(rate_hz, "rate_hz", "Hz")) < math.inf:
         raise InvalidValueError("rate_hz", rate_hz, "must be above 0: samples a second [Hz]")
     if not isinstance(file, str | PathLike):
-        raise InvalidValueError("samples", file, "is no file name")
+        raise InvalidValueError("samples", file, "must be a file name")
     path = Path(fspath(file))
     if path.suffix.lower() not in _READERS:
-        raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}, which tells the format")
+        raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}")
     content = read_whole(path, "samples", max_rows * ROW_BYTES + 1)
     require_bytes(len(content), max_rows, "samples", path.name)
     times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
@@ -90,7 +90,7 @@ def _from_csv(
 
 
 def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> tuple[Array | None, Array]:
-    """Returns times and angles from the columns whose names say what they are; others are not looked at."""
+    """Returns times and angles from the columns with known names; others are ignored."""
     where = f"{name}, line {table.header_line}"
     times: Array | None = None
     joints: dict[int, Array] = {}

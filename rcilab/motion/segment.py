@@ -1,4 +1,4 @@
-"""The segments of a program: each waypoint's way as geometry, from joint angles to joint angles."""
+"""The segments of a program: the geometry of the path to each waypoint."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _NUDGE = 3e-4
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Segment:
-    """The way to one waypoint, as a function of its share u, 0 to 1."""
+    """The path to one waypoint, as a function of its share u, 0 to 1."""
 
     number: int
     """Of the waypoint, from 1."""
@@ -50,7 +50,7 @@ class Segment:
 
     @property
     def label(self) -> str:
-        """What errors call it."""
+        """Name in errors."""
         return label(self.number, self.waypoint)
 
     @property
@@ -83,12 +83,12 @@ class Segment:
 def build_segments(
     model: RobotModel, program: Program, progress: Callable[[float], None] = lambda part: None
 ) -> list[Segment]:
-    """Returns the segments of a program, each from where the one before ends; tells which part of them is built.
+    """Returns the segments of a program, each from the end of the one before.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
             waypoint, the place and the reason.
-        InvalidValueError: A waypoint has what this arm has not.
+        InvalidValueError: A waypoint does not fit this arm.
     """
     q = np.array(program.start)
     try:
@@ -106,7 +106,7 @@ def build_segments(
 
 @contextmanager
 def naming(what: str, number: int | None = None, kind: str = "") -> Iterator[None]:
-    """Puts the name of a waypoint in front of whatever goes wrong, and notes its number."""
+    """Adds the name and number of a waypoint to errors of the body."""
     try:
         yield
     except InvalidValueError as error:

@@ -1,4 +1,4 @@
-"""How fast a chain may be run through: the bounds at its knots."""
+"""The bounds at the knots of a segment spline."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def column_limits(limits: Limits) -> ColumnLimits:
 
 
 def chain_bounds(chain: SegmentSpline, limits: ColumnLimits) -> PathBounds:
-    """Returns what a chain allows."""
+    """Returns the bounds of a segment spline."""
     first, second, third = derivatives_at_knots(chain)
     n = chain.n
     speed = np.minimum(_at_knots(chain.speed, 1.0, np.minimum), 1.0)

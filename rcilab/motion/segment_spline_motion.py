@@ -1,4 +1,4 @@
-"""A chain run through as fast as the limits allow: the law is slowed down where its motion passes a limit."""
+"""The fastest motion along a segment spline: the time law is slowed down where its motion exceeds a limit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, 
 _ROUNDS = 12
 """How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
 _USUAL_ROUNDS = 4.0
-"""By which half of the work is taken for done. Tuning value."""
+"""Number of rounds that counts as half of the progress. Tuning value."""
 _SLOWEST = 50.0
 """Beyond this a limit is passed by a jump. Tuning value."""
 _INSTANTS = (0.25, 0.5, 0.75)
@@ -33,8 +33,8 @@ _HASTE = 1.002
 few rounds do, and places that were good stay so when the cycles fall elsewhere. Tuning value."""
 
 
-def plan_chain(chain: SegmentSpline, limits: Limits, tell: Callable[[float], None]) -> tuple[Array, list[float]]:
-    """Returns the fastest curve along a chain from rest to rest, and when it passes each corner, [s].
+def plan_chain(chain: SegmentSpline, limits: Limits, report: Callable[[float], None]) -> tuple[Array, list[float]]:
+    """Returns the fastest curve along a spline between standstills, and when it passes each corner, [s].
 
     A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
     shape (N - 1, n, 6), ascending powers of the time since the cycle began.
@@ -42,7 +42,7 @@ def plan_chain(chain: SegmentSpline, limits: Limits, tell: Callable[[float], Non
     Args:
         chain: The chain.
         limits: Of the arm.
-        tell: Called before every round with about the part of the work that is done; what it raises ends the planning.
+        report: Called before every round with the approximate progress; an exception that it raises ends the planning.
 
     Raises:
         PlanningError: A joint limit or a singularity is in the way.
@@ -57,7 +57,7 @@ def plan_chain(chain: SegmentSpline, limits: Limits, tell: Callable[[float], Non
     squares = np.zeros(len(chain.knots))
     worst = 0.0
     for round_ in range(2 * _ROUNDS):
-        tell(round_ / (round_ + _USUAL_ROUNDS))
+        report(round_ / (round_ + _USUAL_ROUNDS))
         before, squares = squares, fastest.slowed(slowdown)
         law = smooth_law(chain.knots, squares, cycles)
         interval = chain.interval(law.s)
@@ -163,8 +163,8 @@ def _tool_excess(
 ) -> Array:
     """Returns how much slower each of some rows must be to keep the bounds on tool and arm angle.
 
-    By backward differences at 1 ms, as the controller judges them, with rest before and after: the last row answers for
-    the three that follow it.
+    By backward differences at 1 ms, as the controller checks them, with standstill before and after: the last row
+    includes the three that follow it.
     """
     n, last = chain.n, len(law.s) - 1
     end = rows.stop + 3 if rows.stop > last else rows.stop

@@ -10,7 +10,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 LONGEST = 7200.0
-"""How long a motion through samples may last, [s]. Its rows then take 400 MB, as of one that is planned."""
+"""Longest motion through samples, [s]. Its rows take 400 MB, as those of the longest planned motion."""
 
 
 def spline_through(times: ArrayLike, q: ArrayLike) -> tuple[PiecewisePolynomial | None, JointPath]:

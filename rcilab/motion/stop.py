@@ -1,4 +1,4 @@
-"""The fastest way to stand still, from any state: the one stop of controller and client."""
+"""The fastest stop from any state, for controller and client."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rcilab.motion.motion import Motion, standing
 
 
 def plan_stop(limits: JointLimits, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Motion:
-    """Returns the motion on which every joint for itself stops as fast as its limits allow.
+    """Returns the motion on which every joint stops independently, as fast as its limits allow.
 
-    It answers from any finite state, also from one outside the limits: an acceleration that is too high is first led
-    back inside, a velocity that is too high falls at once. Where the joints stop is the result, not a choice:
-    a joint that runs towards its position limit at full speed passes it (`motion.goal` tells). About 0.13 ms;
-    `motion.q`, the rows to play one a cycle, takes another 0.04 ms once.
+    It works from any finite state, also outside the limits: a too high acceleration is first reduced to the limit, a
+    too high velocity decreases at once. The stop position follows from the state: a joint that moves towards its
+    position limit at full speed exceeds it (see `motion.goal`). Takes about 0.13 ms; the first access to `motion.q`,
+    the rows to send, takes another 0.04 ms.
 
     Args:
         limits: Bounds of the joints.
@@ -28,11 +28,11 @@ def plan_stop(limits: JointLimits, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) 
         ddq: Their accelerations, shape (n,), [rad/s^2], likewise.
 
     Raises:
-        InvalidValueError: The state is not n finite numbers each, or the limits are none, such as a model.
-        PlanningError: The state is absurd (velocities far beyond any robot's).
+        InvalidValueError: The state is not n finite numbers each, or `limits` is something else, such as a model.
+        PlanningError: The velocities are far beyond any robot's.
     """
     if not isinstance(limits, JointLimits):
-        raise InvalidValueError("limits", described(limits), "are no JointLimits; pass model.limits.joint")
+        raise InvalidValueError("limits", described(limits), "must be JointLimits; pass model.limits.joint")
     n = len(limits.velocity)
     q, dq, ddq = as_vector(q, n, "q", "rad"), as_vector(dq, n, "dq", "rad/s"), as_vector(ddq, n, "ddq", "rad/s^2")
     if not dq.any() and not ddq.any():

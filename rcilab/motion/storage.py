@@ -1,4 +1,4 @@
-"""Files of motions: a versioned .npz of arrays that comes back to the last bit, and rows as CSV."""
+"""Files of motions: a versioned .npz with an exact round trip, and rows as CSV."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SIGNATURES = (b"PK", b"\x93NUMPY")
 
 
 def write_arrays(stream: IO[bytes], content: Mapping[str, ArrayLike]) -> None:
-    """Writes what a motion is made of, by name, as .npz."""
+    """Writes the arrays of a motion, by name, as .npz."""
     np.savez(stream, kind=np.array(KIND), version=np.array(VERSION), **dict(content))  # type: ignore[arg-type]
 
 
@@ -83,7 +83,7 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
     """Returns what `build` makes of the content of an .npz; its keyword arguments are those of `Motion`.
 
     Raises:
-        InvalidValueError: There is no such file, it holds no sound motion, or too long a one.
+        InvalidValueError: There is no such file, or its motion is not valid or too long.
         VersionMismatchError: It was written by another version of this format.
     """
     require_max_rows(max_rows)
@@ -106,7 +106,7 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
             goal=content["goal"],
             law=str(content["law"]),
             speed=as_number(content["speed"], "speed"),
-            # Files from before there were programs have neither.
+            # Files of versions without programs have neither.
             segment_starts=content.get("segment_starts", np.zeros(1)),
             notes=tuple(content["notes"].tolist()) if "notes" in content else (),
         )
@@ -148,4 +148,4 @@ def _require_shapes(shapes: Shapes, name: str) -> None:
 
 def _require_stream(file: object, method: str) -> None:
     if not hasattr(file, method):
-        raise InvalidValueError("motion file", file, "is no file name, and no open binary file")
+        raise InvalidValueError("motion file", file, "must be a file name or an open binary file")

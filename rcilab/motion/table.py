@@ -1,4 +1,4 @@
-"""Tables in text, with the line of everything that is wrong; a line is in memory once, as numbers."""
+"""Tables in text files, with errors that name the line; only the numbers are kept in memory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LONGEST_LINE = 65_536  # Characters. Tuning value: a line of ours has some hund
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Cells in rows and columns, and where they stood."""
+    """Cells in rows and columns, and their lines."""
 
     name: str
     """What to call it in an error."""

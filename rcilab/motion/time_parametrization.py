@@ -1,7 +1,7 @@
-"""Time-optimal laws along a path: first with bounds on velocity and acceleration, then with a bounded jerk.
+"""Time-optimal time laws along a path: first with bounds on velocity and acceleration, then with a bounded jerk.
 
-The way is a parameter s of the path, from 0 on, on knots at any distance. What is bounded are rows of quantities that
-depend on s alone: joint angles, the tool's way and turn, the arm angle. With x = s'^2 each row is linear in (x, s''):
+The path has a parameter s, from 0 on, with knots at any distance. The bounded rows are quantities that depend on s
+alone: joint angles, position and rotation of the tool, the arm angle. With x = s'^2 each row is linear in (x, s''):
 |first s'' + second x| <= acceleration, and first^2 x <= velocity^2.
 
 `fastest_squares` is the reachability analysis of Pham and Pham (TOPP-RA, IEEE T-RO 34(3), 2018): backward the largest
@@ -24,7 +24,7 @@ from rcilab.motion.path_bounds import LEAST, PathBounds
 _UNBOUND = 1e30
 """What is more than any x."""
 _CHORDS = 8
-"""Chords in place of the bound on the next x as a function of x. A choice: they lose less than 0.1 % of the time."""
+"""Chords that approximate the bound on the next x as a function of x; they lose less than 0.1 % of the time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class TimeParametrization:
 
 
 def fastest_squares(bounds: PathBounds) -> Array:
-    """Returns the largest squares of s' from rest to rest, at the knots, shape (K + 1,), [1/s^2].
+    """Returns the largest squares of s' between standstills, at the knots, shape (K + 1,), [1/s^2].
 
     Args:
         bounds: What the path allows.
@@ -48,7 +48,7 @@ def fastest_squares(bounds: PathBounds) -> Array:
 
 
 class FastestLaw:
-    """The fastest law along a path. Slowed down in places, it is computed anew only as far as that is felt.
+    """The fastest law along a path. After a local slowdown only the affected part is computed again.
 
     Args:
         bounds: What the path allows.
@@ -153,7 +153,7 @@ def duration_of(knots: Array, squares: Array) -> float:
 def smooth_law(knots: Array, squares: Array, cycles: int) -> TimeParametrization:
     """Returns the law on the grid of cycles whose acceleration is the mean of the given one's over some cycles.
 
-    It begins and ends at rest and without acceleration, takes `cycles` longer and less than a cycle more, and its jerk
+    It begins and ends at standstill without acceleration, takes `cycles` longer and less than a cycle more; its jerk
     is at most the largest jump of the given acceleration, divided by that time.
 
     Args:

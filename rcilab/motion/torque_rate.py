@@ -15,8 +15,8 @@ from rcilab.motion.piecewise import PiecewisePolynomial
 
 _ATTEMPTS = 6
 _SHARE = 0.95
-"""Part of the recommended bound to plan for. A tuning value: the controller differentiates torques over whole cycles,
-and between the moments looked at here they may change a little faster."""
+"""Part of the recommended bound to plan for: the controller differentiates torques over whole cycles, and between the
+instants checked here they may change a little faster."""
 _MOMENTS = 5
 """At how many moments of each polynomial piece to look, both ends among them."""
 _EVENTFUL = 0.03

@@ -1,4 +1,4 @@
-"""Waypoints: one step of a program each, where to and how, as values of plain numbers."""
+"""Waypoints: the steps of a program as values of plain numbers."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from rcilab.robots.description import RobotDescription
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 
 FARTHEST = 10.0
-"""Beyond this a coordinate is no place that an arm reaches, [m]; a choice: whoever writes more, writes millimetres."""
+"""Largest coordinate, [m]: far beyond the reach of an arm, so that a larger one must be in millimetres."""
 LARGEST_BLEND = 1.0
-"""Largest blend radius, [m]; tuning value: an arm's reach."""
+"""Largest blend radius, [m]: about the reach of an arm."""
 LONGEST_DWELL = 3600.0
-"""Longest stay at a waypoint, [s]; tuning value."""
+"""Longest dwell at a waypoint, [s]."""
 _UNIT = 1e-3
 """How far the length of a quaternion may be from 1; it is normalised."""
 
 ALWAYS = ("speed", "blend", "dwell")
-"""What every waypoint may have."""
+"""Fields of every waypoint."""
 ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "joint": ("q", "position", "wxyz", "psi"),
     "line": ("q", "position", "wxyz", "psi"),
@@ -38,7 +38,7 @@ ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "circle": ("center", "axis", "angle", "orientation", "psi"),
     "nullspace": ("psi", "way"),
 }
-"""What else a waypoint of each type may have."""
+"""Further fields of a waypoint by type."""
 NEEDED: dict[WaypointType, tuple[str, ...]] = {
     "joint": (),
     "line": (),
@@ -46,25 +46,25 @@ NEEDED: dict[WaypointType, tuple[str, ...]] = {
     "circle": ("center", "axis"),
     "nullspace": ("psi",),
 }
-"""What it must have, besides a target: a joint move, a line and an arc go to q, or to position and wxyz."""
+"""Required fields besides a target: a joint move, a line and an arc need q, or position and wxyz."""
 
 WORDS: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(Way)}
-"""The words that some of them are one of; the first is meant where none is given."""
+"""Values of the fields that are words; the first is the default."""
 
 Floats: TypeAlias = tuple[float, ...]
 
 MOST_WAYPOINTS = 10_000
-"""Tuning value: a motion through them has a gigabyte."""
+"""Largest number of waypoints: a motion through them has a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waypoint:
-    """One step of a program: where to, and how. Plain numbers, so that equal waypoints are equal and files exact.
+    """One step of a program, in plain numbers, so that waypoints can be compared and files are exact.
 
-    `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` make them of poses and arrays.
+    `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` build one from poses and arrays.
 
     Raises:
-        InvalidValueError: A number is missing, out of range or of no meaning for this type.
+        InvalidValueError: A number is missing, out of range or not used by this type.
     """
 
     type: WaypointType
@@ -87,18 +87,17 @@ class Waypoint:
     angle: float | None = None
     """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
     orientation: CircleOrientation | None = None
-    """Of the tool on a circle: "held", or "turning" with the circle, about its axis. Every circle has one: "held" where
-    none is given."""
+    """Orientation of the tool on a circle: "held" (default), or "turning" with the circle, about its axis."""
     psi: float | None = None
     """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
     way: Way | None = None
-    """Which way round a nullspace move goes, "shorter" or "longer"; the longer one to the arm angle of the start is a
-    full turn. Every one has it: "shorter" where none is given."""
+    """Direction of a nullspace move, "shorter" (default) or "longer"; the longer one to the arm angle of the start is a
+    full turn."""
     speed: float = 0.2
     """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
     blend: float = 0.0
-    """How far from this waypoint the tool may leave its way to round the corner, up to 1, [m]. 0 is a stop. So are the
-    last waypoint, one with a dwell, and one at which nothing moves."""
+    """Radius within which the tool may leave its path to round the corner, up to 1, [m]. 0 is a stop. The tool also
+    stops at the last waypoint, at one with a dwell, and at one without a motion."""
     dwell: float = 0.0
     """How long to stay here, up to 3600, [s]; in whole cycles."""
 
@@ -142,9 +141,9 @@ class Waypoint:
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
         dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns a move straight in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
+        """Returns a straight move in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
 
-        A pose is reached on the branch closest to where the arm comes from.
+        A pose is reached on the branch closest to the previous joint angles.
         """
         return cls(type="joint", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
@@ -153,7 +152,7 @@ class Waypoint:
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
         dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns a straight line of the tool to a pose, or to where it is at joint angles, shape (n,), [rad]."""
+        """Returns a straight line of the tool to a pose, or to that of joint angles, shape (n,), [rad]."""
         return cls(type="line", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
@@ -192,24 +191,22 @@ class Waypoint:
 
     @property
     def pose(self) -> Pose | None:
-        """The target as a pose, if that is how it was given."""
+        """The target as a pose, if it was given as one."""
         return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
 
     def retyped(self, type: WaypointType, via: ArrayLike | None = None) -> Waypoint:
-        """Returns the waypoint with another way to the same target: joint, line or arc.
+        """Returns the waypoint with another path type to the same target: joint, line or arc.
 
         Args:
             type: The other type.
             via: A point on the arc, shape (3,), [m]; only an arc has one.
 
         Raises:
-            InvalidValueError: One of the two types leads to no target of its own, or the via does not fit the type.
+            InvalidValueError: One of the two types has no target, or the via does not fit the type.
         """
         for kind in (self.type, type):
             if "q" not in ALLOWED.get(kind, ()):
-                error = InvalidValueError(
-                    "type", described(kind), "has no target to keep; joint, line and arc have one"
-                )
+                error = InvalidValueError("type", described(kind), "has no target; joint, line and arc have one")
                 raise error.coded("no_target")
         point = None if via is None else vector_of("via", via)
         return replace(self, type=type, via=point, via_wxyz=None)
@@ -223,7 +220,7 @@ class Waypoint:
             raise missing.coded("missing", type=self.type, names="q / position, wxyz")
         if self.q is not None:
             if has_pose:
-                second = InvalidValueError("q", self.q, "is a second target, beside position and wxyz; keep one")
+                second = InvalidValueError("q", self.q, "is a second target besides position and wxyz; keep one")
                 raise second.coded("second_target")
             if self.psi is not None:
                 second = InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
@@ -231,7 +228,7 @@ class Waypoint:
             object.__setattr__(self, "q", angles_of(self.q, "q"))
         for name, other in (("position", "wxyz"), ("wxyz", "position")):
             if has_pose and getattr(self, name) is None:
-                missing = InvalidValueError(name, None, f"is missing beside {other}: a pose has both")
+                missing = InvalidValueError(name, None, f"is missing: a pose has {other} and {name}")
                 raise missing.coded("missing_beside", other=other)
 
 
@@ -246,12 +243,12 @@ _RANGES = (
 
 
 def label(number: int, waypoint: Waypoint) -> str:
-    """Returns what errors call a waypoint, counted from 1."""
+    """Returns the name of a waypoint in errors, counted from 1."""
     return f"waypoint {number} ({waypoint.type})"
 
 
 def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValueError:
-    """Returns the error of a value with the name of its waypoint in front."""
+    """Returns the error of a value with the name of its waypoint."""
     named = InvalidValueError(f"waypoint {number} ({kind}), {error.name}", error.value, error.requirement)
     if not error.code:
         return named
@@ -259,7 +256,7 @@ def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValu
 
 
 def require_count(count: int) -> None:
-    """Refuses a program of no waypoint, or of too many.
+    """Refuses a program without waypoints, or with too many.
 
     Raises:
         InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.

@@ -12,7 +12,7 @@ from rcilab.app.run.mode_actions import ModeActions, SetDrive
 from rcilab.app.run.requested_speed import is_running
 from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
-from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, write
@@ -36,7 +36,7 @@ class SpeedFields:
         self._writing = False
         self.pause = self._button("run.pause", partial(self._ask, modes.pause), icon="pause", style="warning")
         self.resume = self._button("run.resume", partial(self._ask, modes.resume), icon="play", style="info")
-        percent, slowest = 100.0 * state.now.drive.pace, 100.0 * SLOWEST_PACE
+        percent, slowest = 100.0 * state.now.drive.pace, 100.0 * MIN_SPEED_OVERRIDE
         self.slider: Any = lean(
             ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
             readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},

@@ -1,8 +1,8 @@
-"""Two that take turns on one core: to wake somebody on another one costs more than a turn.
+"""Pinning two alternating threads to one core: waking a thread on another core takes longer than its work.
 
-In lock-step the controller waits while the client computes, and the client while the controller does. Left alone, the
-system still wakes each of them on the core that is idle. On the virtual machine this was written on, with nothing else
-to do, a simulated millisecond took 0.9 ms and 0.7 ms of processor time; on one core 0.5 ms and 0.45 ms.
+In lock-step the controller waits while the client computes, and the reverse. By default the system wakes each of them
+on an idle core. Measured on an idle virtual machine: a simulated millisecond took 0.9 ms, and 0.7 ms of processor
+time; on one core 0.5 ms and 0.45 ms.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-_CORE = 36  # Which of the numbers behind the name in `stat` is the core last run on: number 39 of proc(5), from state.
+_CORE = 36  # Index of the last used core in `stat`, counted from the field after the name: field 39 of proc(5).
 
 
 @contextmanager
 def one_core(partner: int | None) -> Iterator[None]:
-    """Keeps this thread and another one on the core that this thread is on, for as long as the body runs.
+    """Keeps this thread and another one on this thread's core while the body runs.
 
-    What the body starts, threads or processes, stays there too. Where the system does not permit it, or the other one
-    has ended, nothing happens.
+    Threads and processes that the body starts run there too. It has no effect if the system does not permit it or the
+    other thread has ended.
 
     Args:
         partner: Id of the other thread, or of a process for its main thread; None changes nothing.
@@ -32,10 +32,10 @@ def one_core(partner: int | None) -> Iterator[None]:
                 for thread in (partner, 0):
                     before = os.sched_getaffinity(thread)
                     os.sched_setaffinity(thread, {core})
-                    afterwards.callback(_let_go, thread, before)
+                    afterwards.callback(_restore, thread, before)
         yield
 
 
-def _let_go(thread: int, cores: set[int]) -> None:
-    with suppress(OSError):  # It may have ended meanwhile.
+def _restore(thread: int, cores: set[int]) -> None:
+    with suppress(OSError):  # The thread may have ended.
         os.sched_setaffinity(thread, cores)

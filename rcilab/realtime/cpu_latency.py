@@ -1,8 +1,8 @@
-"""Keeping the cores awake between two cycles: a core that sleeps for less than a millisecond wakes up late and slow.
+"""Disabling deep idle states between two cycles: a core that leaves one starts late and at a low clock rate.
 
-Linux lets nobody's core sleep deeper than a process allows that holds `/dev/cpu_dma_latency` open with a bound (PM QoS,
-as cyclictest does it). On the virtual machine this was written on, an empty 1 kHz loop was late by more than 1 ms 231
-times in 10 s without it and 6 times with it. It costs electricity: hold it only while something moves.
+While a process holds `/dev/cpu_dma_latency` open, Linux limits the wake-up latency of all cores to the value written
+to it (PM QoS, as in cyclictest). Measured on a virtual machine: an empty 1 kHz loop was more than 1 ms late 231 times
+in 10 s without it and 6 times with it. It costs power: hold it only while the arm moves.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ _NO_LATENCY = struct.pack("i", 0)  # [us]
 
 
 class CpuLatencyLock:
-    """A hold on every core of this machine, on or off. Where the system does not permit it, nothing happens.
+    """A switch that disables deep idle states of all cores. It has no effect if the system does not permit it.
 
     Attributes:
-        is_permitted: Whether the system let us the last time; None before the first time.
+        is_permitted: Whether the last request was permitted; None before the first request.
     """
 
     def __init__(self) -> None:
@@ -28,7 +28,7 @@ class CpuLatencyLock:
         self._file: int | None = None
 
     def switch(self, on: bool) -> None:
-        """Takes hold or lets go; costs nothing when nothing changes. After a refusal it does not ask again."""
+        """Switches it; does nothing without a change, or after a refusal."""
         if on == (self._file is not None):
             return
         if self._file is not None:
@@ -41,7 +41,7 @@ class CpuLatencyLock:
 
 @contextmanager
 def awake_cores() -> Iterator[bool]:
-    """Keeps every core awake for as long as the body runs; gives whether the system permits it."""
+    """Disables deep idle states while the body runs; yields whether the system permits it."""
     cores = CpuLatencyLock()
     cores.switch(True)
     try:

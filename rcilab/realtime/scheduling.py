@@ -1,20 +1,30 @@
-"""Asking the operating system for real time: first in the queue, never swapped out, never collecting garbage.
+"""Real-time conditions from the operating system: SCHED_FIFO, locked memory, no garbage collection, awake cores.
 
-Everything here is a wish. Where the system refuses, the process runs on as an ordinary one, and `Scheduling.warning`
-says in one line what is missing and how to grant it.
+All of them are optional. If the system refuses one, the process runs without it, and `Scheduling.warning` says in one
+line what is missing and how to grant it.
 """
 
 from __future__ import annotations
 
 import ctypes
 import gc
+import logging
 import os
 import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from rcilab.realtime.cpu_latency import awake_cores
+
+PRIORITY = 60  # SCHED_FIFO, of 1 to 99: below the kernel's own threads' usual 90s, above ordinary drivers' 50.
+
 _LOCK_CURRENT, _LOCK_FUTURE, _LOCK_ON_FAULT = 1, 2, 4  # Linux, mlockall(2).
 _CAP_IPC_LOCK = 14  # Linux, capabilities(7).
+
+_log = logging.getLogger("rcilab.execution")
+_warned = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,16 +36,16 @@ class Scheduling:
     priority: int
     """Priority under SCHED_FIFO, 1 to 99; 0 when normal."""
     memory_locked: bool
-    """Whether no page of this process can be swapped out."""
+    """Whether the memory of this process cannot be swapped out."""
     warning: str | None
-    """One line about what was refused and how to grant it; None when all is well."""
+    """One line: what was refused and how to grant it; None if everything was granted."""
 
 
 def enter_realtime(priority: int) -> Scheduling:
-    """Asks for SCHED_FIFO, locked memory and a still garbage collector for this process; returns what was granted.
+    """Requests SCHED_FIFO, locked memory and a disabled garbage collector for this process; returns what was granted.
 
-    The garbage that exists is collected first; what is left is taken for permanent. Reference counting goes on, so a
-    loop that makes no reference cycles does not grow. Child processes start out as ordinary ones.
+    Existing garbage is collected first, the remaining objects are frozen. Reference counting continues, so a loop that
+    creates no reference cycles does not grow. Child processes start with ordinary scheduling.
 
     Args:
         priority: Priority under SCHED_FIFO, 1 to 99.
@@ -60,6 +70,28 @@ def leave_realtime() -> None:
     ctypes.CDLL(None).munlockall()
     gc.unfreeze()
     gc.enable()
+
+
+@contextmanager
+def realtime_section(enabled: bool = True) -> Iterator[None]:
+    """Runs the body with all real-time conditions that the system grants; a missing one is logged once per process.
+
+    Args:
+        enabled: False has no effect: a loop in lock-step has no deadlines.
+    """
+    global _warned
+    if not enabled:
+        yield
+        return
+    scheduling = enter_realtime(PRIORITY)
+    if scheduling.warning and not _warned:
+        _warned = True
+        _log.warning("%s", scheduling.warning)
+    try:
+        with awake_cores():
+            yield
+    finally:
+        leave_realtime()
 
 
 def _enter_fifo(priority: int) -> bool:

@@ -1,7 +1,8 @@
-"""What an arm is, as data. The data files of the arms are with their makers: `rcilab/makers/*/robots`.
+"""Descriptions of arms as data. The data files are in the makers' folders, `rcilab/makers/*/robots`.
 
-This package finds them by folder and imports one when its arm is asked for. So code below `rcilab.makers` can load an
-arm by name without importing a maker. A maker lists its arms in `ROBOTS` of its folder `robots`: name to module.
+This package finds them by folder and imports one when its arm is requested, so that the layers below `rcilab.makers`
+can load an arm by name without importing a maker. A maker lists its arms in `ROBOTS` of its folder `robots`: name to
+module.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ def _find_robots() -> dict[str, Mapping[str, str]]:
 
 
 ROBOTS_BY_MAKER: Mapping[str, Mapping[str, str]] = MappingProxyType(_find_robots())
-"""The arms of every maker: by the maker's folder, the module of the data file by the name of the arm."""
+"""Arms by maker: the maker's folder, then the arm's name, to the module of its data file."""
 ROBOT_NAMES = tuple(name for robots in ROBOTS_BY_MAKER.values() for name in robots)
-"""Every arm that can be computed with."""
+"""Names of all arms."""
 
 
 def describe_robot(name: str) -> RobotDescription:

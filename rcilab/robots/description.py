@@ -1,4 +1,4 @@
-"""What an arm is, as data: geometry, limits and inertias, each with the place the number came from."""
+"""The description of an arm: geometry, limits and inertias, each with its source."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class CraigRow:
 def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
     """Returns the standard rows of the chain that a Craig table describes.
 
-    Both are the same product with the brackets set elsewhere: turn and shift about z of one row go together with shift
-    and turn about x of the next. So the pose of the flange is the same at all joint angles; the frames between are
-    those of the standard convention, which lie on the next joint's axis, not on their own.
+    Both are the same product, grouped differently: rotation and translation along z of one row go with translation and
+    rotation along x of the next. The pose of the flange is the same at all joint angles; the frames between follow the
+    standard convention: they lie on the next joint's axis, not on their own.
 
     Args:
-        table: One row a joint and one for the flange; the first joint turns about the base z axis.
+        table: One row per joint and one for the flange; the first joint turns about the base z axis.
 
     Raises:
-        ValueError: The first row has a shift or turn about x, or the flange one.
+        ValueError: The first or the flange row has a translation or rotation that the standard table cannot express.
     """
     first, *_, flange = table
     if first.a or first.alpha or flange.a or flange.alpha:
@@ -61,7 +61,7 @@ def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rod:
-    """A round rod with ball ends, in the link's frame: what a link without a drawing looks like, and its capsule."""
+    """A round rod with ball ends, in the link's frame: shape and collision capsule of a link without a drawing."""
 
     start: tuple[float, float, float]
     """[m]."""
@@ -88,7 +88,7 @@ class Link:
     origin_height: float
     """Height of the link frame's origin above the base when all joint angles are zero, [m]."""
     source: str
-    """Where mass, centre and tensor were taken from."""
+    """Source of mass, centre and tensor."""
     origin_ahead: float = 0.0
     """How far in front of the base z axis, along base x, that origin is then, [m]."""
 
@@ -104,34 +104,34 @@ class Link:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotDescription:
-    """An arm: everything the rest of the package computes from."""
+    """An arm: the data that all computations use."""
 
     name: str
     """Name as the maker spells it."""
     dh: tuple[DhRow, ...]
-    """One row a joint, base to flange."""
+    """One row per joint, base to flange."""
     dh_source: str
-    """Where the table was taken from, and what was added to it."""
+    """Source of the table, and what was added to it."""
     base: Link
     """The body that does not move."""
     links: tuple[Link, ...]
-    """The moving bodies, one a joint, base to flange."""
+    """The moving bodies, one per joint, base to flange."""
     limits: Limits
     home: JointVector
-    """A comfortable pose away from limits and singularities, shape (n,), [rad]."""
+    """Joint angles away from limits and singularities, shape (n,), [rad]."""
     rated_payload: float
     """Largest load, [kg]."""
     rated_payload_source: str
     maker: str = ""
-    """Name of its maker: the folder in `rcilab/makers`; empty for an arm that no maker's interface drives."""
+    """Name of its maker: the folder in `rcilab/makers`; empty for an arm without a driver."""
     faults: type[FaultCode] = FaultCode
     """The faults of the maker's controller."""
     conditions: Callable[[], ConditionTable] | None = None
-    """Returns the conditions of the maker's interface; None checks the common ones, which raise no fault."""
+    """Returns the conditions of the maker's interface; None: the common ones, which raise no fault."""
     elbow_flip: float | None = None
-    """Angle of joint 4 on whose other side the elbow counts as flipped, [rad]; None where the maker defines no flip."""
+    """Angle of joint 4 beyond which the elbow counts as flipped, [rad]; None if the maker defines no flip."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
-    """What base and links are drawn and collide as, base first; None for arms with designed housings."""
+    """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
 
     @property
     def n(self) -> int:

@@ -1,4 +1,4 @@
-"""Robot descriptions on disk: the description file and, below it, the meshes it names."""
+"""Robot descriptions on disk: the description file and the meshes it refers to."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def revolve(
     Args:
         profile: Points (radius, height along the axis), [m], from low to high along the outside of the body.
         axis: The axis of revolution.
-        center: Where on space the profile's origin is put, [m].
+        center: Position of the profile's origin, [m].
         segments: Number of facets around.
         crease: A bend of the profile above this angle is a sharp edge, [deg].
     """

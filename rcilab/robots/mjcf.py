@@ -1,7 +1,7 @@
 """An arm as MJCF, MuJoCo's own format: capsules, inertias, joint ranges, torque motors and a site at the flange.
 
-Figures that no table gives are choices, named here: rotor inertia and friction of the drives. They are typical of
-strain-wave geared joints of this size and keep a simulated arm from ringing; they are not measured on an xMate.
+Rotor inertia and friction of the drives are not in any table. The values here are typical of strain-wave geared joints
+of this size and keep a simulated arm from ringing; they are not measured on an xMate.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def build_mjcf(
         meshes: Whether the housings are drawn (visual geometry, group 2); the files are those of `build_meshes`.
         mesh_dir: Where they lie, relative to the MJCF file; default `meshes/NAME`.
         T_flange_tool: Pose of the tool in the flange.
-        load: What is fixed to the flange, as a body of its own; nothing when None or massless.
+        load: A body fixed to the flange; None or a massless one adds no body.
     """
     directory = f"meshes/{description.name}" if mesh_dir is None else mesh_dir.rstrip("/")
     shape = build_shapes(description, "coarse")
@@ -91,14 +91,14 @@ def build_mjcf(
         lines += _joint_body(description, number) + _body(f"link{number}", link, solid, meshes, number + 3)
     pad = "  " * (description.n + 3)
     T_link_flange = upright_flange(description)
-    place = _place(T_link_flange)
-    lines.append(f'{pad}<site name="flange"{place}/>')
+    orientation = _orientation(T_link_flange)
+    lines.append(f'{pad}<site name="flange"{orientation}/>')
     T_link_tool = T_link_flange @ T_flange_tool
     pose = f'pos="{vector_text(T_link_tool.position)}" quat="{vector_text(T_link_tool.wxyz)}"'
     lines.append(f'{pad}<site name="tool" {pose}/>')
     if load is not None and load.mass > 0.0:
         lines += [
-            f'{pad}<body name="load"{place}>',
+            f'{pad}<body name="load"{orientation}>',
             f"{pad}  {_inertial(load.mass, load.center_of_mass, load.inertia)}",
         ]
         lines.append(f"{pad}</body>")
@@ -106,8 +106,8 @@ def build_mjcf(
     return "\n".join([*lines, "  </worldbody>", *_contacts(description), *_motors(description), "</mujoco>", ""])
 
 
-def _place(T: Pose) -> str:
-    """Returns the attribute that turns an element into place; nothing where it need not be turned."""
+def _orientation(T: Pose) -> str:
+    """Returns the attribute with the orientation of an element; empty without a rotation."""
     return "" if T.is_close(IDENTITY, 0.0) else f' quat="{vector_text(T.wxyz)}"'
 
 
@@ -139,7 +139,7 @@ def _joint_body(description: RobotDescription, number: int) -> list[str]:
 
 
 def _body(name: str, link: Link, shape: LinkShape, meshes: bool, depth: int) -> list[str]:
-    """Returns what belongs to a body itself: inertia, capsules, meshes."""
+    """Returns the elements of a body: inertia, capsules, meshes."""
     pad = "  " * depth
     lines = [pad + _inertial(link.mass, link.center_of_mass, link.inertia)]
     lines += [pad + _capsule(capsule) for capsule in shape.capsules]
@@ -152,7 +152,7 @@ def _body(name: str, link: Link, shape: LinkShape, meshes: bool, depth: int) -> 
 def _inertial(mass: float, center: Vector3, tensor: Matrix) -> str:
     order = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # MuJoCo's fullinertia: xx yy zz xy xz yz
     values = [float(tensor[i, j]) for i, j in order]
-    if not np.any(tensor):  # A point mass has no tensor; MuJoCo asks for some, and a gram's worth moves nothing.
+    if not np.any(tensor):  # MuJoCo requires a tensor also for a point mass; this one is negligible.
         values = [1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0]
     return f'<inertial pos="{vector_text(center)}" mass="{number_text(mass)}" fullinertia="{vector_text(values)}"/>'
 

@@ -1,4 +1,4 @@
-"""The bodies of links that are given as rods: smooth castings around them, a foot plate and a flange."""
+"""The bodies of links that are described as rods: smooth castings around them, a foot plate and a flange."""
 
 from __future__ import annotations
 

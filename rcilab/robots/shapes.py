@@ -1,10 +1,10 @@
-"""What the arms look like: housings, caps and flange as meshes, and capsules for collisions, all from a few numbers.
+"""Shapes of the arms from a few dimensions: housings, caps and flange as meshes, and capsules for collisions.
 
 Drawn after the arm itself. Every y joint is shared by two housings that lie side by side along its axis, the lower one
 at negative y, the upper one at positive y (the centres of mass in the vendor's description alternate the same way);
 each closes with a domed grey cap. Between two y joints a housing returns to the middle, where the z joints cut it.
-A housing is one smooth body of rods and cylinders melted into each other; crisp parts (collars, caps, foot, flange)
-are bodies of revolution set onto it.
+A housing is one smooth union of rods and cylinders; parts with sharp edges (collars, caps, foot, flange) are bodies of
+revolution added to it.
 
 Everything is designed standing upright in the base frame and then moved to the link frames of `upright.py`.
 """
@@ -32,7 +32,7 @@ ROLE_COLORS: dict[ColorRole, tuple[int, int, int]] = {
     "cap": (166, 172, 178),
     "dark": (70, 75, 82),
 }
-"""What the roles look like on a live arm, RGB 0-255."""
+"""Colours of the roles on a live arm, RGB 0-255."""
 
 _GAP = 0.0012  # [m] half the gap between two housings
 _COLLAR = 0.014  # [m] width of the machined ring on each side of a gap
@@ -63,7 +63,7 @@ class Capsule:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkShape:
-    """What a link looks like and where it is solid."""
+    """Meshes and collision capsules of a link."""
 
     parts: tuple[Part, ...]
     capsules: tuple[Capsule, ...]
@@ -112,7 +112,7 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
     """Returns the shapes of an arm.
 
     Args:
-        description: The arm: one that is given as rods, or one of the xMate family's build, with axes z y z y z y z or
+        description: The arm: one described as rods, or one of the xMate family's build, with axes z y z y z y z or
             z y y z y z.
         quality: "fine" for the screen, "coarse" for files and for ghosts.
     """
@@ -131,7 +131,7 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
 
 
 def _rod_arm(description: RobotDescription, rods: tuple[tuple[Rod, ...], ...], fine: _Fineness) -> ArmShape:
-    """Returns the shapes of an arm that is given as rods."""
+    """Returns the shapes of an arm that is described as rods."""
     base, *links = (
         LinkShape(
             (Part(cast(of_link, _ROD_CELL * fine.cell), "shell"),),
@@ -148,7 +148,7 @@ def _rod_arm(description: RobotDescription, rods: tuple[tuple[Rod, ...], ...], f
 
 
 def _in_frame(shape: LinkShape, height: float) -> LinkShape:
-    """Moves a link from where it stands in the base frame into its own frame."""
+    """Transforms a link from the base frame into its own frame."""
     down = np.array([0.0, 0.0, -height])
     return LinkShape(
         tuple(Part(part.mesh.moved(down), part.role) for part in shape.parts),

@@ -1,4 +1,4 @@
-"""Smooth bodies from signed distances: primitives that melt into each other, and the mesh of their surface.
+"""Smooth bodies from signed distances: primitives, smooth unions of them, and the mesh of their surface.
 
 A body is a function from points, shape (N, 3), [m], to signed distances, shape (N,), [m]: negative inside. Minimum
 joins bodies, maximum cuts them; the smooth versions round the seam, so that a housing looks cast in one piece.

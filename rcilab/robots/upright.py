@@ -1,4 +1,4 @@
-"""The arm standing up: link frames that are parallel to the base at zero pose.
+"""Upright link frames, parallel to the base frame at zero pose.
 
 Denavit-Hartenberg frames are for computing. For drawing, URDF, MJCF and rigid-body dynamics each link gets the frame
 its mass data are given in: parallel to the base when all joint angles are zero, origin in the base's xz plane (that of

@@ -22,9 +22,9 @@ def build_urdf(description: RobotDescription, *, mesh_dir: str | None = None, T_
 
     Args:
         description: The arm.
-        mesh_dir: Where the meshes of `build_meshes` lie, relative to the URDF file or as a `package://` address;
+        mesh_dir: Folder of the meshes of `build_meshes`, relative to the URDF file or as a `package://` address;
             default `meshes/NAME`.
-        T_flange_tool: Pose of the tool in the flange; the link `tool` stands there.
+        T_flange_tool: Pose of the tool in the flange, for the link `tool`.
     """
     directory = f"meshes/{description.name}" if mesh_dir is None else mesh_dir.rstrip("/")
     shape = build_shapes(description, "coarse")

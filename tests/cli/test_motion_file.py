@@ -48,7 +48,7 @@ def test_check_refuses_another_arm_and_a_spoiled_file_in_one_line(file, capsys):
     assert main(["check", str(file)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "program.json, line 8, waypoint 1 (line), speed: 7.0 must be from 0.001 to 1" in said
+    assert "program.json, line 8, waypoint 1 (line), speed must be from 0.001 to 1" in said
 
 
 def test_a_motion_needs_the_name_of_an_arm(tmp_path, capsys):

@@ -77,4 +77,4 @@ def test_what_an_error_says_of_a_long_value_is_short(program):
 def test_a_program_of_too_many_waypoints_is_refused_by_their_number(program):
     program.write_text(json.dumps({**PROGRAM, "waypoints": 10_001 * [{}]}))
     ran = shell(f"check {program}")
-    assert "waypoints: 10001 must be 1 to 10000" in ran.stderr
+    assert "waypoints must be 1 to 10000, got 10001" in ran.stderr

@@ -126,7 +126,7 @@ def test_what_is_no_certificate_is_refused_in_words():
         verify_certificate("yes", MOTION, MODEL, START)
     with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
         CERTIFICATE.verify(MOTION, "xMatePro7", START)
-    with pytest.raises(InvalidValueError, match="motion: None is no motion"):
+    with pytest.raises(InvalidValueError, match=r"motion must be a motion.*, got None"):
         CERTIFICATE.verify(None, MODEL, START)
 
 

@@ -147,8 +147,8 @@ def test_rows_that_end_at_rest_to_within_a_cycle_are_not_blamed_for_their_grid()
 @pytest.mark.parametrize(
     ("motion", "model", "sentence"),
     [
-        (MODEL, MOTION, r"motion: RobotModel.* is no motion"),
-        (MODEL.home, MODEL, r"motion: .* is no motion"),
+        (MODEL, MOTION, r"motion must be a motion.*, got RobotModel"),
+        (MODEL.home, MODEL, "motion must be a motion"),
         (MOTION, "xMatePro7", r"use load_model\('xMatePro7'\)"),
     ],
     ids=["swapped", "angles", "name"],

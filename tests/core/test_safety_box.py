@@ -71,7 +71,7 @@ def test_a_size_that_is_none_is_refused(size):
 
 
 def test_a_pose_that_is_none_is_refused():
-    with pytest.raises(InvalidValueError, match="is no Pose"):
+    with pytest.raises(InvalidValueError, match="must be a Pose"):
         SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=np.eye(3))
 
 
@@ -86,5 +86,5 @@ def test_only_an_active_box_bounds_anything_and_what_is_no_box_is_refused_in_wor
         lambda: model.sample_workspace(5, box=3),
         lambda: require_box(None),
     ):
-        with pytest.raises(InvalidValueError, match="is no SafetyBox"):
+        with pytest.raises(InvalidValueError, match="must be a SafetyBox"):
             ask()

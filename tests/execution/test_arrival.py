@@ -71,7 +71,7 @@ def test_a_matrix_that_is_no_rotation_is_refused_before_it_is_sent():
         robot.power_on()
         T = robot.state.T_base_tool_c.matrix
         T[0, 0] *= 1.1
-        with pytest.raises(InvalidValueError, match="holds no rotation"):
+        with pytest.raises(InvalidValueError, match="is not a rotation"):
             robot.control(lambda state, t: CartesianPosition(T), "cartesian_position")
 
 

@@ -45,7 +45,7 @@ def test_an_unknown_arm_must_have_the_given_lengths_up_to_a_calibration():
 
 @pytest.mark.parametrize("timeout", [-1, 0, math.nan, math.inf, "a", None, True])
 def test_a_timeout_that_is_no_time_is_named(timeout):
-    with pytest.raises(InvalidValueError, match=r"timeout: .* above 0 \[s\]"):
+    with pytest.raises(InvalidValueError, match=r"timeout must be .*above 0 \[s\]"):
         connect("rci://127.0.0.2:9", timeout=timeout)
 
 

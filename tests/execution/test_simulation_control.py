@@ -216,7 +216,7 @@ def test_wrong_values_are_refused_here_and_impossible_ones_there(robot):
 
 
 def test_a_link_that_a_six_axis_arm_has_not_is_refused_by_name():
-    with simulate(load_model("xMate3")) as robot, pytest.raises(UsageError, match=r"link: 7 .*needs 1 to 6"):
+    with simulate(load_model("xMate3")) as robot, pytest.raises(UsageError, match=r"link needs .*1 to 6, got 7"):
         robot.world.push([1, 0, 0, 0, 0, 0], link=7)
 
 

@@ -178,7 +178,7 @@ def test_start_states_beyond_the_limits_are_refused():
 
 @pytest.mark.parametrize("speed", [0.0, -0.1, 1.0001, float("nan"), float("inf")])
 def test_a_speed_outside_its_range_is_refused(speed):
-    with pytest.raises(InvalidValueError, match=r"speed: .* must be from 0\.001 to 1"):
+    with pytest.raises(InvalidValueError, match=r"speed must be from 0\.001 to 1"):
         plan_joint(MODEL, np.zeros(7), MODEL.home, speed=speed)
 
 
@@ -215,14 +215,14 @@ def test_a_speed_is_bounded_from_below_and_plans_at_the_bound(law):
     model = load_model("xMatePro7")
     lower, upper = model.limits.joint.lower + 1e-6, model.limits.joint.upper - 1e-6
     assert plan_joint(model, lower, upper, speed=MIN_SPEED, law=law).duration > 3600.0
-    with pytest.raises(InvalidValueError, match=r"speed: 1e-09 must be from 0\.001 to 1"):
+    with pytest.raises(InvalidValueError, match=r"speed must be from 0\.001 to 1.*, got 1e-09"):
         plan_joint(model, lower, upper, speed=1e-9, law=law)
 
 
 @pytest.mark.parametrize("change", [{"speed": "fast"}, {"speed": None}, {"speed": np.ones(2)}, {"law": [1]}])
 def test_a_speed_or_law_of_the_wrong_type_is_refused_in_words(change):
     model = load_model("xMatePro7")
-    with pytest.raises(InvalidValueError, match=f"{next(iter(change))}: "):
+    with pytest.raises(InvalidValueError, match=rf"^{next(iter(change))}( must|: )"):
         plan_joint(model, model.home, model.home, **change)
 
 

@@ -53,7 +53,7 @@ def test_what_is_no_name_is_refused(file, name):
 def test_a_taken_name_and_an_unknown_one_are_told(file):
     book = NamedPoseStore(PRO7, file)
     book.store("here", PRO7.home)
-    with pytest.raises(InvalidValueError, match="is taken"):
+    with pytest.raises(InvalidValueError, match="is already used"):
         book.store("here", np.zeros(7))
     assert book.recall("here") == pytest.approx(PRO7.home)
     with pytest.raises(InvalidValueError, match="stored: here"):

@@ -353,7 +353,7 @@ def test_segments_and_notes_survive_saving_and_slowing_down(tmp_path):
     slower = motion.slowed(2.0)
     assert slower.segment_starts[1] == 2.0 * motion.segment_starts[1]
     assert set(plan_joint(SEVEN, SEVEN.home, SEVEN.home + 0.1).segment) == {0}
-    with pytest.raises(InvalidValueError, match=r"segment_starts: .* must begin at 0 and never decrease"):
+    with pytest.raises(InvalidValueError, match=r"segment_starts must begin at 0 and never decrease"):
         Motion(polynomial=motion.polynomial, goal=motion.goal, law="samples", segment_starts=np.array([0.0, 2.0, 1.0]))
 
 
@@ -395,9 +395,9 @@ def test_a_line_to_angles_on_another_branch_is_refused():
     ("arguments", "hint"),
     [
         (("xMatePro7", program(SEVEN, Waypoint.joint(SEVEN.home))), "is a name; use load_model"),
-        ((SEVEN, "program.json"), "is no Program; Program.load reads one"),
+        ((SEVEN, "program.json"), "program must be a Program"),
         ((SIX, program(SEVEN, Waypoint.joint(SEVEN.home))), "is the arm it is for, not xMate3"),
-        ((SEVEN, program(SEVEN, Waypoint.joint(SEVEN.home)), 0.0), "speed: 0.0 must be above 0"),
+        ((SEVEN, program(SEVEN, Waypoint.joint(SEVEN.home)), 0.0), "speed must be above 0.*, got 0.0"),
         (
             (SEVEN, program(SEVEN, Waypoint.joint(SEVEN.home, speed=0.002)), 0.1),
             r"waypoint 1 \(joint\), speed times 0.1",

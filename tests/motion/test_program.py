@@ -107,7 +107,7 @@ def test_a_file_comes_back(tmp_path):
     (tmp_path / "c.json").mkdir()
     with pytest.raises(InvalidValueError, match="cannot be written"):
         PROGRAM.save(tmp_path / "c.json")
-    with pytest.raises(InvalidValueError, match="is no file name"):
+    with pytest.raises(InvalidValueError, match="must be a file name"):
         Program.load(7)
 
 
@@ -177,20 +177,20 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "nullspace", "psi": 1e400}', "line 6: 1e400 is beyond the largest number, 1.8e308"),
         ('{"type": "nullspace", "psi": -Infinity}', "line 6: -Infinity is no value"),
         ('{"type": "nullspace", "psi": 0x10}', "line 6: 0x10 is no value"),
-        ('{"type": "nullspace", "psi": "0.1"}', "line 6, waypoint 2, psi: '0.1' must be a number"),
-        ('{"type": "nullspace", "psi": true}', "line 6, waypoint 2, psi: True must be a number"),
+        ('{"type": "nullspace", "psi": "0.1"}', "line 6, waypoint 2, psi must be a number.*, got '0.1'"),
+        ('{"type": "nullspace", "psi": true}', "line 6, waypoint 2, psi must be a number.*, got True"),
         (
             '{"type": "nullspace", "psi": 4}',
-            r"line 6, waypoint 2 \(nullspace\), psi: 4.0 must be from -3.1416 to 3.1416 \[rad\]",
+            r"line 6, waypoint 2 \(nullspace\), psi must be from -3.1416 to 3.1416 \[rad\].*, got 4.0",
         ),
         ('{"type": "nullspace"}', r"waypoint 2 \(nullspace\), psi is missing: nullspace needs psi"),
         (
             '{"type": "nullspace",\n"psi": 0.1,\n"speed": 2}',
-            r"line 8, waypoint 2 \(nullspace\), speed: 2.0 must be from 0.001 to 1 ",
+            r"line 8, waypoint 2 \(nullspace\), speed must be from 0.001 to 1 .*, got 2.0",
         ),
-        ('{"type": "nullspace", "psi": 0.1, "blend": -1}', r"blend: -1.0 must be from 0 to 1 \[m\]"),
-        ('{"type": "nullspace", "psi": 0.1, "dwell": 1e9}', r"dwell: 1000000000.0 must be from 0 to 3600 \[s\]"),
-        ('{"type": "nullspace", "psi": 0.1, "speed": null}', "speed: None must be a number"),
+        ('{"type": "nullspace", "psi": 0.1, "blend": -1}', r"blend must be from 0 to 1 \[m\].*, got -1.0"),
+        ('{"type": "nullspace", "psi": 0.1, "dwell": 1e9}', r"dwell must be from 0 to 3600 \[s\].*, got 1000000000.0"),
+        ('{"type": "nullspace", "psi": 0.1, "speed": null}', "speed must be a number.*, got None"),
         ('{"type": "nullspace", "psi": 0.1, "sped": 1}', "line 6, waypoint 2, sped: 1.0 is unknown; known: type, q,"),
         (
             '{"type": "nullspace", "psi": 0.1, "psi": 0.1}',
@@ -199,16 +199,16 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, way, speed"),
         ('{"psi": 0.1}', "line 6, waypoint 2, type is missing; known: joint, line"),
         ('{"type": "spline"}', r"waypoint 2 \(spline\), type: 'spline' is unknown; known: joint, line"),
-        ('{"type": 3}', "waypoint 2, type: 3.0 must be text"),
-        ("[1, 2]", r"line 6: \[1.0, 2.0\] must be waypoint 2: an object"),
-        ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz is missing beside position"),
+        ('{"type": 3}', "waypoint 2, type must be text.*, got 3.0"),
+        ("[1, 2]", r"line 6 must be waypoint 2: an object.*, got \[1.0, 2.0\]"),
+        ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz is missing: a pose has position"),
         (
             '{"type": "line", "position": [500, 0, 500], "wxyz": [1,0,0,0]}',
             "position: .* is beyond 10 m; millimetres divided",
         ),
         ('{"type": "line", "position": [0.5, 0], "wxyz": [1,0,0,0]}', r"position: .* has shape \(2,\), needs \(3,\)"),
-        ('{"type": "line", "position": [0.5, 0, [1]], "wxyz": [1,0,0,0]}', "position, number 3: .* must be a number"),
-        ('{"type": "line", "position": 0.5, "wxyz": [1,0,0,0]}', "position: 0.5 must be a list of numbers"),
+        ('{"type": "line", "position": [0.5, 0, [1]], "wxyz": [1,0,0,0]}', "position, number 3 must be a number"),
+        ('{"type": "line", "position": 0.5, "wxyz": [1,0,0,0]}', "position must be a list of numbers.*, got 0.5"),
         (
             '{"type": "line", "position": [0.5, 0, 0.5], "wxyz": [2,0,0,0]}',
             "wxyz: .* has length 2, must be 1 within 0.001",
@@ -218,7 +218,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "line", "q": [0,0,0,0,0,0,0], "wxyz": [1,0,0,0]}', "q: .* is a second target"),
         (
             '{"type": "joint", "q": [0,0,0,0,0,0]}',
-            r"line 6, waypoint 2 \(joint\), q: .* must be 7 joint angles \[rad\]",
+            r"line 6, waypoint 2 \(joint\), q must be 7 joint angles \[rad\]",
         ),
         (
             '{"type": "joint", "q": [0,90,0,0,0,0,0]}',
@@ -227,13 +227,16 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,0]}', "axis: .* has no direction"),
         (
             '{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,1], "angle": 0}',
-            "angle: 0.0 must be from more than 0 to 6.2832",
+            "angle must be from more than 0 to 6.2832.*, got 0.0",
         ),
         (
             '{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,1], "orientation": "fixed"}',
             r"line 6, waypoint 2 \(circle\), orientation: 'fixed' is unknown; known: held, turning",
         ),
-        ('{"type": "nullspace", "psi": 1, "way": 2}', "line 6, waypoint 2, way: 2.0 must be text in double quotes"),
+        (
+            '{"type": "nullspace", "psi": 1, "way": 2}',
+            "line 6, waypoint 2, way must be text in double quotes.*, got 2.0",
+        ),
         (
             '{"type": "nullspace", "psi": 1, "orientation": "held"}',
             "orientation: 'held' has no meaning here; nullspace",
@@ -257,17 +260,17 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
     ("text", "hint"),
     [
         ("", "line 1: the end of the text is no value"),
-        ("[]", r"line 1: \[\] must be a program: an object"),
+        ("[]", r"line 1 must be a program: an object.*, got \[\]"),
         ('{"waypoints"', "line 1: the end of the text is no colon"),
         (lines(GOOD) + "{}", "line 8: { follows after the end|follows after the end of the first value"),
-        (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format: 'x' must be 'rcilab program'"),
+        (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format must be 'rcilab program'.*, got 'x'"),
         (lines(GOOD, head='"version": 1'), 'format is missing; a program has "rcilab program"'),
         (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: .*xMatePro3"),
         (
             lines(GOOD, model="xMate3", start=[0.1] * 6),
             r"line 5, waypoint 1 \(nullspace\), psi: 0.1 has no meaning for xMate3",
         ),
-        (lines(GOOD, start=[0.1] * 6), r"line 3, start: .* must be 7 joint angles \[rad\]: xMatePro7 has 7 axes"),
+        (lines(GOOD, start=[0.1] * 6), r"line 3, start must be 7 joint angles \[rad\]: xMatePro7 has 7 axes"),
         (
             lines(GOOD, head='"format": "rcilab program", "version": 1, "speed": 1'),
             "a program, speed: 1.0 is unknown; known: format",
@@ -275,11 +278,11 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
         (lines(GOOD, head='"format": "rcilab program", "version": 1, "tool": [1]'), "line 2, tool: .* needs "),
         (
             lines(GOOD, head='"format": "rcilab program", "version": 1, "name": "a\\nb"'),
-            "line 2, name: .* must be text in one line",
+            "line 2, name must be text in one line",
         ),
         ('{"format": "rcilab program", "version": 1, "start": [], "waypoints": []}', "model is missing"),
-        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "[]"), "line 4, waypoints: 0 must be 1 to 10000"),
-        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "{}"), "line 4, waypoints: {} must be a list"),
+        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "[]"), "line 4, waypoints must be 1 to 10000.*, got 0"),
+        (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "{}"), "line 4, waypoints must be a list.*, got {}"),
         ("[" * 100_000, "opens more than 8 levels"),
         (" " * 8_000_001, "8.0 MB is above 8 MB"),
         ("\ud800", "line 1: .* is no text in UTF-8"),
@@ -313,11 +316,11 @@ def test_a_spoiled_file_is_a_program_or_one_kind_error(data):
 def test_values_from_python_are_checked_as_well():
     with pytest.raises(ModelError, match="known robots"):
         Program(model="kuka", start=(0.0,) * 7, waypoints=(Waypoint.nullspace(0.1),))
-    with pytest.raises(InvalidValueError, match=r"waypoint 1 \(joint\), q: .* must be 7 joint angles"):
+    with pytest.raises(InvalidValueError, match=r"waypoint 1 \(joint\), q must be 7 joint angles"):
         Program(model="xMatePro7", start=MODEL.home, waypoints=(Waypoint.joint([0.0] * 6),))
-    with pytest.raises(InvalidValueError, match=r"waypoint 1: 3 is none; Waypoint\.line makes one"):
+    with pytest.raises(InvalidValueError, match=r"waypoint 1 must be a Waypoint, got 3"):
         Program(model="xMatePro7", start=MODEL.home, waypoints=(3,))
-    with pytest.raises(InvalidValueError, match=r"via: .* must be finite"):
+    with pytest.raises(InvalidValueError, match=r"via must be finite"):
         Waypoint.arc((math.nan, 0.0, 0.0), HOME)
     with pytest.raises(InvalidValueError, match=r"way: .* is unknown; known: shorter, longer"):
         Waypoint.nullspace(0.1, way=np.ones(2))
@@ -339,7 +342,7 @@ def test_a_program_is_saved_as_json_and_never_over_another_kind_of_file(tmp_path
     with pytest.raises(InvalidValueError, match=r"must end in \.json"):
         program.save(file)
     assert file.read_bytes() == b"mine"
-    with pytest.raises(InvalidValueError, match="is no file name"):
+    with pytest.raises(InvalidValueError, match="must be a file name"):
         program.save(None)
 
 
@@ -352,7 +355,7 @@ def test_far_too_many_waypoints_are_counted_and_not_read():
     node = lined_json.Node
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(lined_json, "Node", lambda value, line: read.append(line) or node(value, line))
-        with pytest.raises(InvalidValueError, match="line 1, waypoints: 60000 must be 1 to 10000"):
+        with pytest.raises(InvalidValueError, match="line 1, waypoints must be 1 to 10000, got 60000"):
             Program.from_json(text.encode(), "program.json")
     assert len(read) < 12 * 10_000
 
@@ -360,5 +363,5 @@ def test_far_too_many_waypoints_are_counted_and_not_read():
 @pytest.mark.parametrize("end", ["", "]", ', {"q": 1'])
 def test_too_many_waypoints_in_a_spoiled_file_are_one_kind_of_error(end: str):
     text = '{"waypoints": [' + ",".join(10_001 * ["1"]) + end
-    with pytest.raises(InvalidValueError, match="waypoints: 10001 must be 1 to 10000"):
+    with pytest.raises(InvalidValueError, match="waypoints must be 1 to 10000, got 10001"):
         Program.from_json(text.encode(), "program.json")

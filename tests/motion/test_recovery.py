@@ -127,7 +127,7 @@ def test_a_motion_from_outside_may_not_lead_farther_out():
 @pytest.mark.parametrize("name", MODELS)
 def test_planning_from_outside_names_the_way_back(name):
     model = load_model(name)
-    with pytest.raises(PlanningError, match=r"start .* plan_recovery\(model, q\) leads back inside"):
+    with pytest.raises(PlanningError, match=r"start .* plan_recovery\(model, q\) moves back inside"):
         plan_joint(model, beyond(model, 1.0), model.home)
 
 

@@ -104,7 +104,7 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("0;1,5\n1;1,6\n", {}, "line 1: '1,5' in column 2 is no finite number; decimals need a point"),
         ("0,1,2\n0.1,1\n", {}, "line 2: 2 columns; the first line has 3"),
         ("0,1\n0.1,1\n0.1,1\n", {}, "line 3: 0.1 s is not later than the sample before"),
-        ("0\n1\n", {}, "line 1: 'a single column' needs"),
+        ("0\n1\n", {}, "line 1 needs a time and the joints.*, got 'a single column'"),
         ("t,q1,q3\n0,1,1\n", {}, r"line 1: .*names the joints 1, 3; needs q1, q2"),
         ("t,q1,joint_1\n0,1,1\n", {}, "line 1: 'joint_1' is a second column for joint 1"),
         ("t,time,q1\n0,0,1\n", {}, "line 1: 'time' is a second column of times"),
@@ -114,7 +114,7 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("t,q1\n0,1\n1,90\n", {}, r"line 3: 90.0 rad of joint 1 .*unit='deg'"),
         (b"t,q1\n0,1\n\xff\xfe,2\n", {}, "line 3: .*no text in UTF-8"),
         ("t,q1\n0,1\n", {"unit": "gon"}, "unit: 'gon' is unknown; known: rad, deg"),
-        ("0,1\n", {"rate_hz": 0}, "rate_hz: 0.0 must be above 0"),
+        ("0,1\n", {"rate_hz": 0}, "rate_hz must be above 0.*, got 0.0"),
     ],
 )
 def test_a_bad_csv_is_named_with_its_line_in_one_sentence(tmp_path, text, options, message):
@@ -171,7 +171,7 @@ def test_a_bad_sample_is_for_check_to_find():
 
 
 def test_times_that_do_not_increase_are_refused():
-    with pytest.raises(InvalidValueError, match=r"times at row 2 \(from 0\): 0.1 must be later than 0.1 \[s\]"):
+    with pytest.raises(InvalidValueError, match=r"times at row 2 \(from 0\) must be later than 0.1 \[s\], got 0.1"):
         motion_through([0.0, 0.1, 0.1], np.zeros((3, 6)))
 
 

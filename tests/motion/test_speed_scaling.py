@@ -12,7 +12,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_line
-from rcilab.motion.speed_scaling import as_planned, require_pace
+from rcilab.motion.speed_scaling import as_planned, require_speed_override
 
 MODEL = load_model("xMatePro7")
 WAY = np.array([1.0, 0.4, -0.5, 0.3, 0.6, 0.2, 1.2])
@@ -127,4 +127,4 @@ def test_nothing_asked_for_leaves_the_motion_itself():
 @pytest.mark.parametrize("pace", [0.0, 0.05, 1.01, np.nan, "fast"])
 def test_a_pace_has_a_range(pace):
     with pytest.raises(InvalidValueError):
-        require_pace(pace)
+        require_speed_override(pace)

@@ -103,5 +103,5 @@ def test_differences_and_derivatives_of_a_cubic_convert_exactly(v, a, j):
 
 @pytest.mark.parametrize("wrong", [MODEL, MODEL.limits, None])
 def test_what_are_no_joint_limits_is_named(wrong):
-    with pytest.raises(InvalidValueError, match=r"limits: .* are no JointLimits; pass model\.limits\.joint"):
+    with pytest.raises(InvalidValueError, match=r"limits must be JointLimits.*; pass model\.limits\.joint"):
         plan_stop(wrong, np.zeros(7), np.zeros(7), np.zeros(7))

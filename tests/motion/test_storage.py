@@ -171,9 +171,9 @@ def test_another_version_says_what_to_do_with_the_file(tmp_path):
 
 @pytest.mark.parametrize("file", [None, 3])
 def test_what_is_no_file_is_refused_in_words(file):
-    with pytest.raises(InvalidValueError, match="is no file name"):
+    with pytest.raises(InvalidValueError, match="must be a file name"):
         MOTION.save(file)
-    with pytest.raises(InvalidValueError, match="is no file name"):
+    with pytest.raises(InvalidValueError, match="must be a file name"):
         Motion.load(file)
 
 

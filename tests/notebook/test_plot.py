@@ -151,8 +151,8 @@ def test_one_jump_of_all_joints_is_one_place_in_the_title() -> None:
     ("arguments", "sentence"),
     [
         ((MOTION, "xMatePro7"), r"use load_model\('xMatePro7'\)"),
-        ((PRO7, MOTION), "motion: RobotModel.* is no motion"),
-        ((None, PRO7), "motion: None is no motion"),
+        ((PRO7, MOTION), "motion must be a motion.*, got RobotModel"),
+        ((None, PRO7), "motion must be a motion.*, got None"),
         ((MOTION, PRO7, "x"), "run: 'x' is no run"),
     ],
 )
@@ -162,7 +162,7 @@ def test_wrong_types_are_refused_in_words(arguments: tuple[Any, ...], sentence: 
 
 
 def test_a_bare_joint_number_is_refused_in_words() -> None:
-    with pytest.raises(InvalidValueError, match=r"joints: 3 must be a list"):
+    with pytest.raises(InvalidValueError, match=r"joints must be a list"):
         plot(MOTION, PRO7, joints=3)  # type: ignore[arg-type]
 
 

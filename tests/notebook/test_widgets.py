@@ -93,7 +93,7 @@ def test_the_notebook_decides_the_language_unless_somebody_else_does(monkeypatch
 def test_angles_beyond_a_limit_are_refused_by_joint_and_bound() -> None:
     q = PRO7.home.copy()
     q[1] = 2.2
-    with pytest.raises(InvalidValueError, match=r"joint 2: 2\.2 must be from -2\.0944 to 2\.0944 rad"):
+    with pytest.raises(InvalidValueError, match=r"joint 2 must be from -2\.0944 to 2\.0944 rad, got 2\.2"):
         widgets.JointSliders(PRO7, q)
 
 

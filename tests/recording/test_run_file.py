@@ -247,7 +247,7 @@ def test_faults_beyond_32_bits_keep_their_number_and_their_maker():
 
 
 def test_what_is_no_file_name_is_said_to_be_none():
-    with pytest.raises(InvalidValueError, match="run file: None is no file name"):
+    with pytest.raises(InvalidValueError, match="run file must be a file name, got None"):
         rcilab.load_run(None)
-    with pytest.raises(InvalidValueError, match="None is no file name"):
+    with pytest.raises(InvalidValueError, match="must be a file name, got None"):
         some_run().save(None)

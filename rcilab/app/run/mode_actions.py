@@ -22,7 +22,7 @@ from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.rokae.driver.controller_parameters import ControlPart, control_ranges, standard_control
-from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
@@ -97,7 +97,7 @@ class ModeActions:
             choose_mode(self._store, cast("Mode", request.mode))
             self._store.update(asked=None)
         if request.pace is not None and math.isfinite(request.pace):
-            pace = min(max(request.pace, SLOWEST_PACE), 1.0)
+            pace = min(max(request.pace, MIN_SPEED_OVERRIDE), 1.0)
             self._store.update(drive=replace(self._store.state.drive, pace=pace))
             self._wish.choose(pace, status)
 

@@ -23,8 +23,7 @@ from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.doctor.processor import read_ticks
 from rcilab.diagnostics.doctor.system import System
 from rcilab.realtime.cpu_latency import awake_cores
-from rcilab.realtime.punctual import PRIORITY
-from rcilab.realtime.scheduling import enter_realtime
+from rcilab.realtime.scheduling import PRIORITY, enter_realtime
 
 _STOPPING_PAUSE = 0.010  # [s] Ten cycles: the shortest run of lost commands that a controller may stop a motion for.
 _CYCLES_A_LINE = 1000

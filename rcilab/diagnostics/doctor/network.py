@@ -10,7 +10,7 @@ from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.doctor.system import System
 from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
-from rcilab.realtime.punctual import PRIORITY
+from rcilab.realtime.scheduling import PRIORITY
 
 _POLICIES = {"0": "SCHED_OTHER", "1": "SCHED_FIFO", "2": "SCHED_RR", "3": "SCHED_BATCH", "5": "SCHED_IDLE"}
 _REALTIME_POLICIES = ("1", "2")

@@ -1,1 +1,1 @@
-"""Forces: what torques a motion takes."""
+"""Dynamics: the joint torques of a motion."""

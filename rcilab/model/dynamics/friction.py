@@ -1,4 +1,4 @@
-"""Friction of the joints: as the simulated arm has it, or with figures that were identified on a real one."""
+"""Joint friction: that of the simulated arm, or with coefficients identified on a real one."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rcilab.robots.mjcf import DAMPING_PER_TORQUE
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointFriction:
-    """What n joints lose: viscous * dq + coulomb * sign(dq) + offset, the law of the vendor's model library.
+    """Friction of n joints: viscous * dq + coulomb * sign(dq) + offset, the model of the vendor's library.
 
     Raises:
-        InvalidValueError: The vectors are not all of one length, not finite, or a joint would gain by moving.
+        InvalidValueError: The vectors differ in length or are not finite, or a coefficient is negative.
     """
 
     viscous: JointVector
     """Shape (n,), [N m s/rad], not negative."""
     coulomb: JointVector
-    """Shape (n,), [N m], not negative; nothing at rest."""
+    """Shape (n,), [N m], not negative; zero at standstill."""
     offset: JointVector
-    """At rest, too, shape (n,), [N m]."""
+    """Shape (n,), [N m], also at standstill."""
 
     def __post_init__(self) -> None:
         """Checks the values and makes them read-only."""
@@ -37,7 +37,7 @@ class JointFriction:
             object.__setattr__(self, name, values)
 
     def torque(self, dq: Array) -> Array:
-        """Returns what a motor needs on top of the torques of the rigid arm, [N m], for dq of shape (..., n), [rad/s].
+        """Returns the friction torques, [N m], to add to those of the rigid arm, for dq of shape (..., n), [rad/s].
 
         Raises:
             InvalidValueError: It is the friction of another number of joints.
@@ -54,11 +54,11 @@ class JointFriction:
 def simulated_friction(limits: JointLimits) -> JointFriction:
     """Returns the friction of the MuJoCo plant: viscous, in proportion to the size of the drive.
 
-    No table gives figures for the real arms; these are a choice. Those of a real arm are in its answer to
-    LoadRobotModel.
+    No table has coefficients of the real arms; these keep the simulated arm from ringing. A real arm sends its own in
+    the response to LoadRobotModel.
 
     Args:
-        limits: Of the arm; its torque limits stand for the size of the drives.
+        limits: Limits of the arm; the torque limits represent the size of the drives.
     """
     none = np.zeros(len(limits.torque))
     return JointFriction(viscous=DAMPING_PER_TORQUE * limits.torque, coulomb=none, offset=none)

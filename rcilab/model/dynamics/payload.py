@@ -19,7 +19,7 @@ class Payload:
     """A rigid body fixed to the flange.
 
     Raises:
-        InvalidValueError: The mass is negative, the inertia is no body's, or something is not finite.
+        InvalidValueError: The mass is negative, the inertia is physically impossible, or a number is not finite.
     """
 
     mass: float = 0.0
@@ -37,7 +37,7 @@ class Payload:
         try:
             moments = np.array(self.inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError, OverflowError):
-            moments = self.inertia  # It is refused as it came in.
+            moments = self.inertia  # The error shows the value as passed.
         inertia = as_vector(moments, 9, "load inertia", "kg m^2").reshape(3, 3)
         if mass == 0.0 and np.any(inertia):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be zero: a load without mass has none")
@@ -48,7 +48,7 @@ class Payload:
         center = as_vector(self.center_of_mass, 3, "load centre of mass", "m")
         if np.abs(center).max() > _FARTHEST:
             raise InvalidValueError(
-                "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; give metres"
+                "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; the unit is metres"
             )
         object.__setattr__(self, "center_of_mass", center)
         object.__setattr__(self, "inertia", readonly_copy(inertia))
@@ -60,7 +60,7 @@ class Payload:
 
 
 def _nearest_possible(inertia: Matrix) -> Matrix:
-    """Returns an inertia without the moments below zero that rounding made.
+    """Returns an inertia without negative moments caused by rounding.
 
     Every body's principal moments are positive or zero, and none exceeds the sum of the other two.
     """
@@ -72,7 +72,7 @@ def _nearest_possible(inertia: Matrix) -> Matrix:
         raise InvalidValueError(
             "load inertia",
             inertia.tolist(),
-            f"is no body's: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
+            f"is physically impossible: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
             "and none larger than the sum of the other two",
         )
     if smallest >= 0.0:

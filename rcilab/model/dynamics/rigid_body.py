@@ -1,7 +1,7 @@
 """Joint torques of the rigid arm, by pinocchio's recursive Newton-Euler algorithm."""
 
 # pyright: reportAttributeAccessIssue=false
-# pinocchio's names are put into its module by compiled code when it is loaded, where pyright cannot see them.
+# pinocchio defines its names in compiled code at import, where pyright cannot see them.
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-import pinocchio as pin  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
+import pinocchio as pin  # pyright: ignore[reportMissingImports]  # Installed through a .pth file.
 
 from rcilab.core.arrays import Array, JointPath, JointVector, Matrix, Vector3, make_readonly
 from rcilab.core.spatial import IDENTITY, Pose
@@ -26,7 +26,7 @@ Twist: TypeAlias = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TorqueTerms:
-    """The joint torques of a motion and what they are made of, each of shape (n,) or (N, n), [N m]."""
+    """The joint torques of a motion and their terms, each of shape (n,) or (N, n), [N m]."""
 
     full: JointVector
     """inertial + coriolis + gravity + friction."""
@@ -35,12 +35,12 @@ class TorqueTerms:
     coriolis: JointVector
     """C(q, dq) dq: Coriolis and centrifugal torques."""
     gravity: JointVector
-    """g(q): what holds the arm still."""
+    """g(q): the torques that hold the arm still."""
     friction: JointVector
-    """What the joints lose by friction; zeros unless it was asked for."""
+    """Friction torques; zeros unless requested."""
 
     def with_friction(self, friction: JointVector) -> TorqueTerms:
-        """Returns these terms and those of friction on top, of the same shape, [N m]."""
+        """Returns these terms with friction torques added, of the same shape, [N m]."""
         return replace(self, full=self.full + friction, friction=friction)
 
     def __repr__(self) -> str:
@@ -51,10 +51,10 @@ class TorqueTerms:
 
 
 class ToolTerms:
-    """What there is to know of the tool of an arm in one state; arrays are not to be written to.
+    """Pose, twist and Jacobian of the tool of an arm in one state; its arrays must not be written to.
 
-    Whoever acts in one cycle asks the same value: what follows from angles and velocities is computed once. What a law
-    needs in addition is computed when it is asked for first, so it belongs to the thread of its `RigidBody`.
+    All control laws of a cycle share one instance, so that everything that follows from angles and velocities is
+    computed once. Other terms are computed on first use, so an instance belongs to the thread of its `RigidBody`.
 
     Attributes:
         matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
@@ -63,9 +63,9 @@ class ToolTerms:
 
     Args:
         model: The arm as pinocchio has it.
-        data: Its memory.
+        data: Its working memory.
         tool: Number of the tool's frame.
-        q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
+        q: Joint angles, shape (n,), [rad]; the array must not change afterwards.
         dq: Joint velocities, shape (n,), [rad/s]; likewise.
     """
 
@@ -80,7 +80,7 @@ class ToolTerms:
         self._mass_inverse: Matrix | None = None
 
     def is_at(self, q: JointVector, dq: JointVector) -> bool:
-        """Returns whether it is that of these very arrays."""
+        """Returns whether it was computed from these array objects."""
         return self._args[3] is q and self._args[4] is dq
 
     @property
@@ -119,7 +119,7 @@ class RigidBody:
 
     Args:
         description: The arm.
-        load: What is fixed to the flange.
+        load: The load at the flange.
         tool: Pose of the tool in the flange; it has no mass.
     """
 
@@ -166,14 +166,14 @@ class RigidBody:
         return pin.rnea(self._model, self._data, q, dq, ddq).copy()
 
     def shared_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
-        """Returns `full_torque`, read-only and computed once for all who ask for the very same arrays."""
+        """Returns `full_torque`, read-only and computed once for the same array objects."""
         args = self._shared_args
         if not (args and args[0] is q and args[1] is dq and args[2] is ddq):
             self._shared_args, self._shared_torque = (q, dq, ddq), make_readonly(self.full_torque(q, dq, ddq))
         return self._shared_torque
 
     def motion_torque(self, q: JointVector, dq: JointVector, ddq: JointVector) -> JointVector:
-        """Returns what a motion takes beyond holding the arm still: M ddq + C dq, shape (n,), [N m]."""
+        """Returns the torques of a motion without gravity: M ddq + C dq, shape (n,), [N m]."""
         return pin.rnea(self._weightless, self._data, q, dq, ddq).copy()
 
     def motion_torques(self, q: JointPath, dq: JointPath, ddq: JointPath) -> JointPath:
@@ -210,7 +210,7 @@ class RigidBody:
         return pin.aba(self._model, self._data, q, dq, tau).copy()
 
     def weightless_acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
-        """Returns the joint accelerations that torques cause on top of those that hold the arm; as `acceleration`."""
+        """Returns the joint accelerations of torques that are added to gravity compensation; as `acceleration`."""
         return pin.aba(self._weightless, self._data, q, dq, tau).copy()
 
     def link_jacobian(self, q: JointVector, link: int, point: Vector3) -> Matrix:
@@ -243,16 +243,16 @@ class RigidBody:
         return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)
 
     def tool_motion(self, q: JointVector, dq: JointVector) -> ToolTerms:
-        """Returns what there is to know of the tool in one state; see `ToolTerms` for the arguments."""
+        """Returns the tool's pose, twist and Jacobian in one state; see `ToolTerms` for the arguments."""
         return ToolTerms(self._model, self._data, self._tool, q, dq)
 
     def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
-        """Returns the `tool_motion` of the arm as it is, for all that acts in one cycle.
+        """Returns the `tool_motion` of the present state, shared by all control laws of a cycle.
 
-        The last answer is kept, and given again when the very same arrays come.
+        The last result is kept and returned again for the same array objects.
 
         Args:
-            q: Joint angles, shape (n,), [rad]; an array that nobody writes to any more.
+            q: Joint angles, shape (n,), [rad]; the array must not change afterwards.
             dq: Joint velocities, shape (n,), [rad/s]; likewise.
         """
         terms = self._tool_terms

@@ -1,17 +1,17 @@
-"""Small symmetric systems of equations, solved once a millisecond, and the modes in which an arm on springs vibrates.
+"""Small symmetric systems of equations for the 1 kHz path, and the vibration modes of an arm on springs.
 
 eigenpy, which comes with pinocchio, binds Eigen's decompositions: on six equations they take a fifth of the time of
 numpy's general solver, whose checks cost more than its work, and on the modes of seven joints less than half.
 """
 
 # pyright: reportAttributeAccessIssue=false
-# eigenpy's names are put into its module by compiled code when it is loaded, where pyright cannot see them.
+# eigenpy defines its names in compiled code at import, where pyright cannot see them.
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import eigenpy  # pyright: ignore[reportMissingImports]  # It lives behind a .pth file.
+import eigenpy  # pyright: ignore[reportMissingImports]  # Installed through a .pth file.
 
 from rcilab.core.arrays import Array, Matrix
 
@@ -41,12 +41,12 @@ class SymmetricSolver:
 
     @property
     def has_solved(self) -> bool:
-        """Whether the last matrix was positive-definite, so that its solution has a meaning; of NaN it is not known."""
+        """Whether the last matrix was positive-definite and its solution valid; undefined for NaN."""
         return self._decomposition.info() == _SUCCESS
 
 
 class VibrationModes(NamedTuple):
-    """How an arm vibrates on springs, slowest mode first."""
+    """The vibration modes of an arm on springs, slowest first."""
 
     squares: Array
     """Angular frequencies squared, w^2, shape (n,), [rad^2/s^2]; of modes without a spring zero, within rounding."""

@@ -1,1 +1,1 @@
-"""Geometry of the arm: where the tool is, how it moves, and which joint angles put it there."""
+"""Kinematics of the arm: poses, velocities and inverse kinematics."""

@@ -1,8 +1,8 @@
-"""The arm angle psi of a 7-axis arm: where the elbow is on its circle around the shoulder-wrist line.
+"""The arm angle psi of a 7-axis arm: the angle of the elbow on its circle around the shoulder-wrist line.
 
 With S the shoulder, E the elbow, W the wrist centre and u = unit(W - S), psi is the right-hand angle about u from the
 component of base +z perpendicular to u to the component of (E - S) perpendicular to u. At psi = 0 the elbow is in the
-vertical plane on the upper side; at +-pi on the lower side. The vendor's controller counts it in the same way.
+vertical plane on the upper side; at +-pi on the lower side. The vendor's controller uses the same definition.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The pose closest to a wish: what an arm can do of a target it cannot fully reach, and why not all of it."""
+"""The reachable pose closest to a target, and why the target itself cannot be reached."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _HALVINGS = 12  # Steps of the search along the way to the target: 1/4096 of it,
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClosestPose:
-    """The answer to "go there, or as close as you can"."""
+    """The result of a search for the closest reachable pose."""
 
     q: JointVector
     """Joint angles, shape (n,), [rad]."""
     pose: Pose
     """Pose of the tool at q in base: the target itself, or the closest pose found."""
     solutions: Solutions | None
-    """All branches at that pose; None when the arm is best left where it is."""
+    """All branches at that pose; None when the present pose is the closest."""
     refusal: UnreachableError | None
     """Why the target itself cannot be reached; None when it can."""
 
@@ -38,14 +38,14 @@ def closest_reachable(
     q: JointVector,
     target: Pose,
 ) -> ClosestPose:
-    """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+    """Returns joint angles for a target, or for the closest reachable pose.
 
     A target beyond the reach is pulled straight back towards the shoulder, keeping its orientation. One that a joint
     limit forbids is approached along the straight way from the present pose, as far as there is a solution.
 
     Args:
-        solve: Inverse kinematics from a tool pose; raises UnreachableError. Its second argument tells whether it may
-            look for another arm angle than the present one: a search is too slow for every step of a search.
+        solve: Inverse kinematics from a tool pose; raises UnreachableError. Its second argument allows a search for
+            another arm angle, which is too slow for every step of the bisection.
         arm: Lengths of the arm.
         T_flange_tool: Pose of the tool in the flange frame.
         here: Present pose of the tool in base, reached at q.
@@ -87,7 +87,7 @@ def _approach(
 
 
 def interpolate(a: Pose, b: Pose, share: float) -> Pose:
-    """Returns the pose a share (0 to 1) of the way from a to b: position on the line, orientation by slerp."""
+    """Returns the pose at a share (0 to 1) from a to b: position on the line, orientation by slerp."""
     (ra, pa), (rb, pb) = a.parts, b.parts
     qa, qb = wxyz_from_rotation(ra), wxyz_from_rotation(rb)
     dot = sum(x * y for x, y in zip(qa, qb, strict=True))

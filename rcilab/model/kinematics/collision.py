@@ -1,11 +1,11 @@
-"""How near the links come to each other and to the floor: coal's distances between the capsules that the URDF has too.
+"""Distances between the links and to the floor, computed by coal from the capsules of the URDF.
 
-Neighbours are not compared: their housings share a joint and always touch. Every other two links are; none of them
-touch wherever the joints are (a test shows it). The floor is compared with every link that can move up or down.
+Neighbours are not checked: their housings share a joint and always touch. All other pairs of links are; within the
+joint limits none of them touch (a test shows it). The floor is checked against every link that can move vertically.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
-# The names of pinocchio and coal are put into their modules by compiled code when they are loaded.
+# pinocchio and coal define their names in compiled code at import, where pyright cannot see them.
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _SLANT = 0.5  # Axes are along y or z; this is between.
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance:
-    """The smallest distance between any two, and between whom."""
+    """The smallest distance between two links, or a link and the floor, and the two."""
 
     distance: Array
-    """Below 0 where capsules overlap, shape () or (N,), [m]; infinite where nothing is compared."""
+    """Below 0 where capsules overlap, shape () or (N,), [m]; infinite without a pair to check."""
     links: NDArray[np.intp]
     """Numbers of the two, shape (2,) or (N, 2): 0 the base, n the last link, -1 the floor, -2 the tool."""
 
@@ -50,12 +50,12 @@ class Clearance:
 
 
 class CollisionGeometry:
-    """The capsules of an arm, what is compared with what, and how far a joint can move them. Immutable.
+    """The capsules of an arm, the pairs to check, and how far a joint can move them. Immutable.
 
     Args:
         description: The arm.
         tool: Capsule around the tool in the frame of the last link, or None.
-        floor_height: Of the floor in the base frame, [m]; None where there is none.
+        floor_height: Height of the floor in the base frame, [m]; None without a floor.
     """
 
     def __init__(self, description: RobotDescription, tool: Capsule | None, floor_height: float | None) -> None:
@@ -97,10 +97,10 @@ class CollisionGeometry:
 
 
 class ClearanceQuery:
-    """Asks for distances, configuration by configuration. Owned by one thread.
+    """Computes distances, configuration by configuration. Owned by one thread.
 
     Args:
-        geometry: What is compared.
+        geometry: The capsules and pairs.
     """
 
     def __init__(self, geometry: CollisionGeometry) -> None:
@@ -113,7 +113,7 @@ class ClearanceQuery:
         return self._nearest(self._geometry.links, self._links, self._geometry.link_pairs, q)
 
     def floor(self, q: JointVector) -> tuple[float, LinkPair]:
-        """Returns the smallest distance of a link from the floor, [m], and which; infinite where there is none."""
+        """Returns the smallest distance of a link from the floor, [m], and which; infinite without a floor."""
         if not self._geometry.floor_pairs:
             return float("inf"), LinkPair(self._geometry.tree.njoints - 1, FLOOR)
         return self._nearest(self._geometry.floor, self._floor, self._geometry.floor_pairs, q)
@@ -142,8 +142,8 @@ def collision_geometry(
     Args:
         description: The arm.
         tool: Origin of the tool in the flange, [m].
-        floor_height: Of the floor in the base frame, [m]; None where there is none.
-        tool_radius: Of a capsule from the flange to the tool's origin, [m]; None where there is none.
+        floor_height: Height of the floor in the base frame, [m]; None without a floor.
+        tool_radius: Radius of a capsule from the flange to the tool's origin, [m]; None without one.
     """
     capsule = None
     if tool_radius is not None and any(tool):

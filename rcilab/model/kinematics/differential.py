@@ -1,4 +1,4 @@
-"""How a frame of the arm moves: Jacobian, velocity and acceleration, for whole tables of joint angles."""
+"""Jacobian, velocity and acceleration of a frame of the arm, for tables of joint angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The circle that the elbow of a 7-axis arm goes round while its tool stays, as a thing in space."""
+"""The circle on which the elbow of a 7-axis arm can move while the tool stays, as geometry in base."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from rcilab.core.errors import SingularError
 from rcilab.model.kinematics.arm_angle import reference_frame
 
 _LOOKS = 720  # Arm angles at which a ray is compared with the circle: half a degree; a parabola does the rest.
-_PULL = 1e-3  # [m] per rad: what decides between the near and the far side where a ray passes both. Tuning value.
-_LEAST = 1e-6  # [m] Below it the arm is as good as stretched, and its elbow has no circle.
+_PULL = 1e-3  # [m] per rad: weight of the distance to `near` where a ray passes both sides of the circle. Tuning value.
+_LEAST = 1e-6  # [m] Radius below which the arm counts as stretched, without a circle.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

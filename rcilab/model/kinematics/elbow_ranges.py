@@ -1,4 +1,4 @@
-"""Which arm angles a pose leaves to an arm with redundancy: ranges of them, and what forbids the others."""
+"""The feasible ranges of the arm angle at a pose, and what forbids the other ranges."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import degrees, remainder, tau
 from typing import Literal, TypeAlias
 
 Reason: TypeAlias = Literal["joint limits", "singularity", "safety box", "reach"]
-"""What forbids an arm angle; "reach" where no joint angles put the tool there, as an arm with offsets has it."""
+"""What forbids an arm angle; "reach": no solution at this angle, which happens on an arm with offsets."""
 
 INSIDE = 0.1
 """How far inside a range an arm angle is chosen automatically, [rad]. Tuning value: some six degrees."""
@@ -24,7 +24,7 @@ class Arc:
     end: float
     """[rad], above start by at most a full turn."""
     reasons: tuple[Reason, ...]
-    """What forbids it; empty where the arm can stand."""
+    """What forbids it; empty if it is feasible."""
     joints: tuple[int, ...]
     """Numbers (from 1) of the joints beyond their limits in the branch that breaks fewest; empty if one breaks none."""
     branches: tuple[int, ...]
@@ -33,7 +33,7 @@ class Arc:
 
     @property
     def ok(self) -> bool:
-        """Whether the arm can stand here, in at least one branch."""
+        """Whether at least one branch is feasible here."""
         return not self.reasons
 
     def holds(self, psi: float) -> bool:
@@ -50,7 +50,7 @@ class FeasibleArcs:
 
     @property
     def feasible(self) -> tuple[tuple[float, float], ...]:
-        """Ranges (start, end) of arm angles where the arm can stand in at least one branch, [rad], end above start."""
+        """Ranges (start, end) of arm angles with at least one feasible branch, [rad], end above start."""
         return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok])
 
     def of_branch(self, branch: int) -> tuple[tuple[float, float], ...]:

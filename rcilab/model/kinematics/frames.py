@@ -1,4 +1,4 @@
-"""The frames of an arm that one can ask about: those after each joint, the flange, the tool, the stiffness frame."""
+"""The named frames of an arm: those after each joint, the flange, the tool, the stiffness frame."""
 
 from __future__ import annotations
 
@@ -35,4 +35,4 @@ def locate(frame: str, n: int, T_flange_tool: Pose, T_tool_stiffness: Pose) -> t
         return n, IDENTITY
     if frame in names:
         return names.index(frame) + 1, IDENTITY
-    raise InvalidValueError("frame", frame, f"is none of {', '.join(names)}, flange, tool, stiffness")
+    raise InvalidValueError("frame", frame, f"must be one of {', '.join(names)}, flange, tool, stiffness")

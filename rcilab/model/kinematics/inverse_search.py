@@ -1,6 +1,6 @@
-"""Which joint angles put the flange of one arm at a pose: at the arm angle asked for, else at the closest that has any.
+"""Inverse kinematics of the flange inside the joint limits: at a given arm angle, else at the closest with a solution.
 
-What cannot be reached is refused in words: by which distance, or by which joint and how far.
+The error of an unreachable pose says by what distance, or which joint limit is exceeded and by how much.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.robots.description import RobotDescription
 
 _LOOKS = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
-"""Offsets looked at, nearest first, to say what is in the way of a pose that no arm angle reaches, [rad]."""
+"""Offsets of the arm angle to try, nearest first, for the error of a pose that no arm angle reaches, [rad]."""
 
 
 class InverseSearch:
@@ -44,7 +44,7 @@ class InverseSearch:
             near: Joint angles, [rad], that decide what a singular pose leaves open.
 
         Raises:
-            UnreachableError: There is none; the message says what is in the way.
+            UnreachableError: There is no solution; the message says why.
         """
         start = psi
         if start is None and self.solver.redundancy:
@@ -73,7 +73,7 @@ class InverseSearch:
         return self.solver.arcs(T_base_flange, self._joint.lower, self._joint.upper, outside_box)
 
     def natural_psi(self, near: Sequence[float] | None) -> float:
-        """Returns the arm angle of joint angles, [rad]; 0 where it has no meaning, or where there are none."""
+        """Returns the arm angle of joint angles, [rad]; 0 where it is not defined, or without joint angles."""
         if near is None:
             return 0.0
         try:

@@ -11,7 +11,7 @@ from rcilab.core.arrays import Array, Matrix
 
 @dataclass(frozen=True, slots=True)
 class Manipulability:
-    """What the singular values of the Jacobian say about a configuration."""
+    """Measures of a configuration from the singular values of its Jacobian."""
 
     manipulability: float
     """sqrt(det(J J^T)): product of the singular values (Yoshikawa 1985); 0 at a singularity."""
@@ -21,7 +21,7 @@ class Manipulability:
     """Largest over smallest singular value; infinite at a singularity."""
 
 
-def dexterity(J: Matrix) -> Manipulability:
+def manipulability_of(J: Matrix) -> Manipulability:
     """Returns the dexterity measures of a Jacobian, shape (6, n), metres and radians taken as they are."""
     values = np.linalg.svd(J, compute_uv=False)
     smallest, largest = float(values[-1]), float(values[0])

@@ -1,4 +1,4 @@
-"""Where the frames of an arm are, how they move, and which joint motion moves them as wanted."""
+"""Forward and differential kinematics of an arm's frames."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from rcilab.model.kinematics.jacobian import jacobian
 from rcilab.model.kinematics.least_norm import JointRates, least_norm
 from rcilab.robots.description import DhRow
 
-MOST_ANGLE = 4.0 * math.pi
-"""[rad] The largest joint or arm angle that is taken for one: two turns. Degrees by mistake are soon beyond it."""
+MAX_ANGLE = 4.0 * math.pi
+"""[rad] Largest accepted joint or arm angle: two turns. Larger values are usually degrees by mistake."""
 
 
 class MovingArm:
@@ -28,12 +28,12 @@ class MovingArm:
     Capital names in brackets are those of the vendor's model library (RCI manual, section 3.4).
 
     Args:
-        dh: Standard Denavit-Hartenberg table, one row a joint.
+        dh: Standard Denavit-Hartenberg table, one row per joint.
         T_flange_tool: Pose of the tool in the flange frame.
         T_tool_stiffness: Pose of the stiffness frame in the tool frame.
 
     Raises:
-        InvalidValueError: A pose is none.
+        InvalidValueError: A pose is not valid.
     """
 
     def __init__(self, dh: Sequence[DhRow], T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
@@ -47,7 +47,7 @@ class MovingArm:
         """Returns the pose of the tool in base.
 
         Args:
-            q: Joint angles, shape (n,), [rad]; limits are not looked at.
+            q: Joint angles, shape (n,), [rad]; limits are not checked.
 
         Raises:
             InvalidValueError: q is not n finite numbers.
@@ -59,7 +59,7 @@ class MovingArm:
         """Returns the pose of a frame of the arm in base (GetCartPose); `forward` is the short way for the tool.
 
         Args:
-            q: Joint angles, shape (n,), [rad]; limits are not looked at.
+            q: Joint angles, shape (n,), [rad]; limits are not checked.
             frame: joint1 to jointn, flange, tool or stiffness.
 
         Raises:
@@ -145,12 +145,12 @@ class MovingArm:
     ) -> JointRates:
         """Returns the joint velocities of least norm that give a frame a twist (GetJointVel).
 
-        Close to a singularity they are damped, and the answer says so: `.damped`, and what is `.missed` of the twist.
+        Close to a singularity they are damped: see `.damped`, and `.missed` for the part of the twist that is missing.
 
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
             twist: Wanted motion in base axes, shape (6,) or (N, 6), linear part first, [m/s, rad/s].
-            weights: What a joint's motion costs against the others', shape (n,), positive; all the same when absent.
+            weights: Relative costs of the joints' motions, shape (n,), positive; all equal when absent.
             frame: joint1 to jointn, flange, tool or stiffness. What fewer than 6 joints move is always damped.
 
         Raises:
@@ -200,18 +200,18 @@ class MovingArm:
         return values
 
     def _floats(self, q: ArrayLike) -> list[float]:
-        """Returns q as n finite plain floats; the cheap way for what is an array already.
+        """Returns q as n finite plain floats; cheap for an array.
 
         Raises:
-            InvalidValueError: It is no n finite numbers, or an angle is of a size that only degrees have.
+            InvalidValueError: It is not n finite numbers, or an angle is so large that it must be in degrees.
         """
         if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
             values = q.tolist()
-            if math.isfinite(sum(values)) and -MOST_ANGLE <= min(values) and max(values) <= MOST_ANGLE:
+            if math.isfinite(sum(values)) and -MAX_ANGLE <= min(values) and max(values) <= MAX_ANGLE:
                 return values
         values = as_vector(q, self.n, "q", "rad").tolist()
         joint = max(range(self.n), key=lambda i: abs(values[i]))
-        if abs(values[joint]) > MOST_ANGLE:
-            problem = "rad is more than two turns; angles are wanted in rad: np.radians(q) makes them of degrees"
+        if abs(values[joint]) > MAX_ANGLE:
+            problem = "rad is more than two turns; the unit is rad, use np.radians(q) for degrees"
             raise InvalidValueError(f"q of joint {joint + 1}", values[joint], problem)
         return values

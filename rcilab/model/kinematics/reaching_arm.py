@@ -1,4 +1,4 @@
-"""Which joint angles bring the tool of an arm to a pose, and what is in the way of a pose that none brings it to."""
+"""Inverse kinematics of an arm with its tool, and why a pose cannot be reached."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rcilab.model.kinematics.closest_pose import ClosestPose, closest_reachable
 from rcilab.model.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 from rcilab.model.kinematics.inverse_search import InverseSearch
-from rcilab.model.kinematics.moving_arm import MOST_ANGLE, MovingArm
+from rcilab.model.kinematics.moving_arm import MAX_ANGLE, MovingArm
 from rcilab.model.kinematics.solution_batch import SolutionBatch, as_pose_batch
 from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.kinematics.solvers.solver import KinematicsSolver, Redundancy
@@ -32,7 +32,7 @@ class ReachingArm(MovingArm):
         T_tool_stiffness: Pose of the stiffness frame in the tool frame.
 
     Raises:
-        InvalidValueError: A pose is none.
+        InvalidValueError: A pose is not valid.
     """
 
     def __init__(self, description: RobotDescription, T_flange_tool: Pose, T_tool_stiffness: Pose) -> None:
@@ -42,7 +42,7 @@ class ReachingArm(MovingArm):
 
     @property
     def redundancy(self) -> Redundancy:
-        """What a pose of the tool leaves open: nothing (then it is false), the arm angle, or the angle of a joint."""
+        """The redundancy at a pose of the tool: none (false), the arm angle, or the angle of a joint."""
         return self.solver.redundancy
 
     @property
@@ -53,20 +53,20 @@ class ReachingArm(MovingArm):
     def inverse(self, T: Pose | ArrayLike, psi: float | None = None, near: ArrayLike | None = None) -> Solutions:
         """Returns every solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
-        The xMates have 8 solutions at an arm angle. The Panda has offsets, and up to 16 or none: the roots of a
-        polynomial, which takes a millisecond or two. Where two of them are about to meet, one may be taken for both;
-        the one next to `near` is always found. An arm without closed form is solved by iteration: every solution given
-        is exact, but one may be missing.
+        The xMates have 8 solutions at an arm angle. The Panda has offsets and 0 to 16 solutions, the roots of a
+        polynomial, which takes one or two milliseconds. Of two that almost coincide one may be missing; the one next
+        to `near` is always found. An arm without closed form is solved by iteration: every returned solution is exact,
+        but some may be missing.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
             psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
                 and if nothing is inside the limits there, the closest arm angle that has a solution, a little inside
                 its range.
-            near: Joint angles, [rad], that decide what a singular pose leaves open.
+            near: Joint angles, [rad], that resolve the ambiguity of a singular pose.
 
         Raises:
-            UnreachableError: The pose is out of reach, or every branch breaks a joint limit; the message says by how
+            UnreachableError: The pose is out of reach, or every branch exceeds a joint limit; the message says by how
                 much, and `.distance`, `.joint` and `.excess` hold the numbers.
             InvalidValueError: T, psi or near is not usable, or psi was given for a 6-axis arm.
         """
@@ -77,8 +77,8 @@ class ReachingArm(MovingArm):
         guess = None if near is None else self._floats(near)
         if psi is not None and not math.isfinite(psi := as_number(psi, "psi", "rad")):
             raise InvalidValueError("psi", psi, "must be finite [rad]")
-        if psi is not None and abs(psi) > MOST_ANGLE:
-            raise InvalidValueError("psi", psi, "is more than two turns; it is wanted in rad")
+        if psi is not None and abs(psi) > MAX_ANGLE:
+            raise InvalidValueError("psi", psi, "is more than two turns; the unit is rad")
         if psi is not None and not self.redundancy:
             name = self.description.name
             problem = f"has no meaning for {name}: a 6-axis arm has no arm angle"
@@ -86,11 +86,11 @@ class ReachingArm(MovingArm):
         return self._search.solve(self._flange(pose), psi, guess)
 
     def closest(self, T: Pose | ArrayLike, near: ArrayLike, psi: float | None = None) -> ClosestPose:
-        """Returns joint angles for a target, or for the closest pose to it that the arm can take.
+        """Returns joint angles for a target, or for the closest reachable pose.
 
         Args:
             T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            near: Present joint angles, shape (n,), [rad]: where to start from, and which branch to stay on.
+            near: Present joint angles, shape (n,), [rad]: the start of the search and its branch.
             psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
 
         Raises:
@@ -116,7 +116,7 @@ class ReachingArm(MovingArm):
             `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
 
         Raises:
-            InvalidValueError: T or psi has another shape, is not finite, or holds what is no pose.
+            InvalidValueError: T or psi has another shape, is not finite, or contains an invalid pose.
         """
         poses = as_pose_batch(T)
         angles = np.asarray(psi, dtype=np.float64)
@@ -129,11 +129,11 @@ class ReachingArm(MovingArm):
         return SolutionBatch(self.solver.batch(flange, angles), joint.lower, joint.upper)
 
     def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
-        """Returns which arm angles a pose leaves to a 7-axis arm, and what forbids the others.
+        """Returns the feasible arm angles of a 7-axis arm at a pose, and what forbids the others.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            box: What the tool shall stay in; nothing when absent.
+            box: Safety box of the tool; none when absent.
 
         Returns:
             `.feasible`: ranges of arm angles, [rad]; `.arcs`: the whole circle, each part with its reasons.
@@ -160,18 +160,18 @@ class ReachingArm(MovingArm):
         return self.solver.arm_angle(self._floats(q))
 
     def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
-        """Returns the circle on which the elbow can go round while the tool stays, for a 7-axis xMate.
+        """Returns the circle on which the elbow of a 7-axis xMate can move while the tool stays.
 
         Args:
             q: Joint angles, shape (7,), [rad].
 
         Raises:
             SingularError: The arm is stretched, or shoulder and wrist are above each other.
-            KinematicsError: The arm has 6 axes, or offsets: then its elbow goes round on no circle.
+            KinematicsError: The arm has 6 axes, or offsets, with which its elbow does not move on a circle.
         """
         self._require_arm_angle()
         if self.redundancy.kind != "arm_angle":
-            raise KinematicsError(f"{self.description.name} has offsets: its elbow does not go round on a circle")
+            raise KinematicsError(f"{self.description.name} has offsets: its elbow does not move on a circle")
         frames = self.joint_frames(q)
         return elbow_circle(*(frames[joint].position for joint in (0, 2, 4)))
 

@@ -1,4 +1,4 @@
-"""Every branch of the inverse at many poses, and the check of the poses."""
+"""All branches of the inverse at many poses, and the validation of the poses."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def as_pose_batch(value: ArrayLike) -> Array:
     """Returns checked homogeneous transforms, shape (N, 4, 4).
 
     Raises:
-        InvalidValueError: They have another shape, or one of them is no proper rigid transform; the message says which.
+        InvalidValueError: They have another shape, or one is not a proper rigid transform; the message says which.
     """
     T = np.asarray(value, dtype=np.float64)
     if T.ndim != 3 or T.shape[1:] != (4, 4) or not len(T):
@@ -97,7 +97,7 @@ def as_pose_batch(value: ArrayLike) -> Array:
         good &= T[:, 3, column] == value
     if not good.all():
         row = int(np.argmin(good))
-        Pose.from_matrix(T[row])  # It names what is wrong with most of them.
+        Pose.from_matrix(T[row])  # Its error is more specific than the one below.
         raise InvalidValueError(f"T at row {row} (from 0)", T[row].tolist(), "is not a proper rigid transform")
     return T
 

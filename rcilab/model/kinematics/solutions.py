@@ -1,4 +1,4 @@
-"""What the inverse answers with: every analytic branch, and which of them the arm can stand in."""
+"""Solutions of the inverse: every analytic branch, and which of them are inside the joint limits."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ class Solutions(Sequence[JointVector]):
 
     @property
     def all(self) -> tuple[Branch, ...]:
-        """Every analytic branch, with what forbids it; judged at the first look."""
+        """Every analytic branch with the joint that forbids it; computed on first access."""
         if self._all is None:
-            self._all = tuple(_judge(q, self._lower, self._upper) for q in self._branches)
+            self._all = tuple(_branch(q, self._lower, self._upper) for q in self._branches)
         return self._all
 
     def __len__(self) -> int:
@@ -89,14 +89,14 @@ class Solutions(Sequence[JointVector]):
         return readonly_copy(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
 
     def refusal(self, *, everywhere: bool = False) -> UnreachableError:
-        """Returns the error that says which joint limit is in the way, for the branch that comes closest.
+        """Returns the error that names the joint limit that is exceeded, for the branch that exceeds it least.
 
         Args:
             everywhere: Whether no other arm angle does better either.
         """
         if not self.all:
             where = "" if self.psi is None else f" at arm angle {degrees(self.psi):.1f} deg"
-            error = UnreachableError(f"no joint angles put the tool there{where}; give another arm angle")
+            error = UnreachableError(f"no joint angles put the tool there{where}; use another arm angle")
             return error.coded("no_angles")
         best = min(self.all, key=lambda branch: branch.excess)
         joint = best.joint or 1
@@ -137,7 +137,7 @@ def _is_inside(q: tuple[float, ...], lower: list[float], upper: list[float]) -> 
     return True
 
 
-def _judge(q: tuple[float, ...], lower: list[float], upper: list[float]) -> Branch:
+def _branch(q: tuple[float, ...], lower: list[float], upper: list[float]) -> Branch:
     joint, worst = None, 0.0
     for number, (angle, low, high) in enumerate(zip(q, lower, upper, strict=True), start=1):
         if not low < angle < high:

@@ -1,4 +1,4 @@
-"""Where an arm can bring its tool at all, as a cloud of samples."""
+"""The workspace of an arm as random samples."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.model.kinematics.manipulability import ManipulabilityPath, dexterity_path
 from rcilab.model.kinematics.moving_arm import MovingArm
 
-_MOST = 1_000_000  # Samples; tuning value: some 200 MB while they are made.
+_MOST = 1_000_000  # Samples: they take about 200 MB while they are computed.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Workspace:
-    """Configurations spread over the joint ranges, and where they put the tool. N of them."""
+    """N configurations spread over the joint ranges, and the tool positions."""
 
     q: JointPath
     """Joint angles, shape (N, n), [rad]."""
     position: Array
     """Origin of the tool in base, shape (N, 3), [m]."""
     dexterity: ManipulabilityPath
-    """How well the tool can be moved there."""
+    """Manipulability there."""
 
     def __len__(self) -> int:
         return len(self.q)
@@ -46,12 +46,12 @@ def sample_workspace(
         arm: The arm with its tool.
         lower: Smallest joint angles, shape (n,), [rad].
         upper: Largest joint angles, shape (n,), [rad].
-        count: How many configurations to try.
-        seed: Of the random numbers.
-        box: Only samples with the tool in it are kept; all when absent or not active.
+        count: Number of configurations to try.
+        seed: Seed of the random numbers.
+        box: Keeps only samples with the tool in it; all when absent or not active.
 
     Raises:
-        InvalidValueError: `count` is no whole number from 1 to 1 000 000, `seed` none from 0 on, or the box is none.
+        InvalidValueError: `count` is not from 1 to 1 000 000, `seed` is negative, or the box is not valid.
     """
     if not isinstance(count, int | np.integer) or not 1 <= count <= _MOST:
         raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MOST}")

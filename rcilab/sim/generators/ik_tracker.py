@@ -36,7 +36,7 @@ class IkTracker:
             SingularError: The arm is at a singularity there; the message says at which.
         """
         flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
-        q = self._solver.beside(flange, psi, near)
+        q = self._solver.solve_near(flange, psi, near)
         if q is None:
             self._solver.at(flange, near).branches(psi)  # Raises the error that says by how much.
             raise UnreachableError("no joint angles near the last ones put the tool there")

@@ -21,7 +21,7 @@ from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Remark
-from rcilab.motion.speed_scaling import SLOWEST_PACE
+from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
@@ -50,7 +50,12 @@ class RunPanel:
         text, ask = self._text, self._ask
         self._planned = Html(gui)
         pace = gui.add_slider(
-            text("run.pace"), 100.0 * SLOWEST_PACE, 100.0, 5.0, 100.0 * state.drive.pace, hint=text("run.pace_hint")
+            text("run.pace"),
+            100.0 * MIN_SPEED_OVERRIDE,
+            100.0,
+            5.0,
+            100.0 * state.drive.pace,
+            hint=text("run.pace_hint"),
         )
         self._pace = BoundControl(pace, ask, lambda v, p: SetDrive(page=p, pace=float(v) / 100.0))
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)

@@ -12,11 +12,11 @@ from rcilab.model.dynamics.payload import Payload
 @pytest.mark.parametrize(
     ("facts", "said"),
     [
-        ({"mass": 2500}, r"load mass: 2500.0 must be from 0 to 100 \[kg\]"),
+        ({"mass": 2500}, r"load mass must be from 0 to 100 \[kg\], got 2500.0"),
         ({"mass": -1}, "must be from 0 to 100"),
         ({"mass": float("nan")}, "must be from 0 to 100"),
-        ({"mass": "2kg"}, r"load mass: '2kg' is not a number \[kg\]"),
-        ({"mass": 1, "center_of_mass": [0, 0, 100]}, "farther than 5 m; give metres"),
+        ({"mass": "2kg"}, r"load mass must be a number \[kg\], got '2kg'"),
+        ({"mass": 1, "center_of_mass": [0, 0, 100]}, "farther than 5 m; the unit is metres"),
     ],
 )
 def test_grams_millimetres_and_words_are_refused(facts, said):
@@ -28,6 +28,6 @@ def test_grams_millimetres_and_words_are_refused(facts, said):
 def test_an_inertia_that_is_none_is_refused_in_plain_text(inertia):
     with pytest.raises(InvalidValueError) as caught:
         Payload(mass=1.0, inertia=inertia)
-    assert str(caught.value).startswith("load inertia: ")
+    assert str(caught.value).startswith(("load inertia ", "load inertia: "))
     assert "array(" not in str(caught.value)
     assert "dtype" not in str(caught.value)

@@ -59,7 +59,7 @@ def test_every_link_has_a_possible_inertia(name):
 
 
 def test_a_load_that_is_none_is_refused():
-    with pytest.raises(InvalidValueError, match="load mass: -1"):
+    with pytest.raises(InvalidValueError, match=r"load mass must be .*, got -1"):
         Payload(mass=-1.0)
     with pytest.raises(InvalidValueError, match="symmetric"):
         Payload(mass=1.0, inertia=[[1, 2, 0], [0, 1, 0], [0, 0, 1]])

@@ -219,5 +219,5 @@ def test_a_pose_with_a_joint_right_at_its_limit_is_refused_in_words() -> None:
 
 def test_an_arm_angle_in_degrees_is_refused():
     model = load_model("xMatePro7")
-    with pytest.raises(InvalidValueError, match=r"psi: 30\.0 is more than two turns; it is wanted in rad"):
+    with pytest.raises(InvalidValueError, match=r"psi: 30\.0 is more than two turns; the unit is rad"):
         model.inverse(model.forward(model.home), psi=30)

@@ -54,11 +54,11 @@ def test_what_counts_as_singular_on_a_path_is_what_counts_for_one_configuration(
 
 @settings(max_examples=40)
 @given(names, seeds)
-def test_the_solution_beside_the_last_angles_is_the_arm_itself(name, seed):
+def test_the_solution_near_the_last_angles_is_the_arm_itself(name, seed):
     model, rng = MODELS[name], np.random.default_rng(seed)
     arm = build_solver(model.description)
     q = model.home + rng.uniform(-0.15, 0.15, model.n)
     near = q + rng.uniform(-2e-3, 2e-3, model.n)
     psi = arm.arm_angle(q.tolist()) if model.n == 7 else 0.0
-    assert arm.beside(model.forward(q), psi, near.tolist()) == pytest.approx(q.tolist(), abs=1e-10)
-    assert arm.beside(Pose((9.0, 0.0, 0.0)), psi, near.tolist()) is None
+    assert arm.solve_near(model.forward(q), psi, near.tolist()) == pytest.approx(q.tolist(), abs=1e-10)
+    assert arm.solve_near(Pose((9.0, 0.0, 0.0)), psi, near.tolist()) is None

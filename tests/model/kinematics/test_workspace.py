@@ -60,13 +60,13 @@ def test_a_box_keeps_the_samples_inside_it():
 
 @pytest.mark.parametrize("count", [0, -5, 10**7, 2.5, "many", None])
 def test_a_count_that_is_none_or_out_of_range_is_refused(count):
-    with pytest.raises(InvalidValueError, match=r"count: .* must be a whole number from 1 to 1000000"):
+    with pytest.raises(InvalidValueError, match=r"count must be a whole number from 1 to 1000000"):
         load_model("xMatePro7").sample_workspace(count)
 
 
 @pytest.mark.parametrize("seed", [-1, "many", 2.5, None])
 def test_a_seed_that_is_none_is_refused(seed):
-    with pytest.raises(InvalidValueError, match=r"seed: .* must be a whole number, 0 or more"):
+    with pytest.raises(InvalidValueError, match=r"seed must be a whole number, 0 or more"):
         load_model("xMatePro7").sample_workspace(10, seed=seed)
 
 

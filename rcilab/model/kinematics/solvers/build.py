@@ -1,4 +1,4 @@
-"""Which solver an arm gets, by its Denavit-Hartenberg table."""
+"""Selection of an arm's solver by its Denavit-Hartenberg table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rcilab.robots.description import RobotDescription
 
 @lru_cache(maxsize=16)
 def build_solver(description: RobotDescription) -> KinematicsSolver:
-    """Returns the closed-form solver for the build of an arm, or the numeric one where there is no closed form.
+    """Returns the closed-form solver for the geometry of an arm, or the numeric one if there is none.
 
     Raises:
         ModelError: The arm has more than 7 joints.

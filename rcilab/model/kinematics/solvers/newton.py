@@ -1,4 +1,4 @@
-"""Newton's method for any chain, one joint held or none: joint angles next to guesses that put the flange at poses."""
+"""Newton's method for any chain, with one joint held or none: it refines guesses to joint angles for flange poses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, forward
 from rcilab.model.kinematics.jacobian import tool_jacobian
 
-_ROUNDS = 12  # Of Newton's method; beside the stretched arm two solutions meet, and the first steps only halve.
+_ROUNDS = 12  # Of Newton's method; near the stretched arm two solutions meet, and the first steps only halve.
 _SLOW_ROUNDS = 40
 _LONGEST = 0.5  # [rad] Of its steps.
 _ALMOST = 3e-7  # [m] and [rad] What is missing before a step that leaves rounding, as each squares it.
@@ -22,10 +22,10 @@ _FARTHEST = 1.2  # [rad] A step of one alone that leaves its guess.
 _SETTLED = 1e-12  # [m] and [rad] What counts as the pose for one alone.
 
 
-def settle(
+def refine(
     chain: Chain, held: int | None, rotations: Array, positions: Array, q: Array, *, slowly: bool = False
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns joint angles next to guesses that put the flange at poses, by Newton's method.
+    """Returns joint angles near guesses that put the flange at poses, by Newton's method.
 
     Args:
         chain: From `build_chain`.
@@ -33,7 +33,7 @@ def settle(
         rotations: Flange in base, shape (M, 3, 3).
         positions: Flange in base, shape (M, 3), [m].
         q: Guesses, shape (M, n), [rad].
-        slowly: Whether to go on until rounding stops it, as it takes where two solutions are about to meet.
+        slowly: Whether to iterate until rounding stops it, which is needed where two solutions almost coincide.
 
     Returns:
         Joint angles, shape (M, n), [rad], and which of them are solutions, shape (M,).
@@ -56,10 +56,10 @@ def settle(
     return q, np.abs(miss).max(axis=1) < _GOOD
 
 
-def settle_beside(
+def refine_near(
     chain: Chain, held: int | None, rotation: Array, position: Array, psi: float, guess: Sequence[float]
 ) -> list[float] | None:
-    """Returns the joint angles of one pose next to a guess, n plain floats, [rad], or None where there are none.
+    """Returns the joint angles of one pose near a guess, n plain floats, [rad], or None without a solution.
 
     Args:
         chain: From `build_chain`.

@@ -1,7 +1,7 @@
 """The inverse along a whole path by Newton's method: one branch, followed without a jump.
 
-What `spherical/branch.py` does in closed form. A few rows are settled one after the other, each from the one
-before; between them the joint angles are guessed by straight lines, and Newton's method settles all rows at once.
+The numeric counterpart of `spherical/branch.py`. A few rows are solved one after the other, each from the one before;
+between them the joint angles are interpolated linearly, and Newton's method refines all rows at once.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain
-from rcilab.model.kinematics.solvers.newton import settle, settle_beside
+from rcilab.model.kinematics.solvers.newton import refine, refine_near
 from rcilab.model.kinematics.solvers.solver import Angles, BranchEnd
 
-_KNOTS = 48  # Rows that are settled one by one. Tuning value: a few ms, and guesses good to a hundredth of a radian.
-_TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are settled first.
-_JUMP = 0.6  # [rad] From row to row: beyond it the arm does not follow but changes branches.
+_KNOTS = 48  # Rows that are solved one by one: takes a few ms, and gives guesses good to a hundredth of a radian.
+_TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are solved first.
+_JUMP = 0.6  # [rad] From row to row: a larger step is a change of branch.
 
 
 def follow_by_newton(
@@ -32,7 +32,7 @@ def follow_by_newton(
     psi: Array,
     start: JointVector,
 ) -> tuple[JointPath, BranchEnd | None]:
-    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
+    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not checked.
 
     Args:
         chain: From `build_chain`.
@@ -44,9 +44,9 @@ def follow_by_newton(
         start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], and the first row that has none, or None. From that row on they mean nothing.
+        Joint angles, shape (N, n), [rad], meaningless from the first row without solution on, and that row, or None.
     """
-    march = _March(chain, held, rotations, positions, psi)
+    march = _RowByRow(chain, held, rotations, positions, psi)
     known = march.run(start)
     rows = np.arange(len(psi))
     places = sorted(known)
@@ -54,7 +54,7 @@ def follow_by_newton(
     guess = np.stack([np.interp(rows, places, column) for column in table.T], axis=1)
     if held is not None:
         guess[:, held] = psi
-    q, settled = settle(chain, held, rotations, positions, guess)
+    q, settled = refine(chain, held, rotations, positions, guess)
     q[places] = table
     settled[places] = True
     lost = ~settled
@@ -67,8 +67,8 @@ def follow_by_newton(
     return q, BranchEnd(row, _reason(solve, rotations[row], positions[row], float(psi[row]), held))
 
 
-class _March:
-    """Settles a few rows of a path one after the other."""
+class _RowByRow:
+    """Solves a few rows of a path one after the other."""
 
     def __init__(self, chain: Chain, held: int | None, rotations: Array, positions: Array, psi: Array) -> None:
         self._chain, self._held = chain, held
@@ -109,7 +109,7 @@ class _March:
     def _settled(self, row: int, guess: list[float]) -> list[float] | None:
         """Returns the solution at a row next to a guess, or None, in plain floats."""
         psi = float(self._psi[row])
-        return settle_beside(self._chain, self._held, self._rotations[row], self._positions[row], psi, guess)
+        return refine_near(self._chain, self._held, self._rotations[row], self._positions[row], psi, guess)
 
 
 def _reason(

@@ -1,4 +1,4 @@
-"""The inverse kinematics of one arm, whatever its build: the protocol that every solver implements."""
+"""The protocol of inverse kinematics that every solver implements."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Angles: TypeAlias = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Redundancy:
-    """What a pose of the flange leaves open, and so what the redundancy angle `psi` of an arm is."""
+    """The redundancy of an arm at a pose of the flange, and so the meaning of its redundancy angle `psi`."""
 
     kind: Literal["none", "arm_angle", "joint"]
-    """"arm_angle": the elbow's place on its circle around the shoulder-wrist line; "joint": the angle of one joint."""
+    """"arm_angle": the elbow's angle on its circle around the shoulder-wrist line; "joint": the angle of one joint."""
     joint: int | None = None
     """Which joint, counted from 1; None unless the kind is "joint"."""
 
@@ -33,7 +33,7 @@ ARM_ANGLE = Redundancy("arm_angle")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """Lengths of an arm without offsets that reaches as far, [m]."""
+    """Lengths of an arm without offsets with the same reach, [m]."""
 
     shoulder: float
     """Height of the shoulder above the base."""
@@ -71,16 +71,16 @@ class KinematicsSolver(Protocol):
 
     @property
     def redundancy(self) -> Redundancy:
-        """What a pose leaves open."""
+        """The redundancy of the arm."""
         ...
 
     @property
     def envelope(self) -> Envelope:
-        """Lengths of an arm without offsets that reaches as far."""
+        """Lengths of an arm without offsets with the same reach."""
         ...
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
-        """Returns the inverse at a pose; `near` decides what a singular pose leaves open.
+        """Returns the inverse at a pose; `near` resolves the ambiguity of a singular pose.
 
         Raises:
             UnreachableError: The pose is out of reach at every redundancy angle.
@@ -105,11 +105,11 @@ class KinematicsSolver(Protocol):
         ...
 
     def singularity(self, q: Sequence[float]) -> str | None:
-        """Returns the description of the singularity at a configuration, or None where there is none."""
+        """Returns the description of the singularity at a configuration, or None."""
         ...
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns how near N configurations are to a singularity, shape (N,); at 1 and above they count as singular."""
+        """Returns the closeness of N configurations to a singularity, shape (N,); 1 and above counts as singular."""
         ...
 
     def is_singular(self, q: Sequence[float]) -> bool:
@@ -117,7 +117,7 @@ class KinematicsSolver(Protocol):
         ...
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
-        """Returns the solutions at N poses, shape (N, branches, n), [rad]; NaN where there are none."""
+        """Returns the solutions at N poses, shape (N, branches, n), [rad]; NaN without a solution."""
         ...
 
     def follow(
@@ -137,15 +137,15 @@ class KinematicsSolver(Protocol):
         """
         ...
 
-    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
-        """Returns the joint angles of a pose closest to those of the cycle before, [rad], or None if there are none.
+    def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles of a pose closest to those of the previous cycle, [rad], or None.
 
         Joint limits are not checked; full turns are counted.
 
         Args:
             T_base_flange: Pose of the flange.
             psi: Redundancy angle, [rad].
-            near: Joint angles of the cycle before, n plain floats, [rad].
+            near: Joint angles of the previous cycle, n plain floats, [rad].
         """
         ...
 

@@ -14,15 +14,15 @@ from rcilab.model.kinematics.solvers.spherical7 import SphericalSeven, closest_b
 
 
 class SphericalSix(SphericalSeven):
-    """6 axes with a spherical wrist: 8 branches, and no arm angle, whatever `psi` says."""
+    """6 axes with a spherical wrist: 8 branches and no arm angle; `psi` has no effect."""
 
     redundancy = NO_REDUNDANCY
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
-        """Returns the inverse at a pose, which is not looked at yet."""
+        """Returns the inverse at a pose, computed on demand."""
         return _SixAxisPose(self.geometry, T_base_flange, near)
 
-    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+    def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those before, [rad]."""
         try:
             return closest_branch(inverse_six(self.geometry, T_base_flange, near), near, (2, 4))
@@ -30,15 +30,15 @@ class SphericalSix(SphericalSeven):
             return None
 
     def arm_angle(self, q: Sequence[float]) -> float:
-        """Raises KinematicsError: there is none."""
+        """Raises KinematicsError: the arm has no arm angle."""
         raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
     def arm_angle_path(self, q: JointPath) -> Array:
-        """Raises KinematicsError: there are none."""
+        """Raises KinematicsError: the arm has no arm angle."""
         raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
-        """Raises KinematicsError: there are none."""
+        """Raises KinematicsError: the arm has no arm angle."""
         raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
 

@@ -35,7 +35,7 @@ class SphericalSeven:
         )
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
-        """Returns the inverse at a pose, which is not looked at yet."""
+        """Returns the inverse at a pose, computed on demand."""
         return _SphericalPose(self.geometry, T_base_flange, near)
 
     def arm_angle(self, q: Sequence[float]) -> float:
@@ -47,7 +47,7 @@ class SphericalSeven:
         return arm_angle_path(self.geometry.upper, self.geometry.fore, q)
 
     def singularity(self, q: Sequence[float]) -> str | None:
-        """Returns the description of the singularity at a configuration, or None where there is none."""
+        """Returns the description of the singularity at a configuration, or None."""
         return find_singularity(self.geometry, q)
 
     def singularity_path(self, q: JointPath) -> Array:
@@ -68,7 +68,7 @@ class SphericalSeven:
         """Returns the joint angles along a path."""
         return follow_branch(self.geometry, rotations, positions, psi, start)
 
-    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+    def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those before, [rad]."""
         try:
             branches = inverse_seven(self.geometry, T_base_flange, psi, near, self._near_flips(near))

@@ -101,12 +101,12 @@ def test_without_a_world_there_is_no_second_line() -> None:
 @pytest.mark.parametrize(
     ("option", "value", "message"),
     [
-        ("--loss", "1.5", r"--loss: 1\.5 needs 0 to 1"),
-        ("--delay", "nan", "--delay: nan must be a finite number"),
-        ("--tcp-split", "-1", "--tcp-split: -1 needs a whole number"),
+        ("--loss", "1.5", r"--loss needs 0 to 1.*, got 1\.5"),
+        ("--delay", "nan", "--delay must be a finite number.*, got nan"),
+        ("--tcp-split", "-1", "--tcp-split needs a whole number.*, got -1"),
         ("--faults-on", "tcp", "--faults-on: 'tcp' is unknown; known: both, commands, states"),
-        ("--stall", "soon", r"--stall: 'soon' needs seconds, as 0\.05@2\.0"),
-        ("--stall", "9", "duration: 9.0 needs 0.001 to 5"),
+        ("--stall", "soon", r"--stall needs seconds, as 0\.05@2\.0.*, got 'soon'"),
+        ("--stall", "9", "duration needs 0.001 to 5.*, got 9.0"),
         ("--stall", "0.5/0.1", "period: 0.1 needs"),
         ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
         ("--world-port", "70000", "--world-port: 70000 is no port"),

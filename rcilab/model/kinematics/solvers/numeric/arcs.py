@@ -12,7 +12,7 @@ from rcilab.core.arrays import Array, JointPath
 from rcilab.core.errors import UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs, Reason
-from rcilab.model.kinematics.solvers.newton import settle
+from rcilab.model.kinematics.solvers.newton import refine
 from rcilab.model.kinematics.solvers.numeric.search import NumericArm, search
 
 _GRID = 120  # Angles of the held joint: 3 degrees; smaller ranges may be overlooked.
@@ -118,7 +118,7 @@ class _Grid:
     def _settled(self, psi: Array, guesses: Array) -> tuple[Array, NDArray[np.int64]]:
         guesses = guesses.copy()
         guesses[:, self._held] = psi
-        return self._coded(*settle(self._arm.chain, self._held, *self._poses(len(psi)), guesses))
+        return self._coded(*refine(self._arm.chain, self._held, *self._poses(len(psi)), guesses))
 
     def _poses(self, count: int) -> tuple[Array, Array]:
         return np.broadcast_to(self._rotation, (count, 3, 3)), np.broadcast_to(self._position, (count, 3))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array, JointVector
 from rcilab.model.kinematics.forward import Chain
-from rcilab.model.kinematics.solvers.newton import cross, free_joints, jacobians, settle
+from rcilab.model.kinematics.solvers.newton import cross, free_joints, jacobians, refine
 from rcilab.model.kinematics.solvers.solver import Angles
 
 _STEPS = 18  # Of damped least squares; a start that has not converged by then seldom does.
@@ -107,10 +107,10 @@ def search(arm: NumericArm, rotations: Array, positions: Array, q: Array) -> tup
         q[active[:, None], free] += step
     good = np.zeros(len(q), dtype=np.bool_)
     if close.any():
-        q[close], good[close] = settle(arm.chain, arm.held, rotations[close], positions[close], q[close])
+        q[close], good[close] = refine(arm.chain, arm.held, rotations[close], positions[close], q[close])
         missed = close & ~good
         if missed.any() and not good.any():  # Where solutions are about to meet, Newton's method halves its steps.
-            q[missed], good[missed] = settle(
+            q[missed], good[missed] = refine(
                 arm.chain, arm.held, rotations[missed], positions[missed], q[missed], slowly=True
             )
     return q, good

@@ -14,7 +14,7 @@ from rcilab.model.kinematics.differential import jacobian_path, moving_frame
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 from rcilab.model.kinematics.forward import build_chain
 from rcilab.model.kinematics.jacobian import tool_jacobian
-from rcilab.model.kinematics.solvers.newton import free_joints, settle_beside
+from rcilab.model.kinematics.solvers.newton import free_joints, refine_near
 from rcilab.model.kinematics.solvers.newton_path import follow_by_newton
 from rcilab.model.kinematics.solvers.numeric.arcs import numeric_arcs
 from rcilab.model.kinematics.solvers.numeric.search import NumericArm, search
@@ -64,7 +64,7 @@ class NumericSolver:
         self._scale = np.array((1.0 / self._arm.reach,) * 3 + (1.0,) * 3)
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
-        """Returns the inverse at a pose, which is not computed yet."""
+        """Returns the inverse at a pose, computed on demand."""
         return _NumericPose(self._arm, self.envelope, T_base_flange, near)
 
     def arm_angle(self, q: Sequence[float]) -> float:
@@ -76,7 +76,7 @@ class NumericSolver:
         return q[:, self._redundant()]
 
     def singularity(self, q: Sequence[float]) -> str | None:
-        """Returns the description of the singularity at a configuration, or None where there is none."""
+        """Returns the description of the singularity at a configuration, or None."""
         return "the arm loses a direction of motion" if self.is_singular(q) else None
 
     def singularity_path(self, q: JointPath) -> Array:
@@ -123,10 +123,10 @@ class NumericSolver:
 
         return follow_by_newton(self._arm.chain, held, solve, rotations, positions, angles, start)
 
-    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+    def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those before, [rad]."""
         rotation, position = T_base_flange.rotation, T_base_flange.position
-        return settle_beside(self._arm.chain, self._held, rotation, position, psi, near)
+        return refine_near(self._arm.chain, self._held, rotation, position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible redundancy angles, looked for on a grid."""

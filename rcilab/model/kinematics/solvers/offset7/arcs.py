@@ -1,4 +1,4 @@
-"""Which arm angles a pose leaves to an arm with offsets: read off its self-motion, piece by piece.
+"""The feasible arm angles of an arm with offsets, from its self-motion, piece by piece.
 
 There is no closed form for where a joint passes its limit here. Pieces of the self-motion in which that happens, and
 those between two branches, are cut into shorter ones until the place is known well enough.
@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs, Reason
-from rcilab.model.kinematics.solvers.newton import settle
+from rcilab.model.kinematics.solvers.newton import refine
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
 
 _CUTS = 8  # Into how many a piece is cut at once; tuning value.
 _ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
 _LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
-_SLIVER = 1e-4  # [rad] What is not worth an arc of its own.
+_SLIVER = 1e-4  # [rad] Shorter arcs are merged.
 _GRID = 1e-9  # [rad] Ends of pieces that differ by less meet.
 _SINGULAR = 1 << 7
-"""What stands for a singularity beside the bits of the joints."""
+"""Bit of a singularity, after the bits of the joints."""
 _NOWHERE = 1 << 8
-"""In place of a set of joints: no branch is there."""
+"""Code of an angle without a branch."""
 
 
 def feasible_offset_arcs(
@@ -100,7 +100,7 @@ def _pieces(
         whole = whole.reshape(between.shape)
         q = whole.reshape(-1, 7)
         codes = broken(q, held_singularity_path(arm, q)).reshape(_CUTS + 1, -1)
-        good = np.abs(whole - between).max(axis=2) < 2.0 * _LONG  # Not so where there is no number.
+        good = np.abs(whole - between).max(axis=2) < 2.0 * _LONG  # False for NaN.
         both = good[:-1] & good[1:]
         starts, ends, before, after = whole[:-1][both], whole[1:][both], codes[:-1][both], codes[1:][both]
         branches = np.broadcast_to(branches[cut], (_CUTS, int(cut.sum())))[both]
@@ -120,7 +120,7 @@ def _placed(
     count = int((~on).sum())
     rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
     positions = np.broadcast_to(T_base_flange.position, (count, 3))
-    found, settled = settle(arm.chain, ELBOW, rotations, positions, guesses[~on])
+    found, settled = refine(arm.chain, ELBOW, rotations, positions, guesses[~on])
     found[~settled] = np.nan
     whole[~on] = found
     return whole

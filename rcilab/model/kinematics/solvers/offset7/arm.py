@@ -167,7 +167,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
         q7: Angles of joint 7, shape (K,), [rad].
 
     Returns:
-        Shape (2, 2, K, 7), [rad], not a number where there are none: joint 4 above the flip or below, cos q5 positive
+        Shape (2, 2, K, 7), [rad], NaN without a solution: joint 4 above the flip or below, cos q5 positive
         or negative, joint 2 positive; and how far the wrist is out of reach, shape (K,), [m], below zero within.
     """
     c7, s7 = np.cos(q7)[:, None], np.sin(q7)[:, None]

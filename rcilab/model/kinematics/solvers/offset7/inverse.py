@@ -11,7 +11,7 @@ along the forearm. What is left is the angle of joint 6, which turns f in a plan
 Both are linear in the sine and cosine of joint 6, whose squares add up to 1. That leaves H0 + H1 S = 0, hence
 H0^2 - (1 - C^2) H1^2 = 0, where H0, H1 and the cosine C are trigonometric polynomials in joint 7. The whole is one of
 degree 8, as it has to be with 16 solutions: what is above cancels (found by evaluation, and held by a test). Its values
-at a few angles of joint 7 give its coefficients, and its sign on a fine grid tells where the roots are.
+at a few angles of joint 7 give its coefficients, and its sign changes on a fine grid bracket the roots.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
-from rcilab.model.kinematics.solvers.newton import settle, settle_beside
+from rcilab.model.kinematics.solvers.newton import refine, refine_near
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, trace, wrapped
 
 DEGREE = 8
@@ -32,7 +32,7 @@ DEGREE = 8
 _NODES = 20
 """Angles of joint 7 at which it is evaluated. Tuning value: 17 determine it, some more even out the rounding."""
 _GRID = 256
-"""Angles at which its sign is looked at. A choice: no two of its extrema lie within a step, but where it is flat."""
+"""Angles at which its sign is evaluated: fine enough that no two extrema lie within a step, unless it is flat."""
 _FLAT, _FINER = 1e-6, 16
 """Below what part of its size it is flat, and into how many parts a step is cut there; tuning value."""
 _CELL = tau / _GRID
@@ -81,17 +81,17 @@ def inverse_held(
         T_base_flange: Pose of the flange in base.
         psi: Angle of joint 3, [rad].
         near: Joint angles, [rad], next to which a solution is looked for, too: where two are about to meet, rounding
-            may hide both. None where there are none.
+            may hide both; or None.
 
     Raises:
         UnreachableError: The pose is out of reach at every angle of joint 3.
     """
     rotation, position = T_base_flange.rotation, T_base_flange.position
     _, q = solve_held(arm, rotation[None], position[None], np.array((psi,)))
-    beside = None if near is None else settle_beside(arm.chain, ELBOW, rotation, position, psi, near)
-    if beside is not None:
+    adjacent = None if near is None else refine_near(arm.chain, ELBOW, rotation, position, psi, near)
+    if adjacent is not None:
         middles = np.array(arm.middles)
-        first = wrapped(np.array(beside) - middles) + middles
+        first = wrapped(np.array(adjacent) - middles) + middles
         q = np.concatenate((first[None], q[np.abs(wrapped(q - first)).max(axis=1) >= _SAME]))
     if not len(q):
         q = _without_a_crossing(arm, T_base_flange, psi)
@@ -110,7 +110,7 @@ def _without_a_crossing(arm: OffsetGeometry, T_base_flange: Pose, psi: float) ->
     guesses[:, ELBOW] = psi
     count, middles = len(guesses), np.array(arm.middles)
     rotations = np.broadcast_to(T_base_flange.rotation, (count, 3, 3))
-    q, good = settle(arm.chain, ELBOW, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses)
+    q, good = refine(arm.chain, ELBOW, rotations, np.broadcast_to(T_base_flange.position, (count, 3)), guesses)
     return wrapped(q[good] - middles) + middles
 
 
@@ -297,12 +297,12 @@ def _joint_angles(
     loose = np.flatnonzero(~small)
     good = np.ones(len(q), dtype=np.bool_)
     if len(loose):
-        q[loose], good[loose] = settle(arm.chain, ELBOW, R[loose], p[loose], q[loose])
+        q[loose], good[loose] = refine(arm.chain, ELBOW, R[loose], p[loose], q[loose])
     return rows[root][good], q[good]
 
 
 def _are_new(rows: NDArray[np.intp], q: Array) -> NDArray[np.bool_]:
-    """Returns which solutions are no repetition of one of the two before; sorted by pose and joint angles."""
+    """Returns which solutions differ from the two before; sorted by pose and joint angles."""
     is_new = np.ones(len(rows), dtype=np.bool_)
     for shift in (1, 2):
         same = rows[shift:] == rows[:-shift]

@@ -1,8 +1,8 @@
-"""How close an arm with offsets is to a pose at which a held elbow no longer decides where the joints go.
+"""Distance of an arm with offsets from configurations at which a held elbow no longer determines the joints.
 
-With joint 3 held six joints are left for six directions; where their Jacobian loses its determinant, two solutions of
-the inverse meet, and commands of pose and elbow tell no more which of them is meant. The maker of the Panda names no
-such condition. It is ours, as the other arms' own is, and for the same reason.
+With joint 3 held, six joints are left for six directions. Where the determinant of their Jacobian is zero, two
+solutions of the inverse meet, and commands of pose and elbow no longer select one of them. The maker of the Panda has
+no such condition. It is rcilab's own, as the corresponding one of the other arms, for the same reason.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
-from rcilab.model.kinematics.solvers.newton import settle_beside
+from rcilab.model.kinematics.solvers.newton import refine_near
 from rcilab.model.kinematics.solvers.newton_path import follow_by_newton
 from rcilab.model.kinematics.solvers.offset7.arcs import feasible_offset_arcs
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry
@@ -34,7 +34,7 @@ class OffsetSeven:
         )
 
     def at(self, T_base_flange: Pose, near: Sequence[float] | None) -> PoseSolver:
-        """Returns the inverse at a pose, which is not looked at yet."""
+        """Returns the inverse at a pose, computed on demand."""
         return _OffsetPose(self.geometry, T_base_flange, near)
 
     def arm_angle(self, q: Sequence[float]) -> float:
@@ -46,7 +46,7 @@ class OffsetSeven:
         return q[:, ELBOW]
 
     def singularity(self, q: Sequence[float]) -> str | None:
-        """Returns the description of the singularity at a configuration, or None where there is none."""
+        """Returns the description of the singularity at a configuration, or None."""
         return "with joint 3 held, the other joints are singular" if self.is_singular(q) else None
 
     def singularity_path(self, q: JointPath) -> Array:
@@ -72,9 +72,9 @@ class OffsetSeven:
 
         return follow_by_newton(self.geometry.chain, ELBOW, solve, rotations, positions, angles, start)
 
-    def beside(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
+    def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those before, [rad]."""
-        return settle_beside(self.geometry.chain, ELBOW, T_base_flange.rotation, T_base_flange.position, psi, near)
+        return refine_near(self.geometry.chain, ELBOW, T_base_flange.rotation, T_base_flange.position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
         """Returns the feasible arm angles, found along the self-motion."""

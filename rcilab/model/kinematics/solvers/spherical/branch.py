@@ -2,9 +2,8 @@
 
 The same mathematics as `inverse.py`, an array for every row. The path starts where the arm is, and that chooses the
 branch. A turn about z before a turn about y is known up to half a turn (Rz(a) Ry(-b) = Rz(a + pi) Ry(b) Rz(pi)); here
-each is taken continuous with the row before, and the tilt gets the sign that belongs to it. So a path that runs exactly
-through a singularity, as those in the vertical plane of the arm do, goes on smoothly; one that passes closely beside is
-told apart.
+each is continuous with the row before, and the tilt gets the matching sign. So a path exactly through a singularity,
+such as those in the vertical plane of the arm, continues smoothly and is distinguished from one that passes close by.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through 
 def follow_branch(
     arm: ArmGeometry, rotations: Array, positions: Array, psi: Column | None, start: JointVector
 ) -> tuple[JointPath, BranchEnd | None]:
-    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not looked at.
+    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not checked.
 
     Args:
         arm: From `build_geometry`.
@@ -42,7 +41,7 @@ def follow_branch(
         start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], and the first row that has none, or None. From that row on they mean nothing.
+        Joint angles, shape (N, n), [rad], meaningless from the first row without solution on, and that row, or None.
     """
     tracker = _Tracker()
     offsets = np.array(arm.offsets)
@@ -129,7 +128,7 @@ def _six(
 
 
 class _Tracker:
-    """Follows azimuths row by row and keeps the first loss."""
+    """Follows azimuths row by row and stores the first row at which one is lost."""
 
     def __init__(self) -> None:
         self.loss: BranchEnd | None = None

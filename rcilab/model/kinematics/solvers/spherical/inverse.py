@@ -82,7 +82,7 @@ def inverse_seven(
         arm: From `build_geometry`.
         T_base_flange: Pose of the flange in base.
         psi: Arm angle, [rad]. Where the shoulder-wrist line is vertical it is counted from base x instead.
-        near: Joint angles, [rad], that decide what a singularity leaves open; None means zeros.
+        near: Joint angles, [rad], that resolve the ambiguity at a singularity; None means zeros.
         flips: Which branches: pi where upright joint 2, 4 or 6 shall be negative, 0 where not.
 
     Raises:
@@ -120,7 +120,7 @@ def inverse_seven(
     q4 = atan2(side, vz)
     rotation = _turn_zy((c1 * c2, -s1, c1 * s2, s1 * c2, c1, s1 * s2, -s2, 0.0, c2), q3, q4)
     q5, q6, q7 = _wrist(rotation, r, guess[4])
-    # Each angle and its twin; two half turns are none.
+    # Each angle and its twin; two half turns cancel.
     twins_1, twins_3 = (_wrap(q1), _wrap(q1 + pi)), (_wrap(q3), _wrap(q3 + pi))
     twins_5, twins_7 = (_wrap(q5), _wrap(q5 + pi)), (_wrap(q7), _wrap(q7 + pi))
     twins_2, twins_4, twins_6 = (q2, -q2), (q4, -q4), (q6, -q6)
@@ -137,7 +137,7 @@ def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | N
     Args:
         arm: From `build_geometry`.
         T_base_flange: Pose of the flange in base.
-        near: Joint angles, [rad], that decide what a singularity leaves open; None means zeros.
+        near: Joint angles, [rad], that resolve the ambiguity at a singularity; None means zeros.
 
     Raises:
         UnreachableError: The wrist centre is out of reach.
