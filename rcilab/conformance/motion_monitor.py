@@ -201,7 +201,7 @@ class Monitor:
         found = self._at_start({"translation": [way], "arm_angle": [math.remainder(turn, math.tau)]})
         found += monitor.broken()
         flange = pose @ self._T_tool_flange if self._has_tool else pose
-        q = self._inverse.beside(flange, self._psi or 0.0, self._on_side(side))
+        q = self._inverse.solve_near(flange, self._psi or 0.0, self._on_side(side))
         if q is None:
             return [*found, self._improper(math.inf)]
         self._q = q

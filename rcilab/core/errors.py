@@ -152,8 +152,8 @@ class RecordedError(RcilabError):
 
     Attributes:
         record: The last cycles before the end, a structured array, one row per cycle; or None.
-        run: The whole motion up to its end, an `rcilab.Run`, to plot, save and replay; None without a motion, or if it ran
-            in another process.
+        run: The whole motion up to its end, an `rcilab.Run`, to plot, save and replay; None without a motion, or
+            if it ran in another process.
     """
 
     run: Any = None

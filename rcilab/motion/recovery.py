@@ -72,7 +72,7 @@ def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> Pl
     where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
     said = (
         f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery leads back "
-        f"from {most}° at most; guide the arm back by hand (start_drag)"
+        f"from {most}° at most; guide the arm back by hand (robot.rci.start_drag())"
     )
     if soft is None:
         return PlanningError(said).coded("recovery_range", **facts)
