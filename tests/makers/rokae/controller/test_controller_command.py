@@ -107,7 +107,7 @@ def test_without_a_world_there_is_no_second_line() -> None:
         ("--faults-on", "tcp", "--faults-on: 'tcp' is unknown; known: both, commands, states"),
         ("--stall", "soon", r"--stall needs seconds, as 0\.05@2\.0.*, got 'soon'"),
         ("--stall", "9", "duration needs 0.001 to 5.*, got 9.0"),
-        ("--stall", "0.5/0.1", "period: 0.1 needs"),
+        ("--stall", "0.5/0.1", "period needs .*, got 0.1"),
         ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
         ("--world-port", "70000", "--world-port: 70000 is no port"),
     ],
