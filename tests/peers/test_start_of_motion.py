@@ -8,13 +8,16 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
+from rcilab.sim.generators.start import SERVO_LENGTH
 from tests.peers import wire
-from tests.peers.arena import PLANTS, arena
+from tests.peers.arena import PLANTS, Arena, arena
 from tests.peers.robot import CARTESIAN_SPACE, DRAG_FREE, Output, Robot
 from tests.peers.wire import State
 
 ROUNDS = 5
 DURATION = 150  # [cycles] of one motion
+LEAN = 3.0
+"""How hard somebody leans on the tool while it yields, up and down in turn, [N]; it then rests 2 to 3 mm off."""
 DRAG = "drag"
 MODES = {
     "joint position": (0, wire.JOINT),
@@ -63,8 +66,12 @@ def swing(mode: tuple[int, int], start: Place) -> Callable[[State], Output]:
     return callback
 
 
-def run(robot: Robot, name: str, start: Place) -> None:
+def run(found: Arena, robot: Robot, name: str, start: Place, lean: float) -> None:
+    """Runs one motion; in impedance modes somebody leans on the tool until it has ended."""
     mode = MODES[name]
+    is_yielding = name.endswith("impedance")
+    if is_yielding:
+        found.between(lambda _: found.plant.push((0.0, 0.0, lean, 0.0, 0.0, 0.0)))
     if mode is None:
         robot.start_drag(CARTESIAN_SPACE, DRAG_FREE)
         before = robot.receive_fresh_state().message_id
@@ -73,6 +80,13 @@ def run(robot: Robot, name: str, start: Place) -> None:
         return
     robot.start_move(*mode)
     robot.control(swing(mode, start))
+    if is_yielding:
+        found.between(lambda _: found.plant.push((0.0,) * 6))
+
+
+def distance(start: Place, reference: Place) -> float:
+    """How far the tool of a start is from that of a reference, [m]."""
+    return math.dist(start[1][3::4], reference[1][3::4])
 
 
 def test_the_sequence_has_every_pair_of_modes() -> None:
@@ -90,8 +104,15 @@ def test_every_mode_begins_after_every_mode(where: str, plant: str) -> None:
         robot.set_joint_impedance((500.0,) * 4 + (100.0,) * 3)
         state = robot.receive_fresh_state()
         first: Place = state.q_c, state.pos_c, state.psi_c[0]
+        leans = itertools.cycle((LEAN, -LEAN))
+        farthest = 0.0
         for _ in range(ROUNDS):
             for name in every_pair(list(MODES)):
                 robot.record_states = False
-                run(robot, name, STARTS[where](robot.receive_fresh_state(), first))
+                state = robot.receive_fresh_state()
+                start = STARTS[where](state, first)
+                farthest = max(farthest, distance(start, (state.q_c, state.pos_c, state.psi_c[0])))
+                run(found, robot, name, start, next(leans))
                 assert not robot.receive_fresh_state().errors
+        # The controller's reference follows an arm that has yielded; only a client's own last command is then off it.
+        assert farthest > SERVO_LENGTH if where == "own last command" else farthest < SERVO_LENGTH
