@@ -324,7 +324,7 @@ def test_a_motion_arrives_over_a_slow_network_that_repeats_every_state() -> None
             assert np.array_equal(peer.receive_live_state().q, MOTION.goal)
             ids = [state.message_id for state in peer.seen]
             assert len(set(ids)) < 0.6 * len(ids)
-        assert found.server.cycle.playout.lost == 0
+        assert found.server.controller.playout.lost == 0
 
 
 def test_no_state_gets_through_until_the_network_is_mended(lockstep: Running) -> None:
