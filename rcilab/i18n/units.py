@@ -30,6 +30,7 @@ _FIXED = {
     "mm": ("m", 1e-3),
     "deg/s": ("rad/s", math.pi / 180.0),
     "mm/s": ("m/s", 1e-3),
+    "rad/s²": ("rad/s^2", 1.0),
 }
 """Variables of the catalogues for numbers of the text itself: SI unit, and how many of it one is."""
 
