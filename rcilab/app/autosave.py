@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rcilab.app.setup.configuration_json import build_setup, setup_facts
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
-from rcilab.core.atomic_file import write_whole
+from rcilab.core.atomic_file import read_own_text, write_whole
 from rcilab.core.errors import RcilabError
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
@@ -80,7 +80,7 @@ class Autosave:
         if self._file is None:
             return None
         try:
-            content: dict[str, Any] = json.loads(self._file.read_text(encoding="utf-8"))
+            content: dict[str, Any] = json.loads(read_own_text(self._file))
             if (content["format"], content["version"]) != (_FORMAT, _VERSION):
                 return None
             self._arms = dict(content["arms"])

@@ -77,6 +77,19 @@ def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> N
         stream.write(text.encode())
 
 
+def read_own_text(file: Path) -> str:
+    """Returns the text of a file that this program writes itself, in a folder of the user.
+
+    Raises:
+        OSError: It cannot be read, or is not a regular file; a named pipe in its place would be waited for without end.
+        UnicodeDecodeError: It is not text.
+    """
+    with open(os.open(file, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
+        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "not a regular file", str(file))
+        return stream.read().decode()
+
+
 def read_whole(file: Path, what: str, most: int) -> bytes:
     """Returns the content of a file.
 

@@ -11,7 +11,7 @@ from typing import Any, cast
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_vector, described, readonly_copy
-from rcilab.core.atomic_file import write_whole
+from rcilab.core.atomic_file import read_own_text, write_whole
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.model.robot_model import RobotModel, require_model
 
@@ -116,7 +116,7 @@ class NamedPoseStore:
 
     def _read(self) -> dict[str, Any]:
         try:
-            text = self.file.read_text(encoding="utf-8")
+            text = read_own_text(self.file)
         except FileNotFoundError:
             return {"format": FORMAT, "version": VERSION, "poses": {}}
         except (OSError, UnicodeDecodeError) as error:

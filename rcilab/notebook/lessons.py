@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from rcilab.core.atomic_file import write_whole
+from rcilab.core.atomic_file import read_own_text, write_whole
 from rcilab.core.errors import UsageError
 
 INDEX = "index.md"
@@ -110,8 +110,8 @@ def _names(name: str) -> Iterator[str]:
 
 def _read_record(folder: Path) -> dict[str, str]:
     try:
-        found = json.loads((folder / _RECORD).read_text(encoding="utf-8"))
-    except (FileNotFoundError, ValueError):
+        found = json.loads(read_own_text(folder / _RECORD))
+    except (OSError, ValueError):
         return {}  # Then every copy that differs counts as edited.
     return {str(name): str(digest) for name, digest in found.items()} if isinstance(found, dict) else {}
 

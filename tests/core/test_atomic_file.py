@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rcilab import check, load_model, plan_joint, simulate
-from rcilab.core.atomic_file import replacing
+from rcilab.core.atomic_file import read_own_text, replacing
 from rcilab.core.errors import UsageError
 from rcilab.motion import Program, Waypoint
 from rcilab.recording.optional_deps import MissingExtraError
@@ -71,6 +71,13 @@ def run():
     with simulate(model) as robot:
         robot.power_on()
         yield robot.execute(plan_joint(model, model.home, model.home + 0.01))
+
+
+def test_a_pipe_in_the_place_of_an_own_file_is_not_waited_for(tmp_path: Path) -> None:
+    file = tmp_path / "own.json"
+    os.mkfifo(file)
+    with pytest.raises(OSError, match="not a regular file"):
+        read_own_text(file)
 
 
 @pytest.mark.parametrize(("ending", "library"), [(".parquet", "pyarrow"), (".mcap", "mcap")])

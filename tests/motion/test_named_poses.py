@@ -86,6 +86,13 @@ def test_a_file_that_is_none_is_named_and_left_alone(file, text, said):
     assert file.read_text() == text
 
 
+def test_a_pipe_in_the_place_of_the_file_is_refused(file):
+    file.parent.mkdir()
+    os.mkfifo(file)
+    with pytest.raises(InvalidValueError, match=r"cannot be read: not a regular file"):
+        NamedPoseStore(PRO7, file).names()
+
+
 def test_a_file_of_another_version_is_left_alone(file):
     file.parent.mkdir()
     file.write_text('{"format": "rcilab poses", "version": 2, "poses": {}}')
