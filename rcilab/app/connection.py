@@ -43,13 +43,13 @@ class Robot(Protocol):
         certificate: Certificate,
         mode: Mode = "joint_position",
         *,
-        pace: float = 1.0,
+        speed_override: float = 1.0,
         stops: int | None = None,
     ) -> PendingRequest:
         """Streams a checked motion; see `rcilab.control_process.Supervisor.execute`."""
         ...
 
-    def set_pace(self, pace: float) -> PendingRequest:
+    def set_speed_override(self, speed_override: float) -> PendingRequest:
         """Sets the speed override of the motion in progress."""
         ...
 

@@ -107,7 +107,7 @@ class SessionConnection:
         except UsageError:  # A cell has just begun to move the arm, or closed the session.
             return self._last
         phase = "fault" if state.faults else "moving" if is_moving else "idle"
-        is_held = phase == "moving" and way is not None and way.pace == 0.0
+        is_held = phase == "moving" and way is not None and way.speed_override == 0.0
         return SupervisorStatus(
             phase=phase,
             code="moving.held" if is_held else phase,
@@ -170,7 +170,7 @@ class SessionConnection:
         certificate: Certificate,
         mode: Mode = "joint_position",
         *,
-        pace: float = 1.0,
+        speed_override: float = 1.0,
         stops: int | None = None,
     ) -> PendingRequest:
         """Streams a checked motion in a thread of the kernel.
@@ -179,11 +179,13 @@ class SessionConnection:
             motion: The motion.
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: How the arm is commanded.
-            pace: Speed override, 0.1 to 1.
+            speed_override: Speed override, 0.1 to 1.
             stops: Not counted here.
         """
         self._progress = None
-        return self._do("execute", lambda: self._session.execute(motion, certificate, mode=mode, pace=pace))
+        return self._do(
+            "execute", lambda: self._session.execute(motion, certificate, mode=mode, speed_override=speed_override)
+        )
 
     def set_up(self, setup: RobotConfiguration) -> PendingRequest:
         """Sends limits or parameters to the controller."""
@@ -215,10 +217,10 @@ class SessionConnection:
         """Restarts the controller, which closes the session."""
         return self._do("reboot", self._session.rci.reboot)
 
-    def set_pace(self, pace: float) -> PendingRequest:
+    def set_speed_override(self, speed_override: float) -> PendingRequest:
         """Sets the speed override of the motion in progress."""
-        self._session.set_pace(pace)
-        return _settled("pace")
+        self._session.set_speed_override(speed_override)
+        return _settled("speed_override")
 
     def pause(self) -> PendingRequest:
         """Holds the motion in progress."""
@@ -289,7 +291,7 @@ def _describe_progress(way: MotionProgress | None) -> dict[str, Any]:
     if way is None:
         return {}
     names = {"motion_time": way.time, "motion_duration": way.duration, "motion_place": way.place}
-    return {**names, "pace": way.pace, "mode": way.mode}
+    return {**names, "speed_override": way.speed_override, "mode": way.mode}
 
 
 def _has_world(session: RobotSession) -> bool:

@@ -24,14 +24,14 @@ _ATTEMPTS = 12  # Candidates that are checked in full, which bounds the time of 
 _PAST = 3  # Rows that the differences of a row reach back to.
 
 
-def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
+def plan_start(motion: Motion, speed_override: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
     """Returns a motion that runs with a speed override from its first row on, checked by the conditions of its mode.
 
     The path is the one that was checked, so safety box and distances need no other check; at 1 nothing does.
 
     Args:
         motion: The motion, checked as planned.
-        pace: `MIN_SPEED_OVERRIDE` to 1.
+        speed_override: `MIN_SPEED_OVERRIDE` to 1.
         model: The arm, with its tool and load.
         mode: How it is commanded.
 
@@ -39,19 +39,27 @@ def plan_start(motion: Motion, pace: float, model: RobotModel, mode: Mode) -> Sp
         InvalidValueError: The override is out of range.
         PlanningError: At this speed it breaks a condition that it keeps as planned, as torques that hold the arm may.
     """
-    paced = start_with_override(motion, require_speed_override(pace))
+    paced = start_with_override(motion, require_speed_override(speed_override))
     if not paced.changed:
         return paced
     broken = _breaches(paced, model, mode)
     if broken:
         raise PlanningError(
-            f"at {100 * pace:.0f} % of its speed this motion would break a condition ({broken[0].condition.id} at "
-            f"t = {broken[0].time:.3f} s) that it keeps as planned; choose another pace"
-        ).coded("pace_breaks", pace=f"{100 * pace:.0f}", id=broken[0].condition.id, time=f"{broken[0].time:.3f}")
+            f"at {100 * speed_override:.0f} % of its speed this motion would break a condition "
+            f"({broken[0].condition.id} at "
+            f"t = {broken[0].time:.3f} s) that it keeps as planned; choose another speed override"
+        ).coded(
+            "pace_breaks",
+            speed_override=f"{100 * speed_override:.0f}",
+            id=broken[0].condition.id,
+            time=f"{broken[0].time:.3f}",
+        )
     return paced
 
 
-def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
+def plan_speed_override(
+    paced: SpeedScaledMotion, cycle: int, speed_override: float, model: RobotModel, mode: Mode
+) -> SpeedScaledMotion:
     """Returns the motion that continues with another speed override from a cycle on, once all conditions allow it.
 
     The path stays the one that was checked, so safety box and distances need no other check. The override that it has
@@ -60,7 +68,7 @@ def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotMod
     Args:
         paced: The motion as it runs so far.
         cycle: The first row that may differ.
-        pace: From 0, to be held, to 1.
+        speed_override: From 0, to be held, to 1.
         model: The arm, with its tool and load.
         mode: How it is commanded.
 
@@ -68,14 +76,15 @@ def plan_pace(paced: SpeedScaledMotion, cycle: int, pace: float, model: RobotMod
         PlanningError: There is no such change from there: the motion arrives before, or uses all of a limit until then.
     """
     for _, candidate in zip(
-        range(_ATTEMPTS), change_speed_override(paced, cycle, pace, model.limits.joint), strict=False
+        range(_ATTEMPTS), change_speed_override(paced, cycle, speed_override, model.limits.joint), strict=False
     ):
         if not _breaches(candidate, model, mode):
             return candidate
     raise PlanningError(
         f"at t = {paced.place_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan there is no way within the "
-        f"limits to go on with {100 * pace:.0f} % of its speed; the motion goes on as it is, stop() always works"
-    ).coded("no_way_to_pace", pace=f"{100 * pace:.0f}")
+        f"limits to go on with {100 * speed_override:.0f} % of its speed; the motion goes on as it is, stop() always "
+        "works"
+    ).coded("no_way_to_pace", speed_override=f"{100 * speed_override:.0f}")
 
 
 def _breaches(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:

@@ -161,4 +161,4 @@ class MotionService:
             self._publisher.say("moving", "moving.held" if switch.holds else "moving")
             self._requests.answer(request)
         else:
-            self._requests.answer(request, UsageError("the change of pace came too late; ask again"))
+            self._requests.answer(request, UsageError("the change of the speed override came too late; ask again"))

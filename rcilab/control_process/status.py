@@ -167,10 +167,10 @@ class SupervisorStatus:
     motion_time: float | None = None
     """Time since the first command of the running (or last) motion, [s]; None before the first one."""
     motion_duration: float | None = None
-    """How long that motion is planned to take, at the pace it has, [s]."""
+    """How long that motion is planned to take, at the speed override it has, [s]."""
     motion_place: float | None = None
     """Where in its plan that motion is, [s]; behind `motion_time` when it ran slower or was held."""
-    pace: float = 1.0
+    speed_override: float = 1.0
     """Part of its planned speed that it runs at, or comes to; 0 when it is held."""
     mode: Mode = "joint_position"
     """How the arm is commanded in it."""

@@ -198,7 +198,7 @@ class Supervisor(Closeable):
                 setup=self._setup.acknowledged,
                 setup_times=self._setup.times,
                 **fields,
-                **self._read_pace(shown),
+                **self._read_override(shown),
                 **self._round_trip.read_fields(),
             )
 
@@ -270,7 +270,7 @@ class Supervisor(Closeable):
         certificate: Certificate,
         mode: Mode = "joint_position",
         *,
-        pace: float = 1.0,
+        speed_override: float = 1.0,
         stops: int | None = None,
     ) -> PendingRequest:
         """Streams a checked motion; the request is done when the arm stands still again.
@@ -282,12 +282,12 @@ class Supervisor(Closeable):
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
                 `rcilab.execution.command_builder`.
-            pace: Part of its planned speed that it runs at from the beginning, 0.1 to 1; `set_pace` changes it later.
+            speed_override: Part of its planned speed that it begins with, 0.1 to 1; `set_speed_override` changes it.
             stops: What `stops` was when somebody wanted this; None: they want it now.
 
         Raises:
-            InvalidValueError: The pace is out of range.
-            PlanningError: At this pace it would break a condition, or last too long.
+            InvalidValueError: The speed override is out of range.
+            PlanningError: At this speed override it would break a condition, or last too long.
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
             UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
                 than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
@@ -302,7 +302,7 @@ class Supervisor(Closeable):
             box=self._setup.wanted.box,
             mode=mode,
         )
-        paced = plan_start(motion, pace, self.model, mode)
+        paced = plan_start(motion, speed_override, self.model, mode)
         with self._lock:
             self._require_unstopped(stops)
             self._setup.require_given()
@@ -322,29 +322,29 @@ class Supervisor(Closeable):
         """
         return self._override_of_motion().change(0.0)
 
-    def resume(self, pace: float = 1.0) -> PendingRequest:
-        """Goes on with a motion that is held; see `set_pace`."""
-        return self.set_pace(pace)
+    def resume(self, speed_override: float = 1.0) -> PendingRequest:
+        """Goes on with a motion that is held; see `set_speed_override`."""
+        return self.set_speed_override(speed_override)
 
-    def set_pace(self, pace: float) -> PendingRequest:
+    def set_speed_override(self, speed_override: float) -> PendingRequest:
         """Runs the motion under way at part of its planned speed; done once that is handed over.
 
         The change is planned here, along the way, and judged by the conditions of the motion's mode before any of it
         is sent; that takes some 10 to 100 ms.
 
         Args:
-            pace: 0.1 to 1.
+            speed_override: 0.1 to 1.
 
         Raises:
-            InvalidValueError: The pace is out of range.
+            InvalidValueError: The speed override is out of range.
             UsageError: No motion of `execute` is under way, or this machine is too busy.
             PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
         """
-        return self._override_of_motion().change(require_speed_override(pace))
+        return self._override_of_motion().change(require_speed_override(speed_override))
 
     @property
     def paced(self) -> SpeedScaledMotion | None:
-        """The motion of the last `execute` as it was really commanded, with every change of pace; None before."""
+        """The motion of the last `execute` as it was really commanded, with every change of speed; None before."""
         with self._lock:
             self._require_block()
             return self._override.motion
@@ -357,7 +357,7 @@ class Supervisor(Closeable):
     def _require_cycle(self) -> int:
         cycle = self._motion_cycle()
         if cycle is None:
-            raise UsageError("no motion runs whose pace could change").coded("no_pace")
+            raise UsageError("no motion runs whose speed override could change").coded("no_pace")
         return cycle
 
     def jog(
@@ -627,12 +627,12 @@ class Supervisor(Closeable):
                 return None
             return self._reader.read_cycle()
 
-    def _read_pace(self, shown: Snapshot) -> dict[str, Any]:
+    def _read_override(self, shown: Snapshot) -> dict[str, Any]:
         paced = self._override.motion
         if paced is None or shown.motion_time is None:
             return {}
         place = paced.place_at(round(shown.motion_time / CYCLE_TIME))
-        return {"motion_place": place, "pace": paced.override, "mode": self._override.mode}
+        return {"motion_place": place, "speed_override": paced.override, "mode": self._override.mode}
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:

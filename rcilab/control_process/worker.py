@@ -217,7 +217,7 @@ class ControlProcess:
                 self._record(driver.poll(_LOOK))
                 self._motions.jog(driver, self._model)
             case SwitchRows():
-                raise UsageError("no motion runs whose pace could change").coded("no_pace")
+                raise UsageError("no motion runs whose speed override could change").coded("no_pace")
             case End():
                 self._is_ending = True
 

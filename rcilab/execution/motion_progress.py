@@ -19,12 +19,11 @@ class MotionProgress:
     """Time in its plan, [s]; less than `time` when it ran slower or was held."""
     planned: float
     """Duration of its plan, [s]."""
-    pace: float
+    speed_override: float
     """Speed override: the part of its planned speed that it runs at or changes to; 0 when it is held."""
     mode: Mode
     """Command mode."""
 
     def __repr__(self) -> str:
-        return (
-            f"<MotionProgress: at {self.place:.3f} s of the plan, {100.0 * self.pace:.0f} % of its speed, {self.mode}>"
-        )
+        percent = 100.0 * self.speed_override
+        return f"<MotionProgress: at {self.place:.3f} s of the plan, {percent:.0f} % of its speed, {self.mode}>"

@@ -337,11 +337,12 @@ class RobotSession(Closeable):
         progress: Progress | None = None,
         *,
         mode: Mode = "joint_position",
-        pace: float = 1.0,
+        speed_override: float = 1.0,
     ) -> Run:
         """Checks a motion by the conditions of the mode, streams it and returns its run.
 
-        From another thread, `pause`, `resume` and `set_pace` change its speed, and `progress` returns its progress. In
+        From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` says how far it
+        is. In
         torque mode the arm is compliant, see `rcilab.execution.command_builder`.
 
         Args:
@@ -349,7 +350,7 @@ class RobotSession(Closeable):
             certificate: From an earlier `check(motion, model, mode=mode)`; then only its validity is verified.
             progress: Called with time and duration about 20 times a second.
             mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques.
-            pace: Initial speed override, 0.1 to 1; `set_pace` changes it later.
+            speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it later.
 
         Raises:
             InvalidValueError: The speed override is out of range; nothing moved.
@@ -362,7 +363,7 @@ class RobotSession(Closeable):
         """
         require_motion(motion, certificate)
         require_mode(mode)
-        require_speed_override(pace)
+        require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):
             state = self.receive_state()
             mismatch = describe_start_mismatch(motion.q[0], state.q_c)
@@ -372,7 +373,7 @@ class RobotSession(Closeable):
                 self._require_allowed(motion, state, mode)
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
-            scaled = plan_start(motion, pace, self.model, mode)
+            scaled = plan_start(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
             stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))
             override = SpeedOverride(StreamRows(stream))
@@ -396,7 +397,7 @@ class RobotSession(Closeable):
             duration=scaled.duration,
             place=scaled.place_at(cycle),
             planned=scaled.motion.duration,
-            pace=scaled.override,
+            speed_override=scaled.override,
             mode=override.mode,
         )
 
@@ -407,29 +408,29 @@ class RobotSession(Closeable):
             UsageError: No such motion runs.
             PlanningError: It arrives before it could be held.
         """
-        self._change_pace(0.0)
+        self._change_speed_override(0.0)
 
-    def resume(self, pace: float = 1.0) -> None:
-        """Resumes a held motion; see `set_pace`."""
-        self.set_pace(pace)
+    def resume(self, speed_override: float = 1.0) -> None:
+        """Resumes a held motion; see `set_speed_override`."""
+        self.set_speed_override(speed_override)
 
-    def set_pace(self, pace: float) -> None:
+    def set_speed_override(self, speed_override: float) -> None:
         """Sets the speed override of the motion that `execute` runs in another thread, checked as the motion was.
 
         Args:
-            pace: 0.1 to 1.
+            speed_override: 0.1 to 1.
 
         Raises:
             InvalidValueError: The override is out of range.
             UsageError: No such motion runs.
             PlanningError: The change is not possible within the limits from here; the motion continues unchanged.
         """
-        self._change_pace(require_speed_override(pace))
+        self._change_speed_override(require_speed_override(speed_override))
 
-    def _change_pace(self, pace: float) -> None:
+    def _change_speed_override(self, speed_override: float) -> None:
         if (streamed := self._streamed) is None:
-            raise UsageError("no motion of execute() runs whose pace could change").coded("no_pace")
-        streamed[1].change(pace)
+            raise UsageError("no motion of execute() runs whose speed override could change").coded("no_pace")
+        streamed[1].change(speed_override)
 
     def control(
         self,

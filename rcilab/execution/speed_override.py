@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
-from rcilab.conformance.speed_scaling_check import plan_pace
+from rcilab.conformance.speed_scaling_check import plan_speed_override
 from rcilab.core.errors import UsageError
 from rcilab.core.state import Mode
 from rcilab.execution.streaming import MotionStream
@@ -100,7 +100,7 @@ class SpeedOverride(Generic[_Handed]):
                 cycle = self._rows.cycle()
                 if self.motion is None or self._model is None:
                     raise UsageError("no motion runs whose speed could change").coded("no_pace")
-                changed = plan_pace(self.motion, cycle + lead, factor, self._model, self.mode)
+                changed = plan_speed_override(self.motion, cycle + lead, factor, self._model, self.mode)
                 first = min(self._rows.cycle() + HANDOVER, changed.changed)  # What was to change before goes along.
                 handed = self._rows.switch(first, changed)
                 if handed is not None:

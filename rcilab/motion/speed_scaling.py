@@ -135,10 +135,10 @@ def require_speed_override(override: object) -> float:
     Raises:
         InvalidValueError: It is not a number from `MIN_SPEED_OVERRIDE` to 1.
     """
-    number = as_number(override, "override")
+    number = as_number(override, "speed_override")
     if not MIN_SPEED_OVERRIDE <= number <= 1.0:
         raise InvalidValueError(
-            "override", override, f"must be from {MIN_SPEED_OVERRIDE:g} to 1: part of the planned speed"
+            "speed_override", override, f"must be from {MIN_SPEED_OVERRIDE:g} to 1: part of the planned speed"
         ).coded("span", low=f"{MIN_SPEED_OVERRIDE:g}", high="1")
     return number
 

@@ -124,7 +124,7 @@ class RunPanel(Part):
         self._requests = RobotRequests(self.state.store, connection)
         self._world = WorldActions(self.state.store, connection)
         self._mode_actions = ModeActions(self.state.store, connection, keeps_rest=self.state.session is not None)
-        self.pace = SpeedFields(self.state, text, self._mode_actions)
+        self.speed_override = SpeedFields(self.state, text, self._mode_actions)
         self.modes = ModeFields(self.state, text, self._mode_actions)
         self.signals = SignalFields(text, self._send, self._button)
         self.limits = LimitFields(self.state, text, self._world, self._send, self._button)
@@ -138,8 +138,8 @@ class RunPanel(Part):
             lean(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
             self.modes.choice,
             self._plan,
-            lean(ipywidgets.HBox, [self.execute, *self.pace.buttons, self.stop]),
-            *self.pace.fields,
+            lean(ipywidgets.HBox, [self.execute, *self.speed_override.buttons, self.stop]),
+            *self.speed_override.fields,
             self._question,
             self._answers,
             self.progress,
@@ -344,7 +344,7 @@ class RunPanel(Part):
             told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
             write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
-        self.pace.show(status)
+        self.speed_override.show(status)
         self.modes.show(status)
         self.limits.show(status)
         self.signals.show(status)

@@ -36,7 +36,7 @@ class SpeedFields:
         self._writing = False
         self.pause = self._button("run.pause", partial(self._ask, modes.pause), icon="pause", style="warning")
         self.resume = self._button("run.resume", partial(self._ask, modes.resume), icon="play", style="info")
-        percent, slowest = 100.0 * state.now.drive.pace, 100.0 * MIN_SPEED_OVERRIDE
+        percent, slowest = 100.0 * state.now.drive.speed_override, 100.0 * MIN_SPEED_OVERRIDE
         self.slider: Any = lean(
             ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
             readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},
@@ -59,7 +59,7 @@ class SpeedFields:
         self.pause.layout.display = "none" if is_held else None
         self.pause.disabled = not running
         self.resume.layout.display = None if is_held else "none"
-        percent = 100.0 * self._state.now.drive.pace
+        percent = 100.0 * self._state.now.drive.speed_override
         if self.slider.value != percent:
             self._writing = True
             try:
@@ -67,14 +67,18 @@ class SpeedFields:
                 self.field.show(percent)
             finally:
                 self._writing = False
-        refusal = self._state.now.drive.pace_refusal
+        refusal = self._state.now.drive.override_refusal
         said = "" if not running or status is None else soft(self._tell_way(status, is_held))
         write(self._way, said + ("" if refusal is None or not running else problem(self._text.say(refusal))))
 
     def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
-        pace = f"{100.0 * status.pace:.0f}"
+        speed_override = f"{100.0 * status.speed_override:.0f}"
         place = f"{status.motion_place or 0.0:.1f}"
-        return self._text("run.held", place=place) if is_held else self._text("run.way", place=place, pace=pace)
+        return (
+            self._text("run.held", place=place)
+            if is_held
+            else self._text("run.way", place=place, speed_override=speed_override)
+        )
 
     def _on_slider(self, change: Any) -> None:
         if not self._writing:
@@ -82,7 +86,7 @@ class SpeedFields:
             self._choose(change["new"])
 
     def _choose(self, percent: float) -> None:
-        self._ask(partial(self._modes.set_drive, SetDrive(pace=percent / 100.0)))
+        self._ask(partial(self._modes.set_drive, SetDrive(speed_override=percent / 100.0)))
 
     def _ask(self, act: Callable[[], None]) -> None:
         with self._state.lock:

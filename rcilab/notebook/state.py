@@ -75,7 +75,7 @@ class LabState:
         """What came of the last execution."""
         self.is_run_of_plan = True
         """Whether it was one of the plan; a cell may have run something else."""
-        self._ran: Plan | None = None  # The plan as it was run, where its pace was changed on the way.
+        self._ran: Plan | None = None  # The plan as it was run, where its speed override was changed on the way.
         self.error: RcilabError | None = None
         """Why the last execution did not reach its end; None when it did."""
         self._hearers: dict[Topic, list[Callable[[], None]]] = {}

@@ -39,7 +39,7 @@ def save_run(
 ) -> None:
     """Writes a run to a file; see `Run.save`."""
     if not isinstance(file, str | PathLike):
-        raise InvalidValueError("file", described(file), "is no file name")
+        raise InvalidValueError("file", described(file), "must be a file name")
     path = Path(fspath(file))
     require_ending(path.suffix)
     try:

@@ -86,7 +86,7 @@ class LiveRecording:
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
-            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
+            plan: What was asked of the arm in the end, where that is not what was planned: another speed override.
 
         Raises:
             InvalidValueError: The end of the file cannot be written; all that came before is in it.

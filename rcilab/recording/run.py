@@ -95,7 +95,7 @@ class Run:
     maker: str = ""
     """Name of the maker whose faults the bits of `cycles["faults"]` are; empty: that of the arm."""
     paced: bool = False
-    """Whether the pace was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
+    """Whether the speed was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
     is_complete: bool = True
     """False when it was read from a file whose end is missing: all that came before is here."""
 

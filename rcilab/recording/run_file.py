@@ -7,13 +7,13 @@ The file is a row of blocks (`blocks.py`), in this order:
             "maker": whose faults the bits of "faults" are; the first versions had 32 bits, of Rokae,
             "realtime": whether timing means something, "setup": where and how (`Setup`),
             "report": the verdict on the plan, one object a condition, or null}
-    PLAN    the planned motion as `Motion.save` writes it; missing for a callback. A motion whose pace was changed has
+    PLAN    the planned motion as `Motion.save` writes it; missing for a callback. A motion whose speed was changed has
             another one behind its cycles, as it was asked of the arm in the end; the last one counts
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (neighbours are then alike and take a quarter of the room). Any number of
             these
     TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing,
-            "paced": whether the pace was changed on the way}. A file without it was cut off: by a crash, by a full
+            "paced": whether the speed was changed on the way}. A file without it was cut off: by a crash, by a full
             disk, or because it is still being written
 
 All units are SI. Blocks of other kinds are left out by a reader.
@@ -126,7 +126,7 @@ class RunWriter:
         Args:
             stopped: Why it ended early; None: it did not.
             truncated: Whether the beginning is missing.
-            plan: What was asked of the arm in the end, where that is not what was planned: another pace.
+            plan: What was asked of the arm in the end, where that is not what was planned: another speed override.
             paced: Whether the plan that is written already is such a one.
         """
         if len(self._waiting):
@@ -233,7 +233,7 @@ def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) 
         VersionMismatchError: It was written by another version of this format.
     """
     if not isinstance(file, str | PathLike):
-        raise InvalidValueError("run file", described(file), "is no file name")
+        raise InvalidValueError("run file", described(file), "must be a file name")
     name = fspath(file)
     content = read_whole(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
     return decode_content(content, name, max_rows, build)

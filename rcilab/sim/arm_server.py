@@ -111,7 +111,7 @@ class ArmServer:
 
     @property
     def missed(self) -> int:
-        """Cycles that were left out because this process was not there for them, or put off; see `pace`."""
+        """Cycles that were left out because this process was not there for them, or put off; see `cycle_timer`."""
         return self._timer.missed
 
     @property

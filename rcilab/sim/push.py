@@ -32,9 +32,9 @@ class Push:
         self.is_active = bool(self.wrench.any())
         self._given = np.zeros(3) if point is None else as_vector(point, 3, "point", "m")
         if link is not None and (isinstance(link, bool) or link not in range(1, model.n + 1)):
-            raise InvalidValueError("link", link, f"is no moving link of {model.name}; needs 1 to {model.n}").coded(
-                "span", low="1", high=str(model.n)
-            )
+            raise InvalidValueError(
+                "link", link, f"needs one of the moving links of {model.name}, 1 to {model.n}"
+            ).coded("span", low="1", high=str(model.n))
         self._model = model
         T = upright_flange(model.description) @ model.T_flange_tool
         self._body = model.n if link is None else link

@@ -235,7 +235,7 @@ def _traits(status: SupervisorStatus) -> tuple[object, ...]:
     q, q_c = ((None if angles is None else angles.tobytes()) for angles in (status.q, status.q_c))
     return (
         status.phase, status.code, status.message, status.incident, status.address, status.robot_mode, status.faults,
-        status.powered, status.T_flange_tool, status.setup, status.pace, q, q_c,
+        status.powered, status.T_flange_tool, status.setup, status.speed_override, q, q_c,
     )  # fmt: skip
 
 

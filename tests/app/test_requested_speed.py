@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from rcilab.app.run.requested_speed import RequestedSpeed, tell_pace_refusal
+from rcilab.app.run.requested_speed import RequestedSpeed, tell_override_refusal
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ConnectionLostError, PlanningError
 
 IDLE = SupervisorStatus(phase="idle", code="idle")
-MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, pace=1.0)
-HELD = replace(MOVING, code="moving.held", pace=0.0)
+MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, speed_override=1.0)
+HELD = replace(MOVING, code="moving.held", speed_override=0.0)
 
 
 def due(wish: RequestedSpeed, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
@@ -19,8 +19,8 @@ def due(wish: RequestedSpeed, status: SupervisorStatus, *, is_under_way: bool = 
 
 def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
     wish = RequestedSpeed()
-    for pace in (0.9, 0.5, 0.3):
-        wish.choose(pace, MOVING)
+    for speed_override in (0.9, 0.5, 0.3):
+        wish.choose(speed_override, MOVING)
     assert due(wish, MOVING, is_under_way=True) is None
     assert due(wish, MOVING) == 0.3
     assert due(wish, MOVING) is None
@@ -32,7 +32,7 @@ def test_what_is_chosen_while_nothing_moves_is_no_wish_of_the_next_motion() -> N
     assert due(wish, IDLE) is None
     assert due(wish, MOVING) is None, "it begins at the pace it is executed with"
     wish.choose(0.4, MOVING)
-    assert due(wish, replace(MOVING, pace=0.4)) is None
+    assert due(wish, replace(MOVING, speed_override=0.4)) is None
 
 
 def test_a_held_motion_keeps_waiting_while_the_pace_is_chosen() -> None:
@@ -54,8 +54,8 @@ def test_nothing_is_asked_of_an_arm_that_no_motion_moves(status: SupervisorStatu
 
 
 def test_a_refusal_says_what_cannot_be_and_nothing_once_the_motion_is_over() -> None:
-    def code(error: PlanningError | ConnectionLostError, pace: float, status: SupervisorStatus) -> str | None:
-        told = tell_pace_refusal(error, pace, status)
+    def code(error: PlanningError | ConnectionLostError, speed_override: float, status: SupervisorStatus) -> str | None:
+        told = tell_override_refusal(error, speed_override, status)
         return None if told is None else told.code
 
     assert code(PlanningError("no"), 0.0, MOVING) == "pace.no_pause"

@@ -87,7 +87,7 @@ def test_held_gone_on_with_slower_and_arrived(supervisor, mode):
     wait_until_at(supervisor, 0.3)
     supervisor.pause().wait(SOON)
     assert supervisor.status().code == "moving.held"
-    assert supervisor.status().pace == 0.0
+    assert supervisor.status().speed_override == 0.0
     wait_for(lambda: not supervisor.status().dq.any())
     place = supervisor.status().motion_place
     time.sleep(0.05)
@@ -95,7 +95,7 @@ def test_held_gone_on_with_slower_and_arrived(supervisor, mode):
     supervisor.resume(0.6).wait(SOON)
     assert supervisor.status().code == "moving"
     wait_for(lambda: supervisor.status().motion_place > place + 0.1)
-    supervisor.set_pace(1.0).wait(SOON)
+    supervisor.set_speed_override(1.0).wait(SOON)
     ticket.wait(SOON)
     assert supervisor.status().faults == ()
     assert supervisor.status().q_c == pytest.approx(motion.goal, abs=1e-7)
@@ -107,11 +107,11 @@ def test_held_gone_on_with_slower_and_arrived(supervisor, mode):
 
 def test_a_motion_that_is_to_run_slowly_does_so_from_its_first_row_on(supervisor):
     motion, certificate = planned(supervisor)
-    with pytest.raises(InvalidValueError, match="pace"):
-        supervisor.execute(motion, certificate, pace=0.01)
-    ticket = supervisor.execute(motion, certificate, pace=0.3)
+    with pytest.raises(InvalidValueError, match=r"speed.override"):
+        supervisor.execute(motion, certificate, speed_override=0.01)
+    ticket = supervisor.execute(motion, certificate, speed_override=0.3)
     wait_until_at(supervisor, 0.2)
-    assert supervisor.status().pace == 0.3
+    assert supervisor.status().speed_override == 0.3
     assert supervisor.status().motion_place == pytest.approx(0.3 * supervisor.status().motion_time, abs=0.05)
     ticket.wait(SOON)
     assert supervisor.status().q_c == pytest.approx(motion.goal, abs=1e-7)
@@ -131,7 +131,7 @@ def test_a_held_motion_is_stopped_as_any_other(supervisor):
     assert ticket.done
     assert ticket.error is not None
     assert supervisor.status().code == "idle.stopped"
-    with pytest.raises(UsageError, match="pace"):
+    with pytest.raises(UsageError, match=r"speed.override"):
         supervisor.resume()
 
 

@@ -19,9 +19,9 @@ def test_a_motion_of_a_session_runs_slowly_from_its_first_row_on():
     motion = plan_joint(model, model.home, model.home + np.array([0.2, 0.1, 0.0, 0.0, 0.0, 0.2]), speed=0.5)
     with rcilab.simulate(model) as robot:
         robot.power_on()
-        with pytest.raises(InvalidValueError, match="pace"):
-            robot.execute(motion, pace=0.05)
-        run = robot.execute(motion, pace=0.25)
+        with pytest.raises(InvalidValueError, match=r"speed.override"):
+            robot.execute(motion, speed_override=0.05)
+        run = robot.execute(motion, speed_override=0.25)
     assert run.paced
     assert run.plan.duration == pytest.approx(motion.duration / 0.25, abs=CYCLE_TIME)
     assert np.abs(run.plan.dq).max() < 0.26 * np.abs(motion.dq).max()
@@ -34,7 +34,7 @@ def test_a_motion_that_takes_longer_than_planned_is_recorded_from_its_first_cycl
     motion = plan_joint(model, model.home, model.home + 0.2, speed=0.5)
     with rcilab.simulate(model) as robot:
         robot.power_on()
-        run = robot.execute(motion, pace=0.1)
+        run = robot.execute(motion, speed_override=0.1)
     assert not run.truncated
     assert run.t[0] == 0.0
 
@@ -43,7 +43,7 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
     model = rcilab.load_model("xMate3")
     with rcilab.simulate(model) as robot:
         robot.power_on()
-        with pytest.raises(UsageError, match="pace"):
+        with pytest.raises(UsageError, match=r"speed.override"):
             robot.pause()
         assert robot.progress is None
         motion = plan_joint(model, model.home, model.home + np.array([0.2, 0.1, 0.0, 0.0, 0.0, 0.2]), speed=0.03)
@@ -56,25 +56,25 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         )
         mover.start()
         wait_for(lambda: moved)
-        with pytest.raises(InvalidValueError, match="pace"):
-            robot.set_pace(0.01)
+        with pytest.raises(InvalidValueError, match=r"speed.override"):
+            robot.set_speed_override(0.01)
         wait_for(lambda: robot.progress.place > 0.05)  # It moves by then.
         before = robot.progress
         assert before is not None
-        assert (before.pace, before.mode) == (1.0, "joint_impedance")
+        assert (before.speed_override, before.mode) == (1.0, "joint_impedance")
         assert before.duration == pytest.approx(motion.duration, abs=CYCLE_TIME)
         assert before.place == pytest.approx(before.time)
         assert before.time >= moved[0]
         robot.pause()
         wait_for(lambda: not robot.state.dq_c.any())
         held = robot.progress
-        assert held.pace == 0.0
+        assert held.speed_override == 0.0
         assert before.place < held.place < held.time
         wait_for(lambda: robot.progress.time > held.time)
         assert robot.progress.place == held.place
         robot.resume(0.7)
         wait_for(lambda: robot.progress.place > held.place)
-        assert robot.progress.pace == 0.7
+        assert robot.progress.speed_override == 0.7
         mover.join(30.0)
         assert robot.progress is None
     run = runs[0]

@@ -146,7 +146,7 @@ def test_its_texts_are_short_and_name_duration_and_law():
 
 @pytest.mark.parametrize("q", ["abc", None, [], [[1.0, 2.0], [1.0]], np.zeros((2, 2, 2))])
 def test_samples_that_are_no_table_are_refused_in_words(q):
-    with pytest.raises(InvalidValueError, match=r"^q: "):
+    with pytest.raises(InvalidValueError, match=r"^q (needs|must) "):
         Motion.from_cycles(q)
 
 
@@ -159,7 +159,7 @@ def test_a_sample_that_is_not_finite_is_named_by_row_and_joint():
 
 @pytest.mark.parametrize("t", ["a", None])
 def test_a_time_that_is_no_number_is_refused_in_words(t):
-    with pytest.raises(InvalidValueError, match=r"t: .* is not a number"):
+    with pytest.raises(InvalidValueError, match=r"t must be a number"):
         Motion.from_cycles(np.zeros((3, 6))).at(t)
 
 

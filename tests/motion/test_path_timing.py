@@ -203,7 +203,7 @@ def test_a_joint_goes_up_to_its_limit_and_not_past_it():
     q[6] = model.limits.joint.upper[6] - 0.1
     near, past = (model.forward(q) @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, 0.0, turn)) for turn in (0.0999, 0.1001))
     assert plan_line(model, q, near).q[-1, 6] == pytest.approx(q[6] + 0.0999, abs=1e-9)
-    with pytest.raises(PlanningError, match=r"joint 7 would pass its limit at 360\.0 deg \(-360 to 360 deg\)"):
+    with pytest.raises(PlanningError, match=r"joint 7 would pass its limit at 360\.01 deg \(-360 to 360 deg\)"):
         plan_line(model, q, past)
 
 

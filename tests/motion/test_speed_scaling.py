@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
-from rcilab.conformance.speed_scaling_check import plan_pace, plan_start
+from rcilab.conformance.speed_scaling_check import plan_speed_override, plan_start
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose
@@ -33,13 +33,13 @@ def line(speed: float) -> Motion:
 def test_held_and_gone_on_with_it_keeps_every_condition_and_arrives(plan, speed, share):
     motion = plan(speed)
     cycle = int(share * len(motion))
-    held = plan_pace(as_planned(motion), cycle, 0.0, MODEL, "joint_position")
+    held = plan_speed_override(as_planned(motion), cycle, 0.0, MODEL, "joint_position")
     if not held.holds:  # So near to its end it arrives before it could be held.
         assert np.array_equal(held.q[-1], motion.goal)
         return
     assert np.array_equal(held.q[: cycle + 1], motion.q[: cycle + 1])
-    on = plan_pace(held, len(held.q) + 700, 0.4, MODEL, "joint_position")
-    on = plan_pace(on, len(held.q) + 1000, 1.0, MODEL, "joint_position")
+    on = plan_speed_override(held, len(held.q) + 700, 0.4, MODEL, "joint_position")
+    on = plan_speed_override(on, len(held.q) + 1000, 1.0, MODEL, "joint_position")
     assert np.array_equal(on.q[-1], motion.goal)
     assert on.place[-1] == motion.duration
     assert check(on.as_motion(), MODEL, distance=None).ok
@@ -47,7 +47,7 @@ def test_held_and_gone_on_with_it_keeps_every_condition_and_arrives(plan, speed,
 
 def test_the_way_stays_the_same():
     motion = joint_motion(0.5)
-    slow = plan_pace(as_planned(motion), 300, 0.5, MODEL, "joint_position")
+    slow = plan_speed_override(as_planned(motion), 300, 0.5, MODEL, "joint_position")
     for row in range(0, len(slow.q) - 1, 97):
         assert slow.q[row] == pytest.approx(motion.at(float(slow.place[row])).q, abs=1e-12)
     assert slow.duration > motion.duration
@@ -56,9 +56,9 @@ def test_the_way_stays_the_same():
 
 def test_a_change_in_the_middle_of_a_change_continues_it():
     motion = joint_motion(0.1)
-    slow = plan_pace(as_planned(motion), 1000, 0.2, MODEL, "joint_position")
+    slow = plan_speed_override(as_planned(motion), 1000, 0.2, MODEL, "joint_position")
     assert 0.2 < slow.rate[1030] < 1.0
-    fast = plan_pace(slow, 1030, 1.0, MODEL, "joint_position")
+    fast = plan_speed_override(slow, 1030, 1.0, MODEL, "joint_position")
     assert fast.rate[1030] == slow.rate[1030]
     assert check(fast.as_motion(), MODEL, distance=None).ok
 
@@ -66,8 +66,8 @@ def test_a_change_in_the_middle_of_a_change_continues_it():
 @pytest.mark.parametrize("plan", [joint_motion, line])
 def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rate(plan):
     motion = plan(0.4)
-    held = plan_pace(plan_start(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position")
-    paced = plan_pace(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
+    held = plan_speed_override(plan_start(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position")
+    paced = plan_speed_override(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
     run = paced.as_motion()
     assert np.array_equal(run.q, paced.q)
     for row in range(1, len(paced.q) - 1, 41):
@@ -79,38 +79,38 @@ def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rat
 
 def test_in_cartesian_modes_the_tool_is_judged_too():
     motion = line(0.6)
-    held = plan_pace(as_planned(motion), 200, 0.0, MODEL, "cartesian_position")
-    on = plan_pace(held, len(held.q) + 100, 1.0, MODEL, "cartesian_position")
+    held = plan_speed_override(as_planned(motion), 200, 0.0, MODEL, "cartesian_position")
+    on = plan_speed_override(held, len(held.q) + 100, 1.0, MODEL, "cartesian_position")
     assert check(on.as_motion(), MODEL, distance=None, mode="cartesian_position").ok
 
 
 def test_what_has_arrived_has_no_pace():
     motion = joint_motion(0.5)
     with pytest.raises(PlanningError, match="stop"):
-        plan_pace(as_planned(motion), len(motion) + 10, 0.0, MODEL, "joint_position")
+        plan_speed_override(as_planned(motion), len(motion) + 10, 0.0, MODEL, "joint_position")
 
 
 @pytest.mark.parametrize("mode", ["joint_position", "cartesian_position"])
 @pytest.mark.parametrize("plan", [joint_motion, line])
-@pytest.mark.parametrize("pace", [0.1, 0.37, 0.9])
-def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, pace, mode):
+@pytest.mark.parametrize("speed_override", [0.1, 0.37, 0.9])
+def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, speed_override, mode):
     motion = plan(0.4)
-    slow = plan_start(motion, pace, MODEL, mode)
-    assert slow.duration == pytest.approx(motion.duration / pace, abs=CYCLE_TIME)
+    slow = plan_start(motion, speed_override, MODEL, mode)
+    assert slow.duration == pytest.approx(motion.duration / speed_override, abs=CYCLE_TIME)
     rates = np.abs(np.diff(slow.q, axis=0)).max(axis=0) / CYCLE_TIME
-    assert (rates <= 1.0001 * pace * np.abs(motion.dq).max(axis=0) + 1e-6).all()
+    assert (rates <= 1.0001 * speed_override * np.abs(motion.dq).max(axis=0) + 1e-6).all()
     assert np.array_equal(slow.q[0], motion.q[0])
     assert np.array_equal(slow.q[-1], motion.goal)
     for row in range(0, len(slow.q) - 1, 97):
         assert slow.q[row] == pytest.approx(motion.at(float(slow.place[row])).q, abs=1e-12)
     assert check(slow.as_motion(), MODEL, distance=None, mode=mode).ok
-    fast = plan_pace(slow, 200, 1.0, MODEL, mode)
+    fast = plan_speed_override(slow, 200, 1.0, MODEL, mode)
     assert np.array_equal(fast.q[-1], motion.goal)
     assert fast.duration < slow.duration
 
 
 def test_what_breaks_a_condition_at_its_pace_is_refused():
-    with pytest.raises(PlanningError, match=r"torque\.rate at t = .* choose another pace"):
+    with pytest.raises(PlanningError, match=r"torque\.rate at t = .* choose another speed override"):
         plan_start(joint_motion(0.8), 0.9, MODEL, "torque")  # Nor would it be allowed as planned.
 
 
@@ -124,7 +124,7 @@ def test_nothing_asked_for_leaves_the_motion_itself():
     assert not paced.holds
 
 
-@pytest.mark.parametrize("pace", [0.0, 0.05, 1.01, np.nan, "fast"])
-def test_a_pace_has_a_range(pace):
+@pytest.mark.parametrize("speed_override", [0.0, 0.05, 1.01, np.nan, "fast"])
+def test_a_pace_has_a_range(speed_override):
     with pytest.raises(InvalidValueError):
-        require_speed_override(pace)
+        require_speed_override(speed_override)

@@ -104,11 +104,11 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
 
 def test_a_motion_of_a_cell_is_held_and_goes_on_from_the_panel(robot: RobotSession, panel: RunPanel) -> None:
     cell = execute(robot)
-    wait_for(lambda: not panel.pace.pause.disabled, what="a motion that can be held")
-    panel.pace.pause.click()
-    wait_for(lambda: panel.pace.resume.layout.display is None, what="the arm held")
-    panel.pace.resume.click()
-    wait_for(lambda: panel.pace.pause.layout.display is None, what="the arm on its way again")
+    wait_for(lambda: not panel.speed_override.pause.disabled, what="a motion that can be held")
+    panel.speed_override.pause.click()
+    wait_for(lambda: panel.speed_override.resume.layout.display is None, what="the arm held")
+    panel.speed_override.resume.click()
+    wait_for(lambda: panel.speed_override.pause.layout.display is None, what="the arm on its way again")
     panel.stop.click()
     assert cell.end().stopped == "on request"
 
@@ -119,7 +119,7 @@ def test_a_callback_of_a_cell_is_shown_as_moving_without_an_end_that_nobody_know
     cell = Cell(lambda: sway(robot, until=60.0))
     wait_for(lambda: "A cell moves the arm" in panel._where.value, what="the motion")
     assert panel.progress.layout.visibility == "hidden"
-    assert panel.pace.pause.disabled
+    assert panel.speed_override.pause.disabled
     assert panel.execute.disabled
     time.sleep(0.1)
     panel.stop.click()

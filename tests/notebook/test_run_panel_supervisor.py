@@ -113,40 +113,41 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
     with ExitStack() as open_things:
         robot = None if own else open_things.enter_context(rcilab.simulate(PRO7))
         panel = open_things.enter_context(notebook.RunPanel(PRO7 if robot is None else robot))
-        pace = panel.pace
+        speed_override = panel.speed_override
         if own:
             panel.connect.click()
         power_on(panel)
-        assert pace.pause.disabled
+        assert speed_override.pause.disabled
         panel.state.pose(PRO7.home - 0.6)
         panel.state.ask(SetSpeed(speed=0.1))
         panel.state.make_plan()
         panel.execute.click()
-        wait_for(lambda: not pace.pause.disabled, what="a motion that can be held")
-        pace.pause.click()
-        wait_for(lambda: pace.resume.layout.display is None, what="the arm held")
+        wait_for(lambda: not speed_override.pause.disabled, what="a motion that can be held")
+        speed_override.pause.click()
+        wait_for(lambda: speed_override.resume.layout.display is None, what="the arm held")
         wait_for(
-            lambda: re.search(r"Held at \d+\.\d s of the plan", pace._way.value), what="where it is held, in words"
+            lambda: re.search(r"Held at \d+\.\d s of the plan", speed_override._way.value),
+            what="where it is held, in words",
         )
-        pace.field.box.value = "50"
-        assert pace.slider.value == 50.0
+        speed_override.field.box.value = "50"
+        assert speed_override.slider.value == 50.0
         assert panel.state.status is not None
-        assert panel.state.status.pace == 0.0  # It keeps waiting.
-        pace.resume.click()
-        wait_for(lambda: "50 %" in pace._way.value, what="half the speed")
+        assert panel.state.status.speed_override == 0.0  # It keeps waiting.
+        speed_override.resume.click()
+        wait_for(lambda: "50 %" in speed_override._way.value, what="half the speed")
         wait_for(
             lambda: (
                 (now := panel.state.status).motion_place is not None and now.motion_place < (now.motion_time or 0.0)
             ),
             what="the plan falling behind the clock",
         )
-        assert pace.resume.layout.display == "none"
-        pace.slider.value = 100.0
-        wait_for(lambda: panel.state.status is not None and panel.state.status.pace == 1.0, what="all of it")
+        assert speed_override.resume.layout.display == "none"
+        speed_override.slider.value = 100.0
+        wait_for(lambda: panel.state.status is not None and panel.state.status.speed_override == 1.0, what="all of it")
         panel.stop.click()
-        wait_for(lambda: pace.pause.disabled, what="the end of the motion")
+        wait_for(lambda: speed_override.pause.disabled, what="the end of the motion")
         wait_for(
-            lambda: not pace._way.value, what="the end of what is said of it"
+            lambda: not speed_override._way.value, what="the end of what is said of it"
         )  # Another thread writes it, a moment later.
         wait_for(lambda: panel.state.run is not None, what="the run")
         run = panel.state.run
@@ -170,18 +171,18 @@ def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
         robot = Real(PRO7.home, phase="moving", code="moving", motion_duration=1.0, motion_place=0.9)
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
-        panel.pace.pause.click()
-        wait_for(lambda: "Too late to hold" in panel.pace._way.value, what="why not")
-        assert robot.paces == [0.0]
-        assert "rl-problem" in panel.pace._way.value
+        panel.speed_override.pause.click()
+        wait_for(lambda: "Too late to hold" in panel.speed_override._way.value, what="why not")
+        assert robot.overrides == [0.0]
+        assert "rl-problem" in panel.speed_override._way.value
 
 
 def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
     with notebook.RunPanel(PRO7) as panel:
         for typed in ("5", "120", "fast", "nan"):
-            panel.pace.field.box.value = typed
-            assert "rl-problem" in panel.pace.field.said.value
-            assert panel.state.now.drive.pace == 1.0
+            panel.speed_override.field.box.value = typed
+            assert "rl-problem" in panel.speed_override.field.said.value
+            assert panel.state.now.drive.speed_override == 1.0
 
 
 class Real:
@@ -191,7 +192,7 @@ class Real:
 
     def __init__(self, q: Any, **how: Any) -> None:
         self.executed: list[Any] = []
-        self.paces: list[float] = []
+        self.overrides: list[float] = []
         self.error: RcilabError | None = None
         self._status = SupervisorStatus(**{"phase": "idle", "code": "idle", "q": q, "q_c": q, "powered": True, **how})
 
@@ -202,14 +203,14 @@ class Real:
         self.executed.append(motion)
         return PendingRequest("execute")
 
-    def set_pace(self, pace: float) -> PendingRequest:
-        self.paces.append(pace)
+    def set_speed_override(self, speed_override: float) -> PendingRequest:
+        self.overrides.append(speed_override)
         if self.error is not None:
             raise self.error
         return PendingRequest("pace")
 
     def pause(self) -> PendingRequest:
-        return self.set_pace(0.0)
+        return self.set_speed_override(0.0)
 
     def supervisor(self) -> Real:
         return self

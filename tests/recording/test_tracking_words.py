@@ -46,7 +46,7 @@ def test_a_stopped_run_says_until_when_it_is_compared(language, words):
     assert words in note
 
 
-@pytest.mark.parametrize(("language", "word"), [("en", "pace"), ("zh", "运行速度")])
+@pytest.mark.parametrize(("language", "word"), [("en", "speed override"), ("zh", "运行速度")])
 def test_a_run_at_another_pace_says_that_its_plan_has_other_times(language, word):
     (note,) = notes(some_run(paced=True), language)
     assert word in note

@@ -39,7 +39,7 @@ def bench() -> Iterator[Workbench]:
 
 @pytest.fixture
 def idle(bench):
-    bench.conductor.ask(SetDrive(mode="joint_position", pace=1.0))
+    bench.conductor.ask(SetDrive(mode="joint_position", speed_override=1.0))
     settle(bench)
     return bench
 
@@ -148,9 +148,9 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     wait(lambda: idle.session.status().code == "moving.held", "the pause")
     idle.conductor.ask(SetDrive(mode="torque"))
     wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
-    idle.conductor.ask(SetDrive(pace=0.7))
+    idle.conductor.ask(SetDrive(speed_override=0.7))
     idle.conductor.ask(RobotCommand(what="resume"))
-    wait(lambda: idle.session.status().pace == pytest.approx(0.7), "the way on")
+    wait(lambda: idle.session.status().speed_override == pytest.approx(0.7), "the way on")
     wait(lambda: told(idle) == "notice.arrived", "the arrival")
     wait(lambda: idle.store.state.last_run is not None and idle.store.state.last_run.run is not None, "the run")
     run = idle.store.state.last_run.run
@@ -166,10 +166,10 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
     idle.conductor.ask(RobotCommand(what="pause"))
     wait(lambda: told(idle) == "pace.nothing", "the answer")
-    idle.conductor.ask(SetDrive(pace=0.2))
+    idle.conductor.ask(SetDrive(speed_override=0.2))
     plan(idle)
     execute(idle)
-    wait(lambda: idle.session.status().pace == pytest.approx(0.2), "the slow motion")
+    wait(lambda: idle.session.status().speed_override == pytest.approx(0.2), "the slow motion")
     idle.conductor.ask(RobotCommand(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
 

@@ -13,7 +13,7 @@ from rcilab.app.run.replay import replayed
 from rcilab.app.run.run_recorder import as_recording
 from rcilab.app.store import UiState
 from rcilab.app.text import Text
-from rcilab.conformance.speed_scaling_check import plan_pace
+from rcilab.conformance.speed_scaling_check import plan_speed_override
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion.speed_scaling import as_planned
 from rcilab.views.plots import build_frame, plan_curves, recorded_curves, streamed_curves
@@ -31,7 +31,7 @@ def slowed() -> UiState:
     state = initial_state()
     plan = make_plan(state.model, state.model.home, state.model.home + 0.3, 0.3, "jerk_limited")
     assert isinstance(plan, Plan)
-    paced = plan_pace(as_planned(plan.motion), CHANGED, 0.5, state.model, "joint_position")
+    paced = plan_speed_override(as_planned(plan.motion), CHANGED, 0.5, state.model, "joint_position")
     motion = paced.as_motion()
     cycles = np.zeros(len(motion.q), some_cycles().dtype)
     cycles["t"], cycles["q"], cycles["q_c"], cycles["dq"] = motion.times, motion.q, motion.q, motion.dq

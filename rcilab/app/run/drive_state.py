@@ -34,9 +34,9 @@ class DriveState:
     """Parameters as the operator wants them, all of them; None: nobody has touched them."""
     refusal: Message | None = None
     """Why the controller did not take them."""
-    pace: float = 1.0
+    speed_override: float = 1.0
     """Part of the planned speed to run at."""
-    pace_refusal: Message | None = None
+    override_refusal: Message | None = None
     """Why the motion in progress did not take another one."""
 
     def wanted_control(self, model: RobotModel) -> ControllerParameters:

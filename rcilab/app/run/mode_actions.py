@@ -1,4 +1,4 @@
-"""What happens when somebody chooses a mode, its parameters or a pace. Owned by the conductor's thread."""
+"""What happens when somebody chooses a mode, its parameters or a speed override. Owned by the conductor's thread."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_pace_refusal
+from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_override_refusal
 from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.state_store import StateStore
 from rcilab.app.text import Message, message
@@ -34,12 +34,12 @@ class SetDrive(Request):
 
     mode: str | None = None
     """One of `rcilab.core.state.MODES`."""
-    pace: float | None = None
+    speed_override: float | None = None
     """Part of the planned speed, 0.1 to 1."""
 
     @property
     def replaces(self) -> str | None:  # noqa: D102
-        return None if self.pace is None else f"pace.{self.page}"
+        return None if self.speed_override is None else f"pace.{self.page}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +74,7 @@ class ModeActions:
         self._was_running = False
         self._post = ConfigurationSender(session, self._refuse)
         self._wish = RequestedSpeed()
-        self._changing: tuple[float, PendingRequest] | None = None  # A pace that the robot has not taken yet.
+        self._changing: tuple[float, PendingRequest] | None = None  # A speed override that the robot has not taken yet.
         self._asked_to_send = -math.inf
         self._arm = store.state.model.name
 
@@ -88,7 +88,7 @@ class ModeActions:
         }
 
     def set_drive(self, request: SetDrive) -> None:
-        """Chooses a mode, whose conditions then judge the plan, or a pace; what does not exist is ignored."""
+        """Chooses a mode, whose conditions then judge the plan, or a speed override; what does not exist is ignored."""
         state, status = self._store.state, self._session.status()
         if request.mode in MODES and request.mode != state.drive.mode:
             if is_moving(status):
@@ -96,10 +96,10 @@ class ModeActions:
                 return
             choose_mode(self._store, cast("Mode", request.mode))
             self._store.update(asked=None)
-        if request.pace is not None and math.isfinite(request.pace):
-            pace = min(max(request.pace, MIN_SPEED_OVERRIDE), 1.0)
-            self._store.update(drive=replace(self._store.state.drive, pace=pace))
-            self._wish.choose(pace, status)
+        if request.speed_override is not None and math.isfinite(request.speed_override):
+            speed_override = min(max(request.speed_override, MIN_SPEED_OVERRIDE), 1.0)
+            self._store.update(drive=replace(self._store.state.drive, speed_override=speed_override))
+            self._wish.choose(speed_override, status)
 
     def pause(self) -> None:
         """Holds the motion under way."""
@@ -109,7 +109,7 @@ class ModeActions:
     def resume(self) -> None:
         """Goes on with a motion that is held."""
         if self._require_motion():
-            self._wish.go_on(self._store.state.drive.pace)
+            self._wish.go_on(self._store.state.drive.speed_override)
 
     def type_field(self, request: TypeField) -> None:
         """Takes a typed parameter, or says beside the field what is wrong with it."""
@@ -154,7 +154,7 @@ class ModeActions:
         self._send(self._session.status())
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Looks what became of what was sent, tells our own controller what is new, changes the pace."""
+        """Looks what became of what was sent, tells our own controller what is new, changes the speed override."""
         name = self._store.state.model.name
         if name != self._arm:
             self._arm = name
@@ -165,14 +165,14 @@ class ModeActions:
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send(status)
-        self._change_pace(status)
+        self._change_speed_override(status)
 
     def forget(self) -> None:
         """Drops what was sent and not answered: another robot was chosen."""
         self._wish.forget()
         self._post.forget()
         self._changing, self._was_running = None, False
-        self._store.update(drive=replace(self._store.state.drive, pace_refusal=None))
+        self._store.update(drive=replace(self._store.state.drive, override_refusal=None))
 
     def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state
@@ -188,31 +188,31 @@ class ModeActions:
         self._store.say("warn", message("pace.nothing"))
         return False
 
-    def _change_pace(self, status: SupervisorStatus) -> None:
+    def _change_speed_override(self, status: SupervisorStatus) -> None:
         running, before = is_running(status), self._was_running
         self._was_running = running
         if self._changing is not None and self._changing[1].done:
-            (pace, ticket), self._changing = self._changing, None
-            self._tell_pace(ticket.error, pace)
+            (speed_override, ticket), self._changing = self._changing, None
+            self._tell_override(ticket.error, speed_override)
         elif running and not before:
-            self._set_pace_refusal(None)
+            self._set_override_refusal(None)
         wish = self._wish.due(status, is_under_way=self._changing is not None)
         if wish is None:
             return
-        self._set_pace_refusal(None)
+        self._set_override_refusal(None)
         supervisor = self._session.supervisor()
         try:
-            self._changing = wish, supervisor.set_pace(wish) if wish else supervisor.pause()
+            self._changing = wish, supervisor.set_speed_override(wish) if wish else supervisor.pause()
         except RcilabError as error:
-            self._tell_pace(error, wish)
+            self._tell_override(error, wish)
 
-    def _tell_pace(self, error: RcilabError | None, pace: float) -> None:
-        refusal = None if error is None else tell_pace_refusal(error, pace, self._session.status())
+    def _tell_override(self, error: RcilabError | None, speed_override: float) -> None:
+        refusal = None if error is None else tell_override_refusal(error, speed_override, self._session.status())
         if refusal is not None:
-            self._set_pace_refusal(refusal)
+            self._set_override_refusal(refusal)
             self._store.say("warn", refusal)
 
-    def _set_pace_refusal(self, refusal: Message | None) -> None:
+    def _set_override_refusal(self, refusal: Message | None) -> None:
         drive = self._store.state.drive
-        if drive.pace_refusal is not refusal:
-            self._store.update(drive=replace(drive, pace_refusal=refusal))
+        if drive.override_refusal is not refusal:
+            self._store.update(drive=replace(drive, override_refusal=refusal))

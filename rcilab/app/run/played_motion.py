@@ -1,4 +1,4 @@
-"""When a motion was where in its plan: it may have been run at another pace than it was planned with."""
+"""When a motion was where in its plan: it may have been run at another speed override than it was planned with."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def paced_of(state: UiState) -> SpeedScaledMotion | None:
 
 
 def streamed_rows(state: UiState) -> JointPath | None:
-    """Returns what was streamed of the plan on the page, shape (N, n), [rad], where its pace was changed; else None."""
+    """Returns what was streamed of the plan on the page, shape (N, n), [rad], if its speed was changed; else None."""
     paced, run = paced_of(state), None if state.recording is None else state.recording.run
     if paced is not None:
         return paced.q

@@ -32,7 +32,7 @@ class Recording:
     run: Run | None = None
     """All of it, once the arm stands still."""
     paced: SpeedScaledMotion | None = None
-    """How the plan was run, where its pace was changed on the way; None: as planned."""
+    """How the plan was run, where its speed override was changed on the way; None: as planned."""
     tracking: Tracking | None = None
     """How far the arm was from its plan, once it stands still."""
     file: str = ""

@@ -10,7 +10,7 @@ from rcilab.i18n.translator import Message, message
 if TYPE_CHECKING:
     from rcilab.control_process.status import SupervisorStatus
 
-_SAME_PACE = 1e-3
+_SAME_OVERRIDE = 1e-3
 
 
 class RequestedSpeed:
@@ -22,18 +22,18 @@ class RequestedSpeed:
     def __init__(self) -> None:
         self._wish: float | None = None
 
-    def choose(self, pace: float, status: SupervisorStatus | None) -> None:
+    def choose(self, speed_override: float, status: SupervisorStatus | None) -> None:
         """Requests a speed override for the motion in progress; a motion that is held stays held."""
         if is_running(status) and status is not None and status.code == "moving":
-            self._wish = pace
+            self._wish = speed_override
 
     def hold(self) -> None:
         """Requests that the motion is held."""
         self._wish = 0.0
 
-    def go_on(self, pace: float) -> None:
+    def go_on(self, speed_override: float) -> None:
         """Requests that a motion that is held continues with a speed override."""
-        self._wish = pace
+        self._wish = speed_override
 
     def due(self, status: SupervisorStatus, *, is_under_way: bool) -> float | None:
         """Returns the speed override to send to the robot now, if any; call it several times a second.
@@ -45,7 +45,11 @@ class RequestedSpeed:
         if is_under_way:
             return None
         wish, self._wish = self._wish, None
-        return None if wish is None or not is_running(status) or abs(wish - status.pace) < _SAME_PACE else wish
+        return (
+            None
+            if wish is None or not is_running(status) or abs(wish - status.speed_override) < _SAME_OVERRIDE
+            else wish
+        )
 
     def forget(self) -> None:
         """Drops the value: another robot is connected."""
@@ -57,14 +61,14 @@ def is_running(status: SupervisorStatus | None) -> bool:
     return status is not None and status.code in ("moving", "moving.held") and status.motion_duration is not None
 
 
-def tell_pace_refusal(error: RcilabError, pace: float, status: SupervisorStatus | None) -> Message | None:
+def tell_override_refusal(error: RcilabError, speed_override: float, status: SupervisorStatus | None) -> Message | None:
     """Returns why a motion continues unchanged; None if it has ended meanwhile.
 
     Args:
         error: Why the change failed.
-        pace: The requested speed override; 0 holds the motion.
+        speed_override: The requested speed override; 0 holds the motion.
         status: Of the robot.
     """
     if isinstance(error, PlanningError):
-        return message("pace.no_pause" if pace == 0.0 else "pace.no_change")
+        return message("pace.no_pause" if speed_override == 0.0 else "pace.no_change")
     return message("pace.late") if is_running(status) else None

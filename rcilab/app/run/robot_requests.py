@@ -78,9 +78,11 @@ class RobotRequests:
         """
         certificate = plan.report.require().certificate
         assert certificate is not None  # A report that is ok has one.
-        robot, pace = self._connection.supervisor(), self._store.state.drive.pace
+        robot, speed_override = self._connection.supervisor(), self._store.state.drive.speed_override
         robot.drain()
-        self.add("execute", robot.execute(plan.motion, certificate, plan.mode, pace=pace, stops=stops))
+        self.add(
+            "execute", robot.execute(plan.motion, certificate, plan.mode, speed_override=speed_override, stops=stops)
+        )
         self._recorder.begin(plan)
         self._store.update(recording=None, last_run=None, playing=False, asked=None)
 

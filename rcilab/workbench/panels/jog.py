@@ -53,7 +53,7 @@ class JogPanel:
         self._step = BoundControl(step, ask, lambda v, p: SetJog(page=p, step=steps.get(v)))
         speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
         self._speed = BoundControl(speed, ask, lambda v, p: SetJog(page=p, speed=v / 100.0))
-        self._pace, self._note = Html(gui), Html(gui)
+        self._speed_override, self._note = Html(gui), Html(gui)
         self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
         on_press(self._agree, ask, lambda page: SetJog(page=page, robot=True, agreed=True))
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
@@ -92,7 +92,7 @@ class JogPanel:
         self._agree.visible = self._cancel.visible = jog.asked
         self._step.show(self._steps[jog.step])
         self._speed.show(round(100.0 * jog.speed))
-        self._pace.show(pace_html(jog.speed, self._text))
+        self._speed_override.show(pace_html(jog.speed, self._text))
         factor, digits = self._text.units.from_si("rad")[0], 3 if self._text.units.angle == "deg" else 5
         for joint, angle in enumerate(state.goal.q):
             self._sliders[joint].show(round(float(factor * angle), digits))

@@ -25,7 +25,7 @@ def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         return _bar(state.program.progress)
     if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
         return ""
-    said = text("run.way", place=f"{status.motion_place:.1f}", pace=f"{100.0 * status.pace:.0f}")
+    said = text("run.way", place=f"{status.motion_place:.1f}", speed_override=f"{100.0 * status.speed_override:.0f}")
     if status.code == "moving.held":
         said = text("run.held", place=f"{status.motion_place:.1f}")
     share = min(max(status.motion_place / status.motion_duration, 0.0), 1.0)

@@ -94,7 +94,7 @@ def plot_axes(theme: Theme, *, last: bool, ticks: tuple[float, ...] | None = Non
 
 
 def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_paced: bool = False) -> str:
-    """Returns which colour and dash is which joint, what dots, dashes and areas mean, and at which pace the plan is."""
+    """Returns which colour and dash is which joint, what dots, dashes and areas mean, and the speed of the plan."""
     joints = [joint - 1] if joint else range(n)
     swatches = "".join(
         f'<span><i class="rl-swatch{" rl-broken" if i >= _BROKEN else ""}" style="color:{joint_color(i, theme)}"></i>'

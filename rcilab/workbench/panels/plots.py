@@ -55,7 +55,7 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
-        self._streamed: JointPath | None = None  # What became of the plan at another pace.
+        self._streamed: JointPath | None = None  # What became of the plan at another speed override.
         self._above = 0
         self.end = 1.0
         """Where the time axis ends, [s]."""

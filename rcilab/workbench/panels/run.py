@@ -1,4 +1,4 @@
-"""Run: Execute, pause, pace, power, Recover, and what the controller says."""
+"""Run: Execute, pause, speed override, power, Recover, and what the controller says."""
 
 from __future__ import annotations
 
@@ -49,15 +49,17 @@ class RunPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         self._planned = Html(gui)
-        pace = gui.add_slider(
+        speed_override = gui.add_slider(
             text("run.pace"),
             100.0 * MIN_SPEED_OVERRIDE,
             100.0,
             5.0,
-            100.0 * state.drive.pace,
+            100.0 * state.drive.speed_override,
             hint=text("run.pace_hint"),
         )
-        self._pace = BoundControl(pace, ask, lambda v, p: SetDrive(page=p, pace=float(v) / 100.0))
+        self._speed_override = BoundControl(
+            speed_override, ask, lambda v, p: SetDrive(page=p, speed_override=float(v) / 100.0)
+        )
         self._execute = gui.add_button(text("run.execute"), color=(23, 128, 68), icon="player-play", disabled=True)
         on_press(self._execute, ask, lambda page: RobotCommand(page=page, what="execute"))
         self._question = Html(gui)
@@ -121,7 +123,7 @@ class RunPanel:
         is_held = status.code == "moving.held"
         self._pause.visible, self._resume.visible = not is_held, is_held  # There before they are needed: nothing moves.
         self._pause.disabled = status.code != "moving" or status.motion_place is None
-        self._pace.show(round(100.0 * state.drive.pace, 1))
+        self._speed_override.show(round(100.0 * state.drive.speed_override, 1))
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program

@@ -108,7 +108,7 @@ def test_measured_bounds_leave_a_servo_room_over_the_commanded_ones_and_say_so()
 
 
 def test_conditions_on_the_tool_need_all_limits():
-    with pytest.raises(InvalidValueError, match=r"are of the joints only; pass model\.limits"):
+    with pytest.raises(InvalidValueError, match=r"must not be those of the joints only, .*; pass model\.limits"):
         RCI_CONDITIONS.find("cartesian.velocity.rotation").bounds(LIMITS)
 
 
