@@ -14,7 +14,6 @@ impedance, wherever the arm is compliant: under both impedances and while it is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 from typing import Final
 
@@ -124,7 +123,7 @@ class Actuator:
             return joint_impedance(model, *commanded.arrays, measured, parameters.joint_stiffness, self._damper)
         if law is ControlLaw.CARTESIAN_IMPEDANCE:
             tool = model.rigid_body.tool_terms(measured.q, measured.dq)
-            self._axes.follow(tool_c.twist[:3], tool.pose)
+            self._axes.follow(tool_c.twist[:3], tool)
             self._wrench = _approach(self._wrench, parameters.desired_wrench)
             return cartesian_impedance(
                 model,
@@ -141,8 +140,10 @@ class Actuator:
         return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits)
 
 
-def _approach(wrench: Sequence[float], wanted: Sequence[float]) -> tuple[float, ...]:
+def _approach(wrench: tuple[float, ...], wanted: tuple[float, ...]) -> tuple[float, ...]:
     """Returns a wrench a cycle later on its way to the one that is wanted: a step would jolt the arm."""
+    if wrench == wanted:
+        return wanted
     return tuple(
         now + min(max(goal - now, -step), step) for now, goal, step in zip(wrench, wanted, _WRENCH_STEP, strict=True)
     )

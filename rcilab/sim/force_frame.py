@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose, Rotation9, rotation_from_wxyz, turn_between
@@ -15,6 +16,15 @@ _TURN_STEP = 2.0 * math.pi * CYCLE_TIME  # [rad] in a cycle: half a turn takes 0
 _STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
 _ORIGIN = (0.0, 0.0, 0.0)
 _ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
+
+
+class PosedTool(Protocol):
+    """A tool that computes its pose on demand, as most cycles do not need it."""
+
+    @property
+    def pose(self) -> Pose:
+        """Pose in base."""
+        ...
 
 
 class ForceAxes:
@@ -54,14 +64,14 @@ class ForceAxes:
         """Whether the axes are those of the base."""
         return self._kind is ForceAxesKind.WORLD
 
-    def follow(self, velocity: Sequence[float], T_base_tool: Pose) -> None:
+    def follow(self, velocity: Sequence[float], tool: PosedTool) -> None:
         """Takes how the tool's origin is commanded to move in this cycle, base axes, [m/s], and where the tool is."""
         speed = math.hypot(*velocity)
         if speed > _STANDING:
             x, y, z = velocity
             self._path = (x / speed, y / speed, z / speed)
         if self._kind is ForceAxesKind.PATH:
-            wanted = _path_axes(self._path, self._frame(T_base_tool))
+            wanted = _path_axes(self._path, self._frame(tool.pose))
             self._axes, self.is_settled = (wanted, True) if self._axes is None else _approach(self._axes, wanted)
 
     def rotation(self, T_base_tool: Pose) -> Rotation9:

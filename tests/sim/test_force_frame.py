@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -94,14 +94,19 @@ def test_a_path_that_reverses_does_not_throw_the_arm_that_presses(robot, directi
     assert jerks.max() < 2.0  # [N m] in a cycle
 
 
+@dataclass
+class Tool:
+    pose: Pose
+
+
 def test_the_axes_of_a_path_turn_by_a_bounded_step_and_arrive():
     settings = replace(Settings.of(MODEL.description), force_axes=ForceAxesKind.PATH)
     axes = ForceAxes(MODEL, settings)
     tool = MODEL.forward(MODEL.home)
-    axes.follow([0.0, 0.1, 0.0], tool)
+    axes.follow([0.0, 0.1, 0.0], Tool(tool))
     before = axes.rotation(tool)
     for cycle in range(600):
-        axes.follow([0.0, -0.1, 1e-7], tool)
+        axes.follow([0.0, -0.1, 1e-7], Tool(tool))
         now = axes.rotation(tool)
         assert math.hypot(*turn_between(before, now)) < 0.007
         assert axes.is_settled or cycle < 510

@@ -155,7 +155,7 @@ class StateReporter:
 
     def _in_force_frame(self, wrench: Array, tool: ToolKinematics, velocity: Sequence[float]) -> Array:
         """Returns a wrench on the tool (base axes, tool's origin) at the force frame's origin, in its type's axes."""
-        self._axes.follow(velocity, tool.pose)
+        self._axes.follow(velocity, tool)
         if self._is_wrench_at_tool:
             return wrench
         fx, fy, fz, mx, my, mz = wrench.tolist()
