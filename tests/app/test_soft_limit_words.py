@@ -7,6 +7,7 @@ import pytest
 
 import rcilab
 from rcilab.app.goal.target_status import evaluate_joints
+from rcilab.app.jog.jog_state import Axis, at_limit
 from rcilab.app.planning import make_plan
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_violation
@@ -71,3 +72,10 @@ def test_a_goal_beyond_the_range_is_not_called_at_its_limit() -> None:
     at = np.r_[OWN.upper[0], GOAL[1:]]
     assert make_plan(ARM, ARM.home, at, 0.5, "jerk_limited").code == "plan.at_limit"
     assert evaluate_joints(ARM, at).reason.code == "reach.at_limit"
+
+
+def test_a_jog_button_names_the_soft_limit_that_the_joint_is_at() -> None:
+    at = np.r_[SOFT.limits.joint.upper[0], ARM.home[1:]]
+    assert at_limit(SOFT, at, Axis("joint.0", 1)).code == "jog.at_soft_upper"
+    own = np.r_[OWN.lower[0], ARM.home[1:]]
+    assert at_limit(SOFT, own, Axis("joint.0", -1)).code == "jog.at_lower"

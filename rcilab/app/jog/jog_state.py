@@ -154,7 +154,8 @@ def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
         for end, bound in (("lower", limits.lower[number]), ("upper", limits.upper[number])):
             is_ahead = joint is None or (end == "upper") == (axis.sign > 0)
             if is_ahead and abs(q[number] - bound) < _AT_LIMIT:
-                return message(f"jog.at_{end}", joint=number + 1, angle=float(bound))
+                kind = f"soft_{end}" if limits.is_soft(number + 1, end) else end
+                return message(f"jog.at_{kind}", joint=number + 1, angle=float(bound))
     if joint is None and np.linalg.svd(model.jacobian(q), compute_uv=False)[-1] < DAMPED_BELOW:
         return message("jog.at_edge")
     return None
