@@ -65,6 +65,11 @@ def test_a_flood_of_a_stranger_leaves_room_for_commands():
             for _ in range(2000):  # More than the buffer holds, between any two commands.
                 udp.sendto(bytes(1000), (host, int(port)))
 
+        def is_seen():
+            flood(0.0, 0.0)
+            return robot.world.status().strangers >= 1000
+
+        wait_for(is_seen, 30.0, "the controller to have seen the flood")
         run = robot.execute(motion, progress=flood)
         assert run.faults == ()
         assert np.array_equal(robot.state.q_c, motion.goal)
