@@ -151,10 +151,13 @@ def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
     """Returns why this button leads no further: a joint at its limit, or the edge of the reach; None for neither."""
     limits, joint = model.limits.joint, axis.joint
     for number in range(model.n) if joint is None else (joint,):
-        for end, bound in (("lower", limits.lower[number]), ("upper", limits.upper[number])):
+        for end, bound, is_soft in (
+            ("lower", limits.lower[number], limits.is_soft(number + 1, "lower")),
+            ("upper", limits.upper[number], limits.is_soft(number + 1, "upper")),
+        ):
             is_ahead = joint is None or (end == "upper") == (axis.sign > 0)
             if is_ahead and abs(q[number] - bound) < _AT_LIMIT:
-                kind = f"soft_{end}" if limits.is_soft(number + 1, end) else end
+                kind = f"soft_{end}" if is_soft else end
                 return message(f"jog.at_{kind}", joint=number + 1, angle=float(bound))
     if joint is None and np.linalg.svd(model.jacobian(q), compute_uv=False)[-1] < DAMPED_BELOW:
         return message("jog.at_edge")
