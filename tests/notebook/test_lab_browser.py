@@ -154,6 +154,25 @@ def turn_joint_1(page: Any, handle: Any) -> np.ndarray:
     return goal
 
 
+@pytest.fixture(scope="module")
+def goal(page: Any) -> np.ndarray:
+    """Where a person has put joint 1 by its slider; the arm is connected and powered, and a plan is slow (1 %)."""
+    run_all(page)
+    page.locator(".rl-title").wait_for()
+    wait_for(lambda: shows(page, PRO7.home), what="the arm at home in the scene", timeout=40.0, tab=page)
+    assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
+    found = turn_joint_1(page, page.locator(".widget-tab .noUi-handle:visible").first)
+    page.get_by_role("tab", name="Run", exact=True).click()
+    button(page, "Connect").click()
+    button(page, "Power on").click()
+    page.locator(".rl-chip", has_text=re.compile("^ready$")).wait_for()
+    page.get_by_role("tab", name="Plan", exact=True).click()
+    field = page.locator(".widget-tab input[type=text]:visible").first
+    field.fill("1")
+    field.press("Enter")
+    return found
+
+
 def test_jupyterlab_starts_on_loopback_and_serves_the_directory(jupyter: tuple[dict[str, Any], Path]) -> None:
     server, folder = jupyter
     assert server["hostname"] == "127.0.0.1"
@@ -163,23 +182,7 @@ def test_jupyterlab_starts_on_loopback_and_serves_the_directory(jupyter: tuple[d
 
 
 @pytest.mark.browser
-def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> None:
-    run_all(page)
-    page.locator(".rl-title").wait_for()
-    wait_for(lambda: shows(page, PRO7.home), what="the arm at home in the scene", timeout=40.0, tab=page)
-    assert page.locator(".Toastify__toast").count() == 0  # Nothing has popped up.
-
-    handle = page.locator(".widget-tab .noUi-handle:visible").first
-    goal = turn_joint_1(page, handle)
-
-    page.get_by_role("tab", name="Run", exact=True).click()
-    button(page, "Connect").click()
-    button(page, "Power on").click()
-    page.locator(".rl-chip", has_text=re.compile("^ready$")).wait_for()
-    page.get_by_role("tab", name="Plan", exact=True).click()
-    field = page.locator(".widget-tab input[type=text]:visible").first
-    field.fill("1")
-    field.press("Enter")
+def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any, goal: np.ndarray) -> None:
     button(page, "Plan there").click()
     page.locator(".rl-chip", has_text="Passed").wait_for()
     page.get_by_role("tab", name="Run", exact=True).click()
@@ -193,7 +196,7 @@ def test_a_person_runs_the_lab_moves_a_slider_executes_and_stops(page: Any) -> N
 
 @pytest.mark.browser
 def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without_timers(
-    page: Any, jupyter: tuple[dict[str, Any], Path]
+    page: Any, goal: np.ndarray, jupyter: tuple[dict[str, Any], Path]
 ) -> None:
     from jupyter_client.blocking.client import BlockingKernelClient
 
@@ -212,7 +215,7 @@ def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without
     ended = jupyter[1] / "notes" / "ended"
     assert not ended.exists()
     page.close()
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 20.0
     while not ended.exists() or ended.read_text() != LEFT_ALONE:
         assert time.monotonic() < deadline, "the cell's arm goes on although nobody is there"
         time.sleep(0.1)
