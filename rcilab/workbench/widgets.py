@@ -67,6 +67,11 @@ class BoundControl:
         if value != self._seen == before and time.monotonic() - self._touched > HAND_AWAY:
             self.handle.value = self._seen = value  # What was not there before is a hand's, whose word is on its way.
 
+    def exchange(self, options: tuple[str, ...], value: str) -> None:
+        """Gives a dropdown other options and one of them as value; viser alone would show the first one meanwhile."""
+        self.handle.options = options
+        self.handle.value = self._seen = value
+
 
 class NumberField:
     """A text box for a number: a proposal while it is typed, asked for once it is entered or the typing has paused.

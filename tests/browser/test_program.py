@@ -87,4 +87,7 @@ def test_a_waypoint_of_a_file_has_its_own_type_in_the_editor(writing):
     page.wait(lambda: field(page, "Type").input_value() == "Elbow", "the type that the list shows")
     assert field(page, "Type").is_disabled()
     page.bench.conductor.ask(EditProgram(what="add", source="here"))
-    page.wait(lambda: field(page, "Type").input_value() == "MoveJ", "the type of the new waypoint")
+    page.wait(lambda: len(page.state.program.draft.steps) == 2, "a new waypoint")
+    assert page.state.program.draft.steps[1].waypoint.type == "line"  # It goes on as a path of the tool.
+    page.wait(lambda: field(page, "Type").input_value() == "MoveL", "the type of the new waypoint")
+    page.wait(lambda: not field(page, "Type").is_disabled(), "a type that can be changed")

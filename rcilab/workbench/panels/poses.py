@@ -38,10 +38,10 @@ class PosesPanel:
                 ask(PoseGoal(page=event.client_id, name=names[event.target.value]))
 
             self._nothing = text("poses.nothing")
-            self._list = gui.add_dropdown(
+            chosen = gui.add_dropdown(
                 text("poses.stored_ones"), self._options(state), initial_value=self._chosen(state)
             )
-            self._pose = BoundControl(self._list, ask, lambda v, p: NamedPose(page=p, what="choose", name=v))
+            self._pose = BoundControl(chosen, ask, lambda v, p: NamedPose(page=p, what="choose", name=v))
             acts = gui.add_button_group("  ", [text(f"poses.{act}") for act in _ACTS], hint=text("poses.recall_hint"))
             whats: dict[str, _What] = {text(f"poses.{act}"): act for act in _ACTS}
 
@@ -62,8 +62,7 @@ class PosesPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the list."""
         if state.jog.poses != self._shown.jog.poses:
-            self._list.options = self._options(state)
-            self._list.value = self._chosen(state)
+            self._pose.exchange(self._options(state), self._chosen(state))
             if set(state.jog.poses) > set(self._shown.jog.poses):
                 self._name.handle.value = ""
         self._name.show(state.lease, "")

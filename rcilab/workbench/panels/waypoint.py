@@ -92,7 +92,7 @@ class WaypointPanel:
         is_free, box = waypoint.type in TYPES, self._kind.handle
         options = tuple(self._kinds.values()) if is_free else (label,)
         if box.options != options:
-            box.options = options
+            self._kind.exchange(options, label)
         box.disabled = not is_free
         self._kind.show(label)
 
