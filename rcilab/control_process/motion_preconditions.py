@@ -42,7 +42,7 @@ def require_admissible(
     Raises:
         InvalidValueError: It is no motion, or the certificate is something else, such as a report.
         CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
-        UsageError: The arm is moving, no controller is connected, nobody is at the controls, or the motion is too long.
+        UsageError: The arm is moving, no controller is connected, no operator is present, or the motion is too long.
     """
     require_motion(motion, certificate)
     require_mode(mode)
@@ -67,14 +67,14 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
         is_operator_overdue: Whether somebody ought to be at the controls and is not.
 
     Raises:
-        UsageError: The arm is moving, no controller is connected, or nobody is at the controls.
+        UsageError: The arm is moving, no controller is connected, or no operator is present.
     """
     if status.phase in ("moving", "stopping"):
         raise UsageError("the arm is moving; stop it first, or wait until it has arrived").coded("moving")
     if status.q_c is None or status.phase not in ("idle", "fault"):
         raise UsageError(f"nothing can move now: {status.message}").coded("not_ready")
     if is_operator_overdue:
-        raise UsageError(
-            f"nobody is at the controls: the page that holds them has not been heard of for {OPERATOR_TIMEOUT:g} s"
-        ).coded("nobody", seconds=f"{OPERATOR_TIMEOUT:g}")
+        raise UsageError(f"the operator's page is gone: no sign of it for {OPERATOR_TIMEOUT:g} s").coded(
+            "nobody", seconds=f"{OPERATOR_TIMEOUT:g}"
+        )
     return status.q_c

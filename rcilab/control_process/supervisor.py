@@ -289,7 +289,7 @@ class Supervisor(Closeable):
             InvalidValueError: The speed override is out of range.
             PlanningError: At this speed override it would break a condition, or last too long.
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
-            UsageError: The arm is moving, no controller is connected, nobody is at the controls, the motion takes more
+            UsageError: The arm is moving, no controller is connected, no operator is present, the motion takes more
                 than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
         """
         stops = self.stops if stops is None else stops
@@ -382,7 +382,7 @@ class Supervisor(Closeable):
 
         Raises:
             InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
-            UsageError: Another motion is under way, no controller is connected, nobody is at the controls, or a stop
+            UsageError: Another motion is under way, no controller is connected, no operator is present, or a stop
                 has come meanwhile.
         """
         command = build_jog(kind, values, self.model.n)
@@ -421,7 +421,7 @@ class Supervisor(Closeable):
 
         Raises:
             InvalidValueError: There is no such space or kind.
-            UsageError: The arm is moving, no controller is connected, nobody is at the controls, or a stop has come
+            UsageError: The arm is moving, no controller is connected, no operator is present, or a stop has come
                 meanwhile.
         """
         require_guidable(space, kind)

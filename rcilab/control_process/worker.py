@@ -296,7 +296,7 @@ class ControlProcess:
         self._publisher.say("moving", "moving.guided")
 
     def _mind_guiding(self) -> None:
-        """Ends hand guiding once nobody is at the controls any more."""
+        """Ends hand guiding once no operator is present any more."""
         if self._guide is None or not self._oversight.is_operator_gone:
             return
         try:

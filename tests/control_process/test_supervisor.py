@@ -197,7 +197,7 @@ def test_nobody_at_the_controls_ends_a_motion_after_two_seconds():
         status = supervisor.status()
         assert (status.phase, status.code, status.faults) == ("idle", "idle.operator", ())
         assert status.motion_time > 1.0
-        with pytest.raises(UsageError, match="nobody is at the controls"):
+        with pytest.raises(UsageError, match="the operator's page is gone"):
             begin(supervisor)
         supervisor.set_operator_present(True)
         begin(supervisor, MODEL.home, speed=1.0)

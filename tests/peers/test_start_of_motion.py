@@ -17,7 +17,7 @@ from tests.peers.wire import State
 ROUNDS = 5
 DURATION = 150  # [cycles] of one motion
 LEAN = 3.0
-"""How hard somebody leans on the tool while it yields, up and down in turn, [N]; it then rests 2 to 3 mm off."""
+"""Force on the tool while it yields, up and down in turn, [N]; it then rests 2 to 3 mm off."""
 DRAG = "drag"
 MODES = {
     "joint position": (0, wire.JOINT),
@@ -67,7 +67,7 @@ def swing(mode: tuple[int, int], start: Place) -> Callable[[State], Output]:
 
 
 def run(found: Arena, robot: Robot, name: str, start: Place, lean: float) -> None:
-    """Runs one motion; in impedance modes somebody leans on the tool until it has ended."""
+    """Runs one motion; in impedance modes the tool is pushed until it has ended."""
     mode = MODES[name]
     is_yielding = name.endswith("impedance")
     if is_yielding:

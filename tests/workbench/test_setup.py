@@ -396,4 +396,4 @@ def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
     wait(lambda: settled(bench), "the controller to have it again")
     wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
     said = Text("en").say(bench.store.state.notice.text)
-    assert said == "The controller was connected anew and told the set-up again: safety box, tool, load."
+    assert said == "The controller was connected again and sent the configuration again: safety box, tool, load."

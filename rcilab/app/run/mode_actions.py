@@ -1,4 +1,4 @@
-"""What happens when somebody chooses a mode, its parameters or a speed override. Owned by the conductor's thread."""
+"""Choosing a mode, its parameters or a speed override. Owned by the conductor's thread."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class ModeActions:
         }
 
     def set_drive(self, request: SetDrive) -> None:
-        """Chooses a mode, whose conditions then judge the plan, or a speed override; what does not exist is ignored."""
+        """Chooses a mode, whose conditions the plan is then checked by, or a speed override; ignores unknown ones."""
         state, status = self._store.state, self._session.status()
         if request.mode in MODES and request.mode != state.drive.mode:
             if is_moving(status):
@@ -154,7 +154,7 @@ class ModeActions:
         self._send(self._session.status())
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Looks what became of what was sent, tells our own controller what is new, changes the speed override."""
+        """Collects answers, sends the virtual controller what is new, changes the speed override."""
         name = self._store.state.model.name
         if name != self._arm:
             self._arm = name
