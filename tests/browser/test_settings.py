@@ -79,7 +79,7 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     question.wait_for()
     assert other.tab.get_by_role("alertdialog").count() == 0
     question.get_by_role("button", name="Keep them").click()
-    other.wait(lambda: "was told no" in other.toast(), "the answer")
+    other.wait(lambda: "was refused" in other.toast(), "the answer")
     other.button("Ask for the controls").first.click()
     question.get_by_role("button", name="Hand over").click()
     other.wait(lambda: page.chip("controls") == "page 2; this is page 1", "the first page to see who has the controls")

@@ -55,6 +55,8 @@ def test_the_box_follows_the_controller_whoever_set_it(bench: Workbench) -> None
     assert address is not None
     host, _, port = address.partition(":")
     with SimulationControl(host, int(port)) as world:
+        # What the test before has asked for on the page has arrived, or it would come after what is set here.
+        wait(lambda: world.status().auto_limit is bench.store.state.world.auto_limit, "the page's own request")
         for on in (True, False, True):
             world.set_auto_limit(on)
             wait(lambda on=on: bench.store.state.world.auto_limit is on, "the box")
