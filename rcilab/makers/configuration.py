@@ -5,7 +5,7 @@ Values that every maker understands; what is None is left as the controller has 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -17,10 +17,6 @@ from rcilab.model.dynamics.payload import Payload
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
-
-ControlPart: TypeAlias = Literal[
-    "joint_stiffness", "cartesian_stiffness", "desired_wrench", "collision_thresholds", "filters", "report_filter"
-]
 
 SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "joints", "control"]
 
@@ -54,22 +50,27 @@ class SoftJointLimits:
     upper: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerParameters:
-    """Parameters of the modes; what is None is left as the controller has it. Ranges: `control_ranges`."""
+class ControllerParameters(Mapping[str, tuple[float, ...]]):
+    """Parameters of the modes by name of the group; groups that are missing are left as the controller has them.
 
-    joint_stiffness: tuple[float, ...] | None = None
-    """Of joint impedance, n numbers, [N m/rad]."""
-    cartesian_stiffness: tuple[float, ...] | None = None
-    """Of Cartesian impedance: three [N/m], three [N m/rad]."""
-    desired_wrench: tuple[float, ...] | None = None
-    """What Cartesian impedance presses with: three [N], three [N m]."""
-    collision_thresholds: tuple[float, ...] | None = None
-    """Torques from outside that are a collision, n numbers, [N m]."""
-    filters: tuple[float, ...] | None = None
-    """Cut-off frequencies for commanded angles, poses and torques, [Hz]; 1000 switches one off."""
-    report_filter: tuple[float, ...] | None = None
-    """Cut-off frequency for reported torques, one number, [Hz]."""
+    Args:
+        groups: Such as `joint_stiffness=(...)`. Which groups there are: `Maker.parameters`.
+    """
+
+    def __init__(self, **groups: tuple[float, ...]) -> None:
+        self._groups = groups
+
+    def __getitem__(self, name: str) -> tuple[float, ...]:
+        return self._groups[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._groups)
+
+    def __len__(self) -> int:
+        return len(self._groups)
+
+    def __repr__(self) -> str:
+        return f"ControllerParameters({', '.join(f'{name}={values!r}' for name, values in self.items())})"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -22,6 +22,7 @@ from rcilab.robots import ROBOTS_BY_MAKER
 
 if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
+    from rcilab.makers.parameters import ParameterGroup
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.maker_server import MakerServer
     from rcilab.sim.virtual_arm import VirtualArm
@@ -100,6 +101,10 @@ class Maker(Protocol):
         """Returns the faults that its controllers report: number, name, cause, remedy."""
         ...
 
+    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
+        """Returns what one of its controllers can be set to beside tool, load and limits, in the order to show it."""
+        ...
+
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
         """Returns the virtual side of its wire for one of its arms; only where `capabilities.simulates`."""
         ...
@@ -119,6 +124,10 @@ class Maker(Protocol):
 
 class PlanningOnly:
     """The part of a maker whose arms can be computed with, but neither simulated nor driven."""
+
+    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
+        """Returns nothing: there is no controller to set."""
+        return ()
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
         """Refuses: there is no virtual controller."""
@@ -142,6 +151,12 @@ def all_makers() -> tuple[Maker, ...]:
 def maker_of(model: RobotModel) -> Maker | None:
     """Returns the maker of an arm; None for an arm without a maker."""
     return next((maker for maker in all_makers() if maker.name == model.description.maker), None)
+
+
+def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
+    """Returns what the controller of an arm can be set to, see `Maker.parameters`."""
+    maker = maker_of(model)
+    return () if maker is None else maker.parameters(model)
 
 
 def find_scheme(scheme: str) -> Maker | None:

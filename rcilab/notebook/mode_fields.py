@@ -8,26 +8,19 @@ from typing import Any
 import ipywidgets
 
 from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
-from rcilab.app.run.mode_parameters import (
-    PARTS_OF_MODE,
-    held_rows,
-    is_control_pending,
-    name_number,
-    name_part,
-    shown_numbers,
-)
+from rcilab.app.run.mode_parameters import held_rows, is_control_pending, name_group, shown_numbers
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import Text
-from rcilab.makers.configuration import ControllerParameters, ControlPart
-from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.makers.configuration import ControllerParameters
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import ParameterGroup
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _WIDTHS = ("8em", "3.4em", "4.2em")  # So that two fields stand in a row inside `Lab`.
-_OPEN: tuple[ControlPart, ...] = ("joint_stiffness", "cartesian_stiffness")
 
 
 class ModeFields:
@@ -41,16 +34,16 @@ class ModeFields:
 
     def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
         self._state, self._text, self._modes = state, text, modes
-        self._ranges = control_ranges(state.model.limits)
+        self._groups = parameters_of(state.model)
         self.mode: Any = lean(
             ipywidgets.Dropdown, description=text("mode.choose"),
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
             value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
         self._note, self._held, self._said = block(), block(), block()
-        self.fields: dict[ControlPart, list[NumberField]] = {}
-        """Those of the parts that somebody has opened."""
-        self.folders: dict[ControlPart, Any] = {part: self._folder(part) for part in self._ranges}
+        self.fields: dict[str, list[NumberField]] = {}
+        """By group, of the groups that were opened."""
+        self.folders: dict[str, Any] = {group.name: self._folder(group) for group in self._groups}
         self.send = self._button("control.send", self._on_send)
         self.reset = self._button("control.reset", partial(self._ask, PressControl(what="reset")))
         self._shown: ControllerParameters | None = None
@@ -70,15 +63,16 @@ class ModeFields:
         self.mode.value = state.now.drive.mode
         self.mode.disabled = status is not None and status.phase in ("moving", "stopping")
         write(self._note, soft(text(f"mode.{state.now.drive.mode}_note")))
-        for part, folder in self.folders.items():
-            shown = None if part in PARTS_OF_MODE[state.now.drive.mode] else "none"
+        for group in self._groups:
+            folder, shown = self.folders[group.name], None if state.now.drive.mode in group.modes else "none"
             if folder.layout.display != shown:
                 folder.layout.display = shown
-                folder.selected_index = 0 if shown is None and part in _OPEN else None
+                folder.selected_index = 0 if shown is None and group.is_first else None
         if self._shown is not state.now.drive.control:
             self._shown = state.now.drive.control
-            for part in self.fields:
-                self._fill(part)
+            for group in self._groups:
+                if group.name in self.fields:
+                    self._fill(group)
         pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
         self.send.layout.display = "none" if state.robot is None or state.now.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"
@@ -89,8 +83,7 @@ class ModeFields:
         if state.now.drive.refusal is not None:
             return problem(text("ready.control_refused", error=text.say(state.now.drive.refusal)))
         known = state.session is None and state.robot is not None and state.now.is_virtual
-        own = standard_control(state.model.limits) if known else ControllerParameters()
-        rows = held_rows(state.now.drive.mode, status.setup.control, own, text)
+        rows = held_rows(self._groups, state.now.drive.mode, status.setup.control, text, is_known=known)
         told = soft(text("control.held")) + table([], [list(row) for row in rows])
         return told + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
 
@@ -110,40 +103,38 @@ class ModeFields:
             self._modes.handlers[type(request)](request)
             self._state.tell("robot")
 
-    def _set_number(self, part: ControlPart, place: int, value: float) -> None:
-        self._ask(SetControl(part=part, place=place, value=value))
+    def _set_number(self, group: str, index: int, value: float) -> None:
+        self._ask(SetControl(group=group, index=index, value=value))
 
-    def _folder(self, part: ControlPart) -> Any:
+    def _folder(self, group: ParameterGroup) -> Any:
         """Returns a folder whose fields are made when it is opened: forty of them would delay the cell."""
         inside = lean(ipywidgets.Box, layout={"flex_flow": "row wrap"})
         folder = lean(
-            ipywidgets.Accordion, children=[inside], titles=(name_part(self._text, part, self._ranges[part]),),
+            ipywidgets.Accordion, children=[inside], titles=(name_group(self._text, group),),
             selected_index=None,
             layout=ipywidgets.Layout(display="none"),
         )  # fmt: skip
 
         def open_it(change: Any) -> None:
-            if change["new"] == 0 and part not in self.fields:
-                self.fields[part] = [self._field(part, place) for place in range(len(self._ranges[part]))]
-                self._fill(part)
-                cells = [
-                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.said])
-                    for field in self.fields[part]
-                ]
-                inside.children = tuple(cells)
+            if change["new"] == 0 and group.name not in self.fields:
+                fields = self.fields[group.name] = [self._field(group, index) for index in range(len(group.parameters))]
+                self._fill(group)
+                inside.children = tuple(
+                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.said]) for field in fields
+                )
 
         folder.observe(open_it, names="selected_index")
         return folder
 
-    def _field(self, part: ControlPart, place: int) -> NumberField:
-        low, high, unit = self._ranges[part][place]
-        take = partial(self._set_number, part, place)
-        name = name_number(self._text, part, place)
-        return NumberField(self._text, name, unit, low, high, take, digits=None, widths=_WIDTHS)
+    def _field(self, group: ParameterGroup, index: int) -> NumberField:
+        item = group.parameters[index]
+        take = partial(self._set_number, group.name, index)
+        name = self._text.say(item.label)
+        return NumberField(self._text, name, item.unit, item.low, item.high, take, digits=None, widths=_WIDTHS)
 
-    def _fill(self, part: ControlPart) -> None:
-        numbers = shown_numbers(self._state.now.drive.control, part, self._state.model.limits)
-        for field, number in zip(self.fields[part], numbers, strict=True):
+    def _fill(self, group: ParameterGroup) -> None:
+        numbers = shown_numbers(self._state.now.drive.control, group)
+        for field, number in zip(self.fields[group.name], numbers, strict=True):
             field.show(number)
 
     def _button(self, code: str, act: Any) -> Any:

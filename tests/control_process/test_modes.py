@@ -164,4 +164,6 @@ def test_parameters_are_acknowledged_and_told_again(supervisor):
     ticket = supervisor.set_up(RobotConfiguration(control=beyond))
     with pytest.raises((InvalidValueError, CommandRejectedError), match="joint 1"):
         ticket.wait(SOON)
+    with pytest.raises(InvalidValueError, match=r"sideways.*known: joint_stiffness"):
+        supervisor.set_up(RobotConfiguration(control=ControllerParameters(sideways=(1.0,)))).wait(SOON)
     supervisor.set_up(RobotConfiguration(control=ControllerParameters(filters=(1000.0,) * 3))).wait(SOON)

@@ -11,7 +11,6 @@ import pytest
 import rcilab
 from rcilab import notebook
 from rcilab.app.goal.goal_actions import SetSpeed
-from rcilab.app.run.mode_parameters import PARTS_OF_MODE
 from rcilab.app.session_connection import BusyError
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.cycle_log import cycle_dtype
@@ -19,7 +18,8 @@ from rcilab.core.state import MODES
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import Text
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
-from rcilab.makers.rokae.driver.controller_parameters import standard_control
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import default_parameters
 from rcilab.notebook import robot_words
 from tests.waiting import wait_for
 
@@ -64,12 +64,12 @@ def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> 
         field.box.value = "30000"
         assert "outside 0" in text_of(field.said)
         field.box.value = "1234 N·m/rad"
-        wait_for(lambda: (told := held(panel)) is not None and told.joint_stiffness[2] == 1234.0, 30.0, "the answer")
+        wait_for(lambda: (told := held(panel)) is not None and told["joint_stiffness"][2] == 1234.0, 30.0, "the answer")
         run = run_in(panel, "joint_impedance", 0.5, 0.05)
         assert run.setup.mode == "joint_impedance"
         assert "1234" in text_of(panel.modes._held)
         panel.modes.reset.click()
-        wait_for(lambda: held(panel) == standard_control(PRO7.limits), 30.0, "the defaults")
+        wait_for(lambda: held(panel) == default_parameters(parameters_of(PRO7)), 30.0, "the defaults")
         assert field.box.value == "3000"
 
 
@@ -138,9 +138,8 @@ def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> 
         assert robot.told == []
         assert robot.name in text_of(panel.modes._said)
         panel.modes.send.click()
-        assert [told.joint_stiffness for told in robot.told] == [
-            (500.0, *standard_control(PRO7.limits).joint_stiffness[1:])
-        ]
+        stiffness = default_parameters(parameters_of(PRO7))["joint_stiffness"]
+        assert [told["joint_stiffness"] for told in robot.told] == [(500.0, *stiffness[1:])]
 
 
 def test_refusals_are_told_in_the_language_of_the_panel() -> None:
@@ -169,4 +168,4 @@ def test_every_mode_has_words_and_every_part_a_name() -> None:
     for language in LANGUAGES:
         text = Text(language, "rcilab.notebook")
         assert all(text.has(f"mode.{mode}") and text.has(f"mode.{mode}_note") for mode in MODES)
-        assert all(text.has(f"control.{part}") for parts in PARTS_OF_MODE.values() for part in parts)
+        assert all(text.has(f"control.{group.name}") for group in parameters_of(PRO7))

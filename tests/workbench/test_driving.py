@@ -12,7 +12,7 @@ from rcilab.app.goal.goal_actions import MoveJoint, SetLaw, SetSpeed
 from rcilab.app.request import TypeField
 from rcilab.app.run.drive_state import control_field
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import PARTS_OF_MODE, said_ranges
+from rcilab.app.run.mode_parameters import find_group, format_ranges
 from rcilab.app.run.played_motion import played_path
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.target_robot_actions import ChooseDestination
@@ -21,8 +21,9 @@ from rcilab.app.text import Text, load_catalogue
 from rcilab.app.view_actions import ShowPlot
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import default_parameters
 from rcilab.makers.rokae.controller.settings import Settings
-from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
 from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html
@@ -83,23 +84,31 @@ def execute(bench, place=0.3):
 
 
 def test_what_the_page_takes_for_defaults_is_what_the_virtual_controller_wakes_up_with():
-    ours, woken = standard_control(MODEL.limits), Settings.of(MODEL.description)
-    assert ours.joint_stiffness == woken.joint_stiffness
-    assert ours.cartesian_stiffness == woken.cartesian_stiffness
-    assert ours.desired_wrench == woken.desired_wrench
-    assert ours.collision_thresholds == woken.collision_thresholds
-    assert ours.filters == (woken.joint_filter, woken.cartesian_filter, woken.torque_filter)
-    assert ours.report_filter == (woken.torque_report_filter,)
+    ours, woken = default_parameters(parameters_of(MODEL)), Settings.of(MODEL.description)
+    assert ours == {
+        "joint_stiffness": woken.joint_stiffness,
+        "cartesian_stiffness": woken.cartesian_stiffness,
+        "desired_wrench": woken.desired_wrench,
+        "collision_thresholds": woken.collision_thresholds,
+        "filters": (woken.joint_filter, woken.cartesian_filter, woken.torque_filter),
+        "report_filter": (woken.torque_report_filter,),
+    }
 
 
 def test_every_part_says_its_unit_and_range_and_has_its_words():
-    ranges = control_ranges(MODEL.limits)
-    assert said_ranges(ranges["joint_stiffness"]) == "[0…3000, 300 N·m/rad]"
+    groups = parameters_of(MODEL)
+    assert format_ranges(find_group(groups, "joint_stiffness")) == "[0…3000, 300 N·m/rad]"
     words = load_catalogue("en")
     for mode in MODES:
         assert {f"mode.{mode}", f"mode.{mode}_note"} <= words.keys()
-        assert set(PARTS_OF_MODE[mode]) <= ranges.keys()
-    assert {f"control.{part}" for part in ranges} <= words.keys()
+    assert {f"control.{group.name}" for group in groups} <= words.keys()
+    assert {item.label.code for group in groups for item in group.parameters} <= words.keys()
+    assert [group.name for group in groups if "cartesian_position" in group.modes] == [
+        "collision_thresholds",
+        "filters",
+        "report_filter",
+    ]
+    assert [group.name for group in groups if group.is_first] == ["joint_stiffness", "cartesian_stiffness"]
 
 
 @pytest.mark.parametrize("name", ["control.joint_stiffness.7", "control.sideways.0", "control.filters", "control"])
@@ -111,13 +120,14 @@ def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
     ask = idle.conductor.ask
     ask(TypeField(field="control.joint_stiffness.2", text="1234 N·m/rad"))
     wait(
-        lambda: (c := idle.session.status().setup.control) is not None and c.joint_stiffness[2] == 1234.0, "the answer"
+        lambda: (c := idle.session.status().setup.control) is not None and c["joint_stiffness"][2] == 1234.0,
+        "the answer",
     )
     ask(TypeField(field="control.joint_stiffness.2", text="30000"))
     wait(lambda: "control.joint_stiffness.2" in idle.store.state.problems, "the complaint")
-    assert idle.store.state.drive.control.joint_stiffness[2] == 1234.0
+    assert idle.store.state.drive.control["joint_stiffness"][2] == 1234.0
     ask(PressControl(what="reset"))
-    wait(lambda: idle.session.status().setup.control == standard_control(MODEL.limits), "the defaults")
+    wait(lambda: idle.session.status().setup.control == default_parameters(parameters_of(MODEL)), "the defaults")
     assert "control.joint_stiffness.2" not in idle.store.state.problems
 
 

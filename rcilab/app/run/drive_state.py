@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from rcilab.app.run.mode_parameters import control_obstacle, is_control_pending
+from rcilab.app.run.mode_parameters import control_obstacle, find_group, is_control_pending
 from rcilab.app.text import Message
 from rcilab.core.state import Mode
-from rcilab.makers.configuration import ControllerParameters, ControlPart
-from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.makers.configuration import ControllerParameters
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import ParameterGroup
 
 if TYPE_CHECKING:
     from rcilab.app.app_state import AppState
@@ -39,10 +40,6 @@ class DriveState:
     override_refusal: Message | None = None
     """Why the motion in progress did not take another one."""
 
-    def wanted_control(self, model: RobotModel) -> ControllerParameters:
-        """Returns the parameters to show: those typed, or what a controller wakes up with."""
-        return self.control if self.control is not None else standard_control(model.limits)
-
 
 def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
     """Chooses how motions are commanded; the plan is checked by the conditions of that mode."""
@@ -51,13 +48,13 @@ def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
     store.update(drive=replace(state.drive, mode=mode), plan=plan)
 
 
-def control_field(model: RobotModel, name: str) -> tuple[ControlPart, int] | None:
-    """Returns part and place of a typed field, such as control.joint_stiffness.0; None: there is no such field."""
-    _, part, place = (*name.split("."), "", "")[:3]
-    for known, ranges in control_ranges(model.limits).items():
-        if part == known and place in map(str, range(len(ranges))):
-            return known, int(place)
-    return None
+def control_field(model: RobotModel, name: str) -> tuple[ParameterGroup, int] | None:
+    """Returns group and index of a typed field, such as control.joint_stiffness.0; None: there is no such field."""
+    _, part, index = (*name.split("."), "", "")[:3]
+    group = find_group(parameters_of(model), part)
+    if group is None or index not in map(str, range(len(group.parameters))):
+        return None
+    return group, int(index)
 
 
 def is_pending(state: AppState, status: SupervisorStatus) -> bool:

@@ -11,7 +11,7 @@ from rcilab.app.app_state import AppState
 from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
-from rcilab.app.run.mode_parameters import SECOND_THOUGHT, ask_to_send, with_number
+from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT, ask_to_send, find_group, with_number
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_override_refusal
 from rcilab.app.setup.configuration_sender import ConfigurationSender
@@ -21,7 +21,8 @@ from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.rokae.driver.controller_parameters import ControlPart, control_ranges, standard_control
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import default_parameters
 from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 
 if TYPE_CHECKING:
@@ -53,9 +54,10 @@ class PressControl(Request):
 class SetControl(Request):
     """Change one number of the modes' parameters."""
 
-    part: ControlPart
-    place: int
-    """From 0."""
+    group: str
+    """Name of the group."""
+    index: int
+    """In the group, from 0."""
     value: float
 
 
@@ -117,35 +119,38 @@ class ModeActions:
         found = control_field(state.model, request.field)
         if found is None:
             return
-        part, place = found
-        bounds = control_ranges(state.model.limits)[part][place]
+        group, index = found
+        bounds = group.parameters[index]
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
             self._store.complain(request.field, parsed.problem)
             return
         self._store.clear_problems(request.field)
-        self.set_control(SetControl(part=part, place=place, value=parsed.value))
+        self.set_control(SetControl(group=group.name, index=index, value=parsed.value))
 
     def set_control(self, request: SetControl) -> None:
         """Changes a parameter; a refusal of the ones before is forgotten."""
         state = self._store.state
-        before = state.drive.control
+        groups, before = parameters_of(state.model), state.drive.control
+        group = find_group(groups, request.group)
+        if group is None:
+            return
         if before is None and not self._keeps_rest:
-            before = standard_control(state.model.limits)
-        control = with_number(before, request.part, request.place, request.value, state.model.limits)
+            before = default_parameters(groups)
+        control = with_number(before, group, request.index, request.value)
         self._store.update(drive=replace(state.drive, control=control, refusal=None))
 
     def press(self, request: PressControl) -> None:
         """Sends the parameters, or takes those that a controller wakes up with."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":
-            control = standard_control(state.model.limits)
+            control = default_parameters(parameters_of(state.model))
             drive = replace(state.drive, control=control, refusal=None)
             self._store.clear_problems("control.")
             self._store.update(drive=drive)
             return
-        if state.target != "virtual" and now - self._asked_to_send > SECOND_THOUGHT:
+        if state.target != "virtual" and now - self._asked_to_send > CONFIRM_TIMEOUT:
             self._asked_to_send = now
             self._store.say("warn", ask_to_send(state.target))
             return

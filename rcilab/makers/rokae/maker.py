@@ -12,9 +12,11 @@ from rcilab.makers.rokae.robots import ROBOTS
 
 if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm
+    from rcilab.makers.parameters import ParameterGroup
     from rcilab.makers.rokae.controller.rci_server import RciServer
     from rcilab.makers.rokae.driver.address import RciAddress
     from rcilab.makers.rokae.driver.rci_driver import RciDriver
+    from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.virtual_arm import VirtualArm
 
@@ -37,6 +39,12 @@ class Rokae:
     def faults(self) -> type[Fault]:
         """Returns the twenty faults of the RCI."""
         return Fault
+
+    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
+        """Returns stiffness, desired wrench, collision thresholds and filters."""
+        from rcilab.makers.rokae.parameters import parameter_groups
+
+        return parameter_groups(model.limits)
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> RciServer:
         """Returns the virtual side of the RCI."""

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import PARTS_OF_MODE, held_rows, name_number, name_part
+from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text, message
 from rcilab.core.state import MODES, Mode
-from rcilab.makers.configuration import ControllerParameters, ControlPart
-from rcilab.makers.rokae.driver.controller_parameters import control_ranges, standard_control
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import ParameterGroup
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
 
@@ -49,19 +49,22 @@ class ModePanel:
                 on_press(reset, ask, lambda page: PressControl(page=page, what="reset"))
 
     def _build_parts(self, gui: Any, state: UiState) -> None:
-        self._folders: dict[ControlPart, Any] = {}
-        self._fields: dict[ControlPart, list[NumberField]] = {}
-        self._labels: dict[str, str] = {}
-        self._problems: dict[ControlPart, Html] = {}
-        for part, ranges in control_ranges(state.model.limits).items():
-            visible = part in PARTS_OF_MODE[state.drive.mode]
-            closed = part not in ("joint_stiffness", "cartesian_stiffness")
-            folder = gui.add_folder(name_part(self._text, part, ranges), visible=visible, expand_by_default=not closed)
+        text = self._text
+        self._groups = parameters_of(state.model)
+        self._folders: dict[str, Any] = {}
+        self._fields: dict[str, list[NumberField]] = {}
+        self._labels: dict[str, list[tuple[str, str]]] = {}
+        self._problems: dict[str, Html] = {}
+        for group in self._groups:
+            visible = state.drive.mode in group.modes
+            folder = gui.add_folder(name_group(text, group), visible=visible, expand_by_default=group.is_first)
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
-                self._fields[part] = [self._build_field(gui, part, place) for place in range(len(ranges))]
-                self._problems[part] = Html(gui)
-            self._folders[part] = folder
+                names = [text.say(parameter.label) for parameter in group.parameters]
+                fields = [self._build_field(gui, group, index, name) for index, name in enumerate(names)]
+                self._labels[group.name] = [(field.field, name) for field, name in zip(fields, names, strict=True)]
+                self._fields[group.name], self._problems[group.name] = fields, Html(gui)
+            self._folders[group.name] = folder
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows mode and parameters."""
@@ -69,23 +72,20 @@ class ModePanel:
         self._mode.show(self._names[drive.mode])
         self._mode.handle.disabled = is_moving(status)
         self._note.show(f'<p class="rl-note">{esc(text(f"mode.{drive.mode}_note"))}</p>')
-        wanted = drive.wanted_control(state.model)
-        for part, folder in self._folders.items():
-            visible = part in PARTS_OF_MODE[drive.mode]
+        for group in self._groups:
+            folder, visible = self._folders[group.name], drive.mode in group.modes
             if folder.visible != visible:
                 folder.visible = visible
-            for field, number in zip(self._fields[part], getattr(wanted, part), strict=True):
+            for field, number in zip(self._fields[group.name], shown_numbers(drive.control, group), strict=True):
                 field.show(f"{number:g}", state.problems.get(field.field), state.entered)
-            labels = [(field.field, self._labels[field.field]) for field in self._fields[part]]
-            self._problems[part].show(problems_html(state, text, labels))
+            self._problems[group.name].show(problems_html(state, text, self._labels[group.name]))
         self._send.visible = state.target != "virtual"
         self._send.disabled = not is_pending(state, status) or status.phase != "idle"
         self._held.show(held_html(state, status, text))
 
-    def _build_field(self, gui: Any, part: ControlPart, place: int) -> NumberField:
-        name = f"control.{part}.{place}"
-        self._labels[name] = label = name_number(self._text, part, place)
-        return NumberField(gui.add_text(label, "", hint=self._text("target.type_hint")), self._ask, name)
+    def _build_field(self, gui: Any, group: ParameterGroup, index: int, label: str) -> NumberField:
+        handle = gui.add_text(label, "", hint=self._text("target.type_hint"))
+        return NumberField(handle, self._ask, f"control.{group.name}.{index}")
 
 
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
@@ -93,10 +93,10 @@ def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if state.drive.refusal is not None:
         why = text.say(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
-    own = standard_control(state.model.limits) if state.target == "virtual" else ControllerParameters()
+    groups, is_known = parameters_of(state.model), state.target == "virtual"
     rows = "".join(
-        f"<tr><th>{esc(name)}</th><td>{esc(said)}</td></tr>"
-        for name, said in held_rows(state.drive.mode, status.setup.control, own, text)
+        f"<tr><th>{esc(name)}</th><td>{esc(shown)}</td></tr>"
+        for name, shown in held_rows(groups, state.drive.mode, status.setup.control, text, is_known=is_known)
     )
     pending = f'<p class="rl-note rl-why">{esc(text("control.pending"))}</p>' if is_pending(state, status) else ""
     title = f'<p class="rl-note">{esc(text("control.held"))}</p>'

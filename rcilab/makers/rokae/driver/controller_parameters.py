@@ -1,50 +1,14 @@
-"""How a controller follows and when it gives up: stiffness, desired force, collision thresholds, filters.
-
-The settings of the RCI that belong to the five modes: `setJointImpedance`, `setCartesianImpedance`,
-`setCartImpDesiredTau`, `setCollisionBehavior`, `setFilters` and `setTorqueFilterCutOffFrequency`.
-"""
+"""Sending a configuration to an RCI controller: tool, load, safety box, and the parameters of the modes."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from rcilab.makers.configuration import ControllerParameters, ControlPart, RobotConfiguration, require_control
-from rcilab.makers.rokae.wire.bounds import FILTER_OFF, LOWEST_FREQUENCY
+from rcilab.core.errors import InvalidValueError
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration, require_control
 
 if TYPE_CHECKING:
-    from rcilab.core.limits import Limits
     from rcilab.makers.rokae.driver.settings import RciSettings
-
-REPORT_FREQUENCY = 100.0  # [Hz] What a controller wakes up with for the torques that it reports.
-
-
-class Range(NamedTuple):
-    """What one number of the settings may be."""
-
-    low: float
-    high: float
-    unit: str
-
-
-def control_ranges(limits: Limits) -> dict[ControlPart, tuple[Range, ...]]:
-    """Returns the range of every number, from the arm's one table of limits."""
-    joint, tool = limits.joint, limits.cartesian
-    frequency = Range(LOWEST_FREQUENCY, FILTER_OFF, "Hz")
-    return {
-        "joint_stiffness": tuple(Range(0.0, k, "N·m/rad") for k in joint.stiffness.tolist()),
-        "cartesian_stiffness": (Range(0.0, tool.translation_stiffness, "N/m"),) * 3
-        + (Range(0.0, tool.rotation_stiffness, "N·m/rad"),) * 3,
-        "desired_wrench": (Range(-tool.force, tool.force, "N"),) * 3 + (Range(-tool.moment, tool.moment, "N·m"),) * 3,
-        "collision_thresholds": tuple(Range(0.0, tau, "N·m") for tau in joint.collision_threshold.tolist()),
-        "filters": (frequency,) * 3,
-        "report_filter": (frequency,),
-    }
-
-
-def standard_control(limits: Limits) -> ControllerParameters:
-    """Returns what a controller wakes up with: the stiffest springs, the highest thresholds, no filter of commands."""
-    top = {name: tuple(item.high for item in ranges) for name, ranges in control_ranges(limits).items()}
-    return ControllerParameters(**top | {"desired_wrench": (0.0,) * 6, "report_filter": (REPORT_FREQUENCY,)})
 
 
 def send_parameters(settings: RciSettings, control: ControllerParameters) -> None:
@@ -58,19 +22,20 @@ def send_parameters(settings: RciSettings, control: ControllerParameters) -> Non
         InvalidValueError: A number is outside its range; it was not sent.
         CommandRejectedError: The controller refused; the error names the command.
     """
-    require_control(control)
-    if control.joint_stiffness is not None:
-        settings.set_joint_impedance(control.joint_stiffness)
-    if control.cartesian_stiffness is not None:
-        settings.set_cartesian_impedance(control.cartesian_stiffness)
-    if control.desired_wrench is not None:
-        settings.set_cart_imp_desired_tau(control.desired_wrench)
-    if control.collision_thresholds is not None:
-        settings.set_collision_behavior(control.collision_thresholds)
-    if control.filters is not None:
-        settings.set_filters(*control.filters)
-    if control.report_filter is not None:
-        settings.set_torque_filter_cut_off_frequency(control.report_filter[0])
+    known = {
+        "joint_stiffness": settings.set_joint_impedance,
+        "cartesian_stiffness": settings.set_cartesian_impedance,
+        "desired_wrench": settings.set_cart_imp_desired_tau,
+        "collision_thresholds": settings.set_collision_behavior,
+        "filters": lambda values: settings.set_filters(*values),
+        "report_filter": lambda values: settings.set_torque_filter_cut_off_frequency(*values),
+    }
+    unknown = require_control(control).keys() - known
+    if unknown:
+        raise InvalidValueError("control", sorted(unknown), f"does not exist; known: {', '.join(known)}")
+    for name, send in known.items():
+        if name in control:
+            send(control[name])
 
 
 def send_configuration(settings: RciSettings, setup: RobotConfiguration) -> None:
