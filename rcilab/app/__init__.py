@@ -1,1 +1,1 @@
-"""From where somebody wants the arm to a judged motion, and what is to be said about it."""
+"""The application under page and notebook: from a goal to a checked motion, its execution and its messages."""

@@ -71,7 +71,7 @@ class AppState:
     """Where in the plan the preview stands, 0 to 1."""
     playing: bool = False
     notices: tuple[Toast, ...] = ()
-    """The newest of each page and of all pages together, oldest first: what one is told takes no place of another's."""
+    """The newest of each page and of all pages together, oldest first: one page's never displace another's."""
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
     """What is wrong with typed numbers, by field."""
 

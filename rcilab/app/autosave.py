@@ -1,4 +1,4 @@
-"""What a workbench had comes back with the next one: program, set-up and looks; after a crash the goal, too."""
+"""Restores the last workbench's program, configuration and view settings; after a crash the goal, too."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _FORMAT, _VERSION = "rcilab workbench", 1
 Look: TypeAlias = Literal["language", "theme", "angle", "length"]
 _AT_FIRST: dict[Look, str] = {"language": "en", "theme": "light", "angle": "deg", "length": "mm"}
-_PAUSE = 1.0  # [s] A choice: between two writings, while somebody drags.
+_PAUSE = 1.0  # [s] Between two writings, during a drag.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,7 +36,7 @@ class SavedState:
     """The goal, shape (n,), [rad]; None where the workbench was closed."""
     program: Program | None = None
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
-    """Those parts of the set-up that were edited."""
+    """Those parts of the configuration that were edited."""
 
 
 def looks_of(state: UiState) -> dict[Look, str]:
@@ -58,14 +58,14 @@ def keepsake_file(port: int) -> Path:
 
 
 class Autosave:
-    """Writes down how the page looks, and goal, program and set-up of every arm, when they have changed.
+    """Writes down how the page looks, and goal, program and configuration of every arm, when they have changed.
 
     Owned by the conductor's thread.
 
-    Nobody asked for this file, so where it cannot be written or read it is done without, silently.
+    This file was not asked for, so where it cannot be written or read it is left out silently.
 
     Args:
-        file: Where; its place belongs to whoever holds the port it is named for. None: nowhere.
+        file: Where; it belongs to the process that holds the port it is named for. None: nowhere.
     """
 
     def __init__(self, file: Path | None) -> None:
@@ -146,7 +146,7 @@ class Autosave:
             self._write(self._arms)
 
     def close(self, state: UiState) -> None:
-        """Forgets goals: somebody has closed the workbench on purpose. What belongs to an arm stays, and looks."""
+        """Forgets goals: the workbench was closed on purpose. What belongs to an arm stays, and view settings."""
         if self._file is None:
             return
         self._next = 0.0

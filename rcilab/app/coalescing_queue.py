@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class CoalescingQueue(Generic[T]):
-    """A queue in which a newer request can replace an older one that nobody has looked at yet.
+    """A queue in which a newer request can replace an older one that has not been taken yet.
 
     While a gizmo is dragged, twenty positions a second arrive; only the newest is worth solving.
     """

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 SILENCE = 2.0  # [s] A page that has not answered for so long is gone: the same time that stops a motion.
-PATIENCE = 10.0  # [s] A choice: for so long the holder may think about handing over, while the arm stands.
-_LOADING = 20.0  # [s] A choice: a page that has just opened may take so long until its first word.
+PATIENCE = 10.0  # [s] For so long the holder may think about handing over, while the arm stands.
+_LOADING = 20.0  # [s] A page that has just opened may take so long until its first word.
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class ControlLock:
     since: float = -math.inf
     """When it asked, or when the controls became free, as `time.monotonic` counts."""
     former: int | None = None
-    """Held the controls until it fell silent; gets them back if it speaks before somebody takes them."""
+    """Held the controls until it fell silent; gets them back if it speaks before another page takes them."""
 
     def arrive(self, page: int) -> ControlLock:
         """Returns the lease after a page has opened; it gets the controls when they are free."""

@@ -73,7 +73,7 @@ class ControlLockActions:
         }
 
     def page_came(self, request: PageOpened) -> None:
-        """Notes a page; it gets the controls when nobody has them."""
+        """Notes a page; it gets the controls when no page has them."""
         if request.page is not None:
             self._presence.came(request.page)
             self._store.update(lease=self._store.state.lease.arrive(request.page))
@@ -125,7 +125,7 @@ class ControlLockActions:
             self._find_holder(now)
 
     def _find_holder(self, now: float) -> None:
-        """Gives free controls back to the page that had them, or to the only one once the arm has come to rest."""
+        """Gives free controls back to the page that had them, or to the only one once the arm stands."""
         lease = self._store.state.lease
         if lease.former is not None and not self._presence.is_silent(lease.former):
             self._store.update(lease=lease.take(lease.former))

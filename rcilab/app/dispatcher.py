@@ -39,8 +39,8 @@ from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import memory_needed
 
-_TICK = 0.03  # [s] A choice: about the display's rate; also how often the robot is looked at.
-_AGAIN = 1.0  # [s] A choice: a page that acts without the controls is told so once in that time.
+_TICK = 0.03  # [s] About the display's rate; also how often the robot is looked at.
+_AGAIN = 1.0  # [s] A page that acts without the controls is answered once in that time.
 
 
 class Dispatcher:
@@ -196,7 +196,7 @@ class Dispatcher:
             self._store.say("good", message("setup.back", what=name_parts(tuple(back)), model=name))
 
     def _refuse(self, request: Request) -> None:
-        """Tells a page that it only watches, unless it has got the controls meanwhile."""
+        """Informs a page that it is a spectator, unless it has got the controls meanwhile."""
         lease = self._store.state.lease
         now = time.monotonic()
         refused = (request.page, lease.holder)

@@ -1,4 +1,4 @@
-"""From a goal to a judged motion: what every change of the goal runs, many times a second during a drag."""
+"""From a goal to a checked motion: what every change of the goal runs, many times a second during a drag."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ PATH_KINDS: tuple[PathKind, ...] = ("joint", "line", "arc")
 PlannableLaw = Literal["torque_rate_limited", "jerk_limited", "s_profile"]
 LAWS: tuple[PlannableLaw, ...] = ("torque_rate_limited", "jerk_limited", "s_profile")
 
-SMALLEST_MOTION = 1e-4  # [rad] A choice: a goal closer than this to the arm is where the arm is.
-SAME_WAY = 1e-3  # [rad] A choice: beyond it a line ends in another way of standing than the one that was wanted.
+SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm is where the arm is.
+SAME_WAY = 1e-3  # [rad] Beyond it a line ends in another way of standing than the one that was wanted.
 PATH_POINTS = 120
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """A motion, its judgement, and what views draw of it."""
+    """A motion, its report, and what views draw of it."""
 
     motion: Motion
     report: Report
     model: RobotModel
-    """The arm it was judged for, with its tool and load."""
+    """The arm it was checked for, with its tool and load."""
     box: SafetyBox | None = None
-    """The safety box it was judged with."""
+    """The safety box it was checked with."""
     path: Array = field(repr=False)
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
@@ -52,13 +52,13 @@ class Plan:
     program: Program | None = None
     """The program that the motion goes through; None where it leads to the goal."""
     mode: Mode = "joint_position"
-    """How it was judged to be commanded."""
+    """The mode it was checked for."""
     kind: PathKind = "joint"
     """How the tool goes, where it is no program."""
     note: Message | None = None
     """What else is to be said about where it ends."""
     complete: bool = False
-    """Whether collisions were looked for, too. While somebody drags they are not: it would halve the rate."""
+    """Whether collisions were checked, too. During a drag they are not: it would halve the rate."""
 
     @property
     def starts_at(self) -> JointVector:
@@ -75,7 +75,7 @@ class Plan:
         return replace(self, report=report, mode=mode, complete=True)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
-        """Returns what has changed since the plan was judged, as certificates name it: tool, load, safety box.
+        """Returns what has changed since the plan was checked, as certificates name it: tool, load, safety box.
 
         Args:
             model: The arm as it is now.
@@ -83,11 +83,11 @@ class Plan:
         """
         then, now = self.model.fingerprint, model.fingerprint
         changed = [part for part in ("tool", "load") if then[part] != now[part]]
-        bound, judged = active_box(box), active_box(self.box)
+        bound, checked = active_box(box), active_box(self.box)
         if bound is None:
-            is_changed = judged is not None and any(v.condition.signal == "position" for v in self.report.violations)
+            is_changed = checked is not None and any(v.condition.signal == "position" for v in self.report.violations)
         else:
-            is_changed = judged is None or not _is_same_box(bound, judged)
+            is_changed = checked is None or not _is_same_box(bound, checked)
         if is_changed:
             changed.append("box")
         return tuple(changed)
@@ -108,7 +108,7 @@ def make_plan(
     kind: PathKind = "joint",
     via: Pose | None = None,
 ) -> Plan | Message:
-    """Returns a motion from start to goal that is judged but for collisions, or why there is none."""
+    """Returns a motion from start to goal, checked except for collisions, or why none was found."""
     from rcilab.conformance.check import check
 
     for place, q in (("start", start), ("goal", goal)):
@@ -183,7 +183,7 @@ def _go(
 
 
 def build_plan_view(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
-    """Returns a judged motion with what views draw of it."""
+    """Returns a checked motion with what views draw of it."""
     effort = np.abs(motion.dq[sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
     return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
 

@@ -34,7 +34,7 @@ class Moving(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TypeField(Request):
-    """The text of a number field; the part of its name before the first dot tells the feature that takes it."""
+    """The text of a number field; the part of its name before the first dot names the feature that takes it."""
 
     field: str
     """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup.fields`)."""

@@ -73,7 +73,7 @@ class RobotConnection:
             current.close()
 
     def status(self) -> SupervisorStatus:
-        """Returns the supervisor's snapshot; "starting" while there is none."""
+        """Returns the supervisor's snapshot; "starting" before the first."""
         shown = self._shown
         if shown is not None:
             return shown.status()
@@ -113,7 +113,7 @@ class RobotConnection:
 
     @property
     def stops(self) -> int:
-        """How often the supervisor of now was stopped; 0 where there is none."""
+        """How often the present supervisor was stopped; 0 without one."""
         current = self._current
         return 0 if current is None else current.stops
 

@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         argcomplete.autocomplete(_build_parser())
     try:
-        # Whoever names a command waits for that one only; what is wrong is answered with all of them.
+        # A named command loads that one only; a wrong name is answered with all of them.
         args = _build_parser(arguments[:1] if arguments[0] in COMMANDS else COMMANDS).parse_args(arguments)
         code = int(args.run(args) or 0)
         _flush()

@@ -19,7 +19,7 @@ def add_parser(subparsers: Any) -> None:
     """Adds the command to the `rcilab` parser."""
     parser: ArgumentParser = subparsers.add_parser(
         "check",
-        help="judge a saved motion or program by the robot's conditions",
+        help="check a saved motion or program by the robot's conditions",
         description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles) or on "
         "that of a program saved with Program.save. Exit code: 0 it conforms, or what was written does; 1 it does not; "
         "2 the file or the model name is not valid, or the program cannot be planned.",
@@ -38,7 +38,7 @@ def add_parser(subparsers: Any) -> None:
         "--mode",
         metavar="MODE",
         default="joint_position",
-        help="how it will be sent, which decides what is judged: %(default)s, cartesian_position, torque ...",
+        help="how it will be sent, which decides what is checked: %(default)s, cartesian_position, torque ...",
     )
     add_max_rows(parser)
     form = parser.add_mutually_exclusive_group()
@@ -60,7 +60,7 @@ def run(args: Namespace) -> int:
 
     out: Path | None = args.slow_down
     if out is not None and out.exists() and out.samefile(args.file):
-        raise InvalidValueError("--slow-down", str(out), "is the file that is judged; name another one to write")
+        raise InvalidValueError("--slow-down", str(out), "is the file that is checked; name another one to write")
     found = read_file(args.file, args.max_rows)
     name = found.model if args.model is None and isinstance(found, Program) else args.model
     if name is None:

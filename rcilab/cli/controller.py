@@ -33,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--port", type=int, metavar="N", help="TCP port (the interface's; RCI: 1337); 0: any free one")
     parser.add_argument("--udp-port", type=int, metavar="N", help="UDP port for commands (as --port); 0: any free one")
     parser.add_argument(
-        "--client", metavar="HOST[:PORT]", help="where states go from power-up on (whoever connects, at --port)"
+        "--client", metavar="HOST[:PORT]", help="where states go from power-up on (for any client; at --port)"
     )
     parser.add_argument("--plant", default="ideal", metavar="KIND", help="what moves: ideal or mujoco (%(default)s)")
     parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
@@ -137,7 +137,7 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
             flush=True,
         )
-    # In one piece, so that whoever waits for the first line has the second one, too.
+    # In one piece, so that a reader that waits for the first line has the second one, too.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
     def say_ready() -> None:
@@ -173,7 +173,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         states_network=states_network,
         stalls=tuple(map(parse_stall, args.stall)),
         world_port=None if args.no_world else args.world_port,
-        # Without a number: whoever started us, as long as that one is still there to be asked for.
+        # Without a number: the parent process, while it still exists.
         parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
     )
 
@@ -215,7 +215,7 @@ def parse_stall(text: str) -> Stall:
     """Returns the pause that `S[@T][/P]` means: S seconds, first after T, then every P.
 
     Raises:
-        InvalidValueError: It is none.
+        InvalidValueError: It is not one.
     """
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import Stall

@@ -59,7 +59,7 @@ def one_line_each(text: str) -> str:
 
 
 class _Gone(io.TextIOBase):
-    """Stands for a stdout that nobody has opened."""
+    """Stands for a stdout that is closed."""
 
     def write(self, text: str) -> int:
         raise BrokenPipeError(errno.EPIPE, "the output is closed")

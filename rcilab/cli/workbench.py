@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_page_options(parser: argparse.ArgumentParser) -> None:
-    """Adds what any page can be told."""
+    """Adds the options of every page."""
     parser.add_argument(
         "--host", default="127.0.0.1", help="address to listen on; others than loopback have every page bring a token"
     )
@@ -84,7 +84,7 @@ def find_page_token(args: argparse.Namespace) -> str | None:
     is_made = token is not None and args.token_file is None and not os.environ.get(VARIABLE)
     if is_made and args.no_browser and not sys.stdout.isatty():
         raise UsageError(
-            f"nobody would learn the token: it is not printed where the output is no terminal; give one in ${VARIABLE} "
+            f"the token would stay unknown: it is not printed where the output is no terminal; give one in ${VARIABLE} "
             "or with --token-file FILE"
         )
     return token
@@ -164,11 +164,11 @@ def _browser(url: str | None, *, is_private: bool) -> Iterator[None]:
         yield
 
 
-def _tell_trouble(status: SupervisorStatus, told: str) -> str:
-    """Prints why the robot is not there, once until it is there again; returns what has been told."""
+def _tell_trouble(status: SupervisorStatus, printed: str) -> str:
+    """Prints why the robot is not there, once until it is there again; returns what was printed last."""
     if status.phase not in ("lost", "crashed"):
-        return "" if status.phase in ("idle", "moving") else told
-    if status.message != told:
+        return "" if status.phase in ("idle", "moving") else printed
+    if status.message != printed:
         print(f"rcilab workbench: {status.message}", file=sys.stderr, flush=True)
     return status.message
 

@@ -1,4 +1,4 @@
-"""Which set-up the controller was told, whether it took it, and what it is told again at every new connection."""
+"""The configuration sent to the controller, whether it accepted it, and what it is sent at each new connection."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ class ConfigurationSync:
     """Guarded by the lock of its owner.
 
     Args:
-        setup: What the controller is told at its first connection.
+        setup: What the controller is sent at its first connection.
     """
 
     def __init__(self, setup: RobotConfiguration) -> None:
         self.wanted = setup
-        """What it was told last, all of it."""
+        """The whole configuration that it was sent last."""
         self.acknowledged = RobotConfiguration()
         """What it has answered yes to since it was connected."""
         self.times = 0
-        """At how many connections it has taken a set-up."""
+        """At how many connections it has accepted a configuration."""
         self._waiting: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
         self._refusal: RcilabError | None = None
 
     def follow(self, ticket: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
-        """Takes note of a request that carries a set-up.
+        """Takes note of a request that carries a configuration.
 
         Args:
             ticket: The request.
@@ -50,7 +50,7 @@ class ConfigurationSync:
                 self.acknowledged = RobotConfiguration()
             if ticket.error is not None:
                 self._refusal = ticket.error
-                # It may have taken some of it: what it has of these parts now, nobody knows.
+                # It may have taken some of it: which of these parts it has now is unknown.
                 self.acknowledged = self.acknowledged.without(setup.parts)
                 continue
             self._refusal = None
@@ -58,28 +58,28 @@ class ConfigurationSync:
             self.times += is_new_connection and bool(setup.parts)
 
     def require_given(self) -> None:
-        """Makes sure that nothing is under way and that nothing was refused.
+        """Makes sure that no configuration is in transit and that none was refused.
 
         Raises:
-            UsageError: The controller has another set-up than motions are checked with.
+            UsageError: The controller has another configuration than motions are checked with.
         """
         self.look()
         if self._waiting:
-            raise UsageError("the controller is being told its set-up; wait for the ticket of set_up()").coded(
+            raise UsageError("the configuration is still being sent; wait for the request of set_up()").coded(
                 "telling_setup"
             )
         if self._refusal is not None and self.wanted.parts:
-            raise UsageError(f"the controller did not take its set-up ({self._refusal}); call set_up() again").coded(
+            raise UsageError(f"the controller refused its configuration ({self._refusal}); call set_up() again").coded(
                 "setup_refused", reason=self._refusal
             )
 
 
 def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotConfiguration:
-    """Returns what a controller is told unless somebody says otherwise.
+    """Returns the configuration that a controller is sent by default.
 
     Args:
         model: The arm.
-        is_virtual: Whether the controller is ours: then it is told of tool and load. A real one has its own settings.
+        is_virtual: Whether it is a virtual controller: then it is sent tool and load. A real one has its own settings.
     """
     if not is_virtual:
         return RobotConfiguration()

@@ -75,7 +75,7 @@ class VirtualController(ManagedProcess):
 
     @property
     def world_address(self) -> str | None:
-        """Address of its simulation port, HOST:PORT, once it listens; None when there is none."""
+        """Address of its simulation port, HOST:PORT, once it listens; None without a simulation port."""
         found = _WORLD.search(self._output)
         return found[1] if found else None
 

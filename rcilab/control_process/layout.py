@@ -42,7 +42,7 @@ VERSION = 9  # Count up with every change of this file, of the snapshot or of `c
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
-OPERATOR_TIMEOUT = 2.0  # [s] Nobody at the controls for that long ends a motion (workbench: operator lease).
+OPERATOR_TIMEOUT = 2.0  # [s] No operator for that long ends a motion (workbench: operator lease).
 MESSAGE_SLOTS = 16
 MESSAGE_SIZE = 4096  # [bytes] Of one message; the largest request, a configuration, takes 1300.
 
@@ -59,7 +59,7 @@ class Counter(IntEnum):
     SUPERVISOR_BEAT = 0
     """Supervisor: monotonic time of its last sign of life, [ns]."""
     OPERATOR_BEAT = 1
-    """Supervisor: when somebody was last at the controls, [ns]; 0 as long as nobody is expected."""
+    """Supervisor: when an operator was last present, [ns]; 0 as long as none is expected."""
     STOPS_ASKED = 2
     """Supervisor: how often a stop was asked for."""
     REQUESTS_POSTED = 3
@@ -133,7 +133,7 @@ class ControlBlock:
         return pickle.loads(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + min(length, _SETTINGS_SIZE - 4)])
 
     def close(self) -> None:
-        """Lets go of the memory, as far as nobody looks at it any more, and of the descriptor. May be called twice."""
+        """Releases the memory once no view of it is left, and of the descriptor. May be called twice."""
         if self.descriptor >= 0:
             os.close(self.descriptor)
             self.descriptor = -1

@@ -161,7 +161,7 @@ class Reply:
 def as_sendable(error: Exception) -> RcilabError:
     """Returns an error that fits into a reply.
 
-    The recorded cycles are left out: they are in the block's ring. An error that is none of ours is a defect, and its
+    The recorded cycles are left out: they are in the ring. An error that is not an RcilabError is a defect, and its
     sentence says so.
     """
     if not isinstance(error, RcilabError):

@@ -35,8 +35,8 @@ def require_admissible(
         certificate: What `check` gave for it.
         model: The arm.
         status: Where the arm is and what it does.
-        is_operator_overdue: Whether somebody ought to be at the controls and is not.
-        box: The safety box that the controller was told.
+        is_operator_overdue: Whether an operator is expected and absent.
+        box: The safety box that the controller was sent.
         mode: How the arm is to be commanded.
 
     Raises:
@@ -64,7 +64,7 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
 
     Args:
         status: Where the arm is and what it does.
-        is_operator_overdue: Whether somebody ought to be at the controls and is not.
+        is_operator_overdue: Whether an operator is expected and absent.
 
     Raises:
         UsageError: The arm is moving, no controller is connected, or no operator is present.

@@ -117,7 +117,7 @@ def _too_long(motion: SpeedScaledMotion) -> PlanningError:
 
 
 def _find_room(used: list[_Region], count: int) -> int | None:
-    """Returns the first index with so many rows free between those in use; None: there is none."""
+    """Returns the first index with so many rows free between those in use; None if no gap is large enough."""
     start = 0
     for region in sorted(used, key=lambda region: region.start):
         if start + count <= region.start:

@@ -62,7 +62,7 @@ class MotionService:
 
         Raises:
             UsageError: The arm is not where they begin.
-            StoppedError: Somebody wanted it to end before.
+            StoppedError: It was stopped before.
             ControlError: The controller stopped the arm.
         """
         rows = self._block.motion[: request.rows]
@@ -81,10 +81,10 @@ class MotionService:
             self._stream = None
 
     def jog(self, driver: StreamingDriver, model: RobotModel) -> None:
-        """Moves the arm as long as somebody holds it, and returns once it stands.
+        """Moves the arm for as long as the jog is renewed, and returns once it stands.
 
         Raises:
-            StoppedError: Somebody wanted it to end before.
+            StoppedError: It was stopped before.
             ControlError: The controller stopped the arm.
         """
         assert driver.latest is not None  # A connection begins with a state.
@@ -104,7 +104,7 @@ class MotionService:
         arrived: str,
         mode: Mode = "joint_position",
     ) -> None:
-        """Runs a motion; what it says at its end tells why it ended."""
+        """Runs a motion; its outcome says why it ended."""
         self._is_stopping = False
         executor = MotionExecutor(driver, self._log, self._stop_reason, self._limits, on_stopping=self._show_stopping)
         try:
@@ -146,7 +146,7 @@ class MotionService:
             return "idle.stopped"
         if isinstance(request.body, SwitchRows) and self._stream is not None and not self._is_stopping:
             self._switch_rows(request, request.body, self._stream)
-        elif self._jog is not None:  # It comes to rest at once, and then has no reason to go on.
+        elif self._jog is not None:  # It stops at once, and then has no reason to go on.
             self._requests.defer(request)
             self._jog.is_wanted = False
         else:

@@ -24,7 +24,7 @@ class RingReader:
         """Rows that were overwritten before they were read."""
 
     def newest(self) -> NDArray[np.void] | None:
-        """Returns a copy of the newest row, shape (1,), or None while there is none; does not move the reader."""
+        """Returns a copy of the newest row, shape (1,), or None while the ring is empty; does not move the reader."""
         while True:
             count = self._counters[Counter.CYCLES]
             if count == 0:

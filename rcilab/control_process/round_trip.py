@@ -12,10 +12,10 @@ from rcilab.control_process.ring import RingReader
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.recording.run import find_delay
 
-_PERIOD = 0.5  # [s] between two looks; a choice.
+_PERIOD = 0.5  # [s] between two samples; the delay changes slowly.
 _CYCLES = 600  # Of the newest that are looked at.
 _FEWEST = 50
-_MOVED = 1e-6  # [rad] Less motion than that tells nothing of a delay.
+_MOVED = 1e-6  # [rad] Less motion than that does not show a delay.
 
 
 class RoundTrip:

@@ -9,7 +9,7 @@ from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
 _RECORD = struct.Struct("<BbBBbBBxddd96s1024s")
-_ATTEMPTS = 1000  # The writer needs about 3 us; whoever fails this often meets a writer that died in mid-sentence.
+_ATTEMPTS = 1000  # The writer needs about 3 us; failing this often means that the writer ended while writing.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

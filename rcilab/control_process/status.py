@@ -1,4 +1,4 @@
-"""What the supervisor tells the rest of the program: one frozen snapshot of arm, processes and timing."""
+"""What the supervisor reports to the rest of the program: one frozen snapshot of arm, processes and timing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PHASES: tuple[Phase, ...] = (
     "connecting",  # the control process is trying to reach the controller
     "idle",  # states arrive; the arm stands still and takes requests
     "moving",  # a motion is being streamed, or the arm is free for a hand to guide it (code "moving.guided")
-    "stopping",  # a motion is being brought to rest before its end
+    "stopping",  # a motion is being stopped before its end
     "fault",  # the controller has error bits set; recover() leads out
     "lost",  # no states arrive, or the controller closed the connection; reconnect() tries again
     "crashed",  # a process of ours has died; it is started again, or restart() does it
@@ -131,9 +131,9 @@ class SupervisorStatus:
     T_flange_tool: Pose | None = None
     """The tool that the controller has, by the poses it reports at rest; None while unknown."""
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
-    """What the controller has acknowledged of its set-up since it was connected; it can be asked for none of it."""
+    """What the controller has acknowledged of its configuration since it was connected; it cannot be read back."""
     setup_times: int = 0
-    """At how many connections it has taken a set-up."""
+    """At how many connections it has accepted a configuration."""
     robot_mode: RobotMode | None = None
     controller_mode: ControllerMode | None = None
     faults: tuple[FaultCode, ...] = ()
@@ -156,7 +156,7 @@ class SupervisorStatus:
     """Whether the control process's memory is kept from being paged out."""
     round_trip: float | None = None
     """From a command to the state that shows it as commanded, the controller's play-out included, as the newest motion
-    of joint angles had it, [s]; None as long as there was none."""
+    of joint angles had it, [s]; None before the first."""
     answer_time: float | None = None
     """From a state's arrival to the answer, median of the newest motion's last second, [s]."""
     late_cycles: int = 0

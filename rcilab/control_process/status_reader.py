@@ -61,7 +61,7 @@ class StatusReader:
         }
 
     def read_cycle(self) -> int:
-        """Returns the newest cycle of the motion under way; 0 as long as it has not begun."""
+        """Returns the newest cycle of the motion in progress; 0 as long as it has not begun."""
         row = self._ring.newest()
         t = 0.0 if row is None else float(row["t"][0])
         return round(t / CYCLE_TIME) if t == t else 0  # NaN outside of a motion.

@@ -72,7 +72,7 @@ class StatusWriter:
         count = self.recorder.count
         self._counters[Counter.CYCLES] = count
         self._counters[Counter.LOST] = log.lost_total
-        if log.lateness == log.lateness:  # NaN where nobody waited for the state.
+        if log.lateness == log.lateness:  # NaN where the state was not waited for.
             self._histogram.add(log.lateness)
         if log.state is not None and log.state.tau_ext_in_base is not self._felt:
             self._felt = log.state.tau_ext_in_base
@@ -88,7 +88,7 @@ class StatusWriter:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
     def begin_motion(self, duration: float | None) -> None:
-        """Says how long the motion takes that begins now, [s]; None: as long as somebody holds it."""
+        """Says how long the motion takes that begins now, [s]; None: for as long as it is renewed."""
         self._motion_cycle = 0
         self.update(motion_time=None if duration is None else 0.0, motion_duration=duration)
 

@@ -13,7 +13,7 @@ class StopConditions:
 
     Args:
         counters: The counters of the shared block.
-        parent: Process id of the fork server, which goes with the supervisor. Told: it may be gone before we look.
+        parent: Process id of the fork server, which ends with the supervisor; it may be gone before the first poll.
     """
 
     def __init__(self, counters: memoryview, parent: int) -> None:
@@ -27,16 +27,16 @@ class StopConditions:
 
     @property
     def is_orphan(self) -> bool:
-        """Whether the supervisor's process is gone, or nobody waits for it."""
+        """Whether the supervisor's process is gone, or has no parent that waits for it."""
         return self._is_dismissed or os.getppid() != self._parent
 
     @property
     def is_operator_gone(self) -> bool:
-        """Whether somebody was at the controls once, and nobody is."""
+        """Whether an operator was present once and is not any more."""
         beat = self._counters[Counter.OPERATOR_BEAT]
         if beat == 0:
             return False
-        # A supervisor that hangs cannot tell whether anybody is there: that counts as nobody.
+        # A supervisor that hangs cannot report an operator: that counts as absent.
         oldest = min(beat, self._counters[Counter.SUPERVISOR_BEAT])
         return time.monotonic_ns() - oldest > OPERATOR_TIMEOUT * 1e9
 

@@ -65,7 +65,7 @@ __all__ = ["PendingRequest", "Supervisor"]
 
 VIRTUAL = "virtual"
 _TICK = 0.02  # [s] between two looks of the watching thread.
-_LOSS_LOOKS = 3  # Looks that have to find a connection lost before it is told; a choice, 0.06 s.
+_LOSS_LOOKS = 3  # Polls that have to find a connection lost before it is reported, 0.06 s.
 
 
 class Supervisor(Closeable):
@@ -80,10 +80,10 @@ class Supervisor(Closeable):
         model: The arm.
         target: "virtual" for a private virtual controller on loopback, or the address of a controller, rci://HOST:PORT.
         plant: What the virtual controller moves: "ideal" or "mujoco".
-        stop_without_operator: Whether a motion is brought to rest once nobody has been at the controls for 2 s (see
+        stop_without_operator: Whether a motion is stopped once no operator has been present for 2 s (see
             `set_operator_present`). False lets it finish; meant for the virtual controller.
         auto_restart: Whether a process of ours that died is started again by itself (at most 3 times a minute).
-        setup: What the controller is told at every connection. None: the virtual one the model's tool and load, a
+        setup: What the controller is sent at every connection. None: the virtual one the model's tool and load, a
             real one nothing, since it has its own.
 
     Raises:
@@ -184,7 +184,7 @@ class Supervisor(Closeable):
             phase, code, message = self._judge(shown)
             fields = self._reader.read_fields(shown)
             if phase in ("crashed", "lost", "starting"):
-                fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # Nobody says so any more.
+                fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # Not reported any more.
             return SupervisorStatus(
                 phase=phase,
                 code=code,
@@ -221,9 +221,9 @@ class Supervisor(Closeable):
             return pending
 
     def set_operator_present(self, present: bool) -> None:
-        """Tells that somebody is at the controls; call with True at least once a second while that is so.
+        """Reports that an operator is present; call with True at least once a second while that is so.
 
-        Until the first call nobody is expected. From then on, a motion is brought to rest when the last True is more
+        Until the first call no operator is expected. From then on, a motion is stopped when the last True is more
         than 2 s ago (`stop_without_operator`), and `execute` is refused meanwhile. False changes nothing at once: a
         page that is reloaded has those 2 s to come back.
         """
@@ -239,7 +239,7 @@ class Supervisor(Closeable):
 
         Returns:
             Structured array, see `cycle_dtype`: message_id, t, q, q_c, dq, command, faults, ... Cycles that were
-            overwritten because nobody drained for more than 30 s are missing; `lost` of the first row counts them.
+            overwritten because nothing was drained for 30 s are missing; `lost` of the first row counts them.
         """
         with self._lock:
             self._require_block()
@@ -275,7 +275,7 @@ class Supervisor(Closeable):
     ) -> PendingRequest:
         """Streams a checked motion; the request is done when the arm stands still again.
 
-        It is judged once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
+        It is checked once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
 
         Args:
             motion: The motion.
@@ -283,14 +283,14 @@ class Supervisor(Closeable):
             mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
                 `rcilab.execution.command_builder`.
             speed_override: Part of its planned speed that it begins with, 0.1 to 1; `set_speed_override` changes it.
-            stops: What `stops` was when somebody wanted this; None: they want it now.
+            stops: What `stops` was when this was asked for; None: it is asked for now.
 
         Raises:
             InvalidValueError: The speed override is out of range.
             PlanningError: At this speed override it would break a condition, or last too long.
             CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
             UsageError: The arm is moving, no controller is connected, no operator is present, the motion takes more
-                than 300 s, the controller has not taken the set-up it was told last, or a stop has come meanwhile.
+                than 300 s, the controller has not accepted its last configuration, or a stop has come meanwhile.
         """
         stops = self.stops if stops is None else stops
         require_admissible(
@@ -312,12 +312,12 @@ class Supervisor(Closeable):
             return self._ask("execute", Execute(rows=len(paced.q), duration=duration, mode=mode))
 
     def pause(self) -> PendingRequest:
-        """Holds the motion under way, along its way and within all limits; done once that is handed over.
+        """Holds the motion in progress, along its path and within all limits; done once that is handed over.
 
         `resume` goes on; a motion that is held for more than 120 s is given up.
 
         Raises:
-            UsageError: No motion of `execute` is under way.
+            UsageError: No motion of `execute` is in progress.
             PlanningError: It arrives before it could be held.
         """
         return self._override_of_motion().change(0.0)
@@ -327,9 +327,9 @@ class Supervisor(Closeable):
         return self.set_speed_override(speed_override)
 
     def set_speed_override(self, speed_override: float) -> PendingRequest:
-        """Runs the motion under way at part of its planned speed; done once that is handed over.
+        """Runs the motion in progress at part of its planned speed; done once that is handed over.
 
-        The change is planned here, along the way, and judged by the conditions of the motion's mode before any of it
+        The change is planned here, along the path, and checked by the conditions of the motion's mode before any of it
         is sent; that takes some 10 to 100 ms.
 
         Args:
@@ -337,7 +337,7 @@ class Supervisor(Closeable):
 
         Raises:
             InvalidValueError: The speed override is out of range.
-            UsageError: No motion of `execute` is under way, or this machine is too busy.
+            UsageError: No motion of `execute` is in progress, or this machine is too busy.
             PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
         """
         return self._override_of_motion().change(require_speed_override(speed_override))
@@ -366,7 +366,7 @@ class Supervisor(Closeable):
         """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
 
         The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
-        inside every limit of the joints. A jog that is not renewed for 0.3 s comes to rest. It is a motion like any
+        inside every limit of the joints. A jog that is not renewed for 0.3 s stops. It is a motion like any
         other, so the first movement comes when the controller shows its mode, 0.2 to 1 s after the first call; at rest
         it listens for another second.
 
@@ -375,14 +375,14 @@ class Supervisor(Closeable):
             values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
                 what the limits allow.
             goes_on: Request of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
-            stops: What `stops` was when somebody wanted to begin a jog; None: they want it now.
+            stops: What `stops` was when the jog was asked for; None: it is asked for now.
 
         Returns:
             The request of the jog; it is done when the arm stands still and no jog is held any more.
 
         Raises:
             InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
-            UsageError: Another motion is under way, no controller is connected, no operator is present, or a stop
+            UsageError: Another motion is in progress, no controller is connected, no operator is present, or a stop
                 has come meanwhile.
         """
         command = build_jog(kind, values, self.model.n)
@@ -411,13 +411,13 @@ class Supervisor(Closeable):
     ) -> PendingRequest:
         """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
 
-        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when nobody is at the
+        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when no operator is at the
         controls any more, and by itself when the controller leaves it, as on a fault.
 
         Args:
             space: In joint space every joint is free, and `kind` has no effect.
             kind: What stays free in Cartesian space.
-            stops: What `stops` was when somebody wanted this; None: they want it now.
+            stops: What `stops` was when this was asked for; None: it is asked for now.
 
         Raises:
             InvalidValueError: There is no such space or kind.
@@ -452,15 +452,15 @@ class Supervisor(Closeable):
             )
 
     def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Tells the controller a tool, a load, a safety box, a force-control frame; done once it has taken all of it.
+        """Sends a tool, a load, a safety box, a force-control frame; done once the controller has accepted all of it.
 
-        From now on motions are checked with it, and it is told again at every new connection.
+        From now on motions are checked with it, and it is sent again at every new connection.
 
         Args:
             setup: What to tell; parts that are None stay.
 
         Raises:
-            InvalidValueError: It is no set-up, or the load is heavier than the arm is rated for.
+            InvalidValueError: It is not a configuration, or the load is heavier than the arm is rated for.
             UsageError: The arm is moving, or no controller is connected.
         """
         model = require_setup(setup).applied_to(self.model)
@@ -548,7 +548,7 @@ class Supervisor(Closeable):
             raise ConnectionLostError(status.message)
 
     def _watch(self) -> None:
-        """The watching thread: signs of life, replies, deaths. Waits for nothing and nobody."""
+        """The watching thread: heartbeats, replies, processes that ended. It never blocks."""
         while not self._is_closing.wait(_TICK):
             with self._lock:
                 if self._block is None:
@@ -579,7 +579,7 @@ class Supervisor(Closeable):
                 self._client.fail_all(ConnectionLostError(death.message))
 
     def _look_for_loss(self) -> None:
-        """Notes a connection that went while nobody had asked for anything, unless a death of ours explains it.
+        """Notes a connection lost while no request was pending, unless the end of a process of ours explains it.
 
         A controller's death is known a little later than the end of its connection: hence more looks than one.
         """
@@ -612,7 +612,7 @@ class Supervisor(Closeable):
         self._lost_looks = _LOSS_LOOKS  # Once is enough.
 
     def _end_processes(self, reason: RcilabError) -> None:
-        """Has the arm brought to rest, ends our processes, and fails what was under way."""
+        """Has the arm stopped, ends our processes, and fails what was in progress."""
         if self._keeper.worker_pid is not None:
             self._client.send_end()
         self._keeper.end()

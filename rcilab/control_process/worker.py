@@ -53,9 +53,9 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.scheduling import PRIORITY, enter_realtime
 
-SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a choice below half a second.
+SILENCE = 0.3  # [s] without a state while idle before the connection counts as lost; a page waits 0.5 s.
 _LOOK = 0.02  # [s] Longest wait in the idle loop, and between looks for the supervisor.
-_NAP = 0.004  # [s] between two states that a control process waits for while nothing moves; a choice.
+_NAP = 0.004  # [s] between two states that a control process waits for while nothing moves; saves CPU time.
 
 
 class ControlProcess:
@@ -104,7 +104,7 @@ class ControlProcess:
                     self._listen()
                     self._serve()
                     self._mind_guiding()
-                except ConnectionLostError as error:  # It never ends this process, whatever was under way.
+                except ConnectionLostError as error:  # It never ends this process, whatever was in progress.
                     self._lose(error)
         finally:
             self._disconnect()
@@ -165,10 +165,10 @@ class ControlProcess:
 
     def _show_tool(self, state: RobotState) -> None:
         """Shows the tool that follows from joint angles and pose; at rest both stay, and there is nothing to do."""
-        told = (state.q_c, state.T_base_tool_c)
-        if self._told is not None and _is_same(told, self._told):
+        reported = (state.q_c, state.T_base_tool_c)
+        if self._reported is not None and _is_same(reported, self._reported):
             return
-        self._told = told
+        self._reported = reported
         with suppress(InvalidValueError):  # A controller may report no pose before it is ready.
             flange = self._model.pose(state.q_c, "flange")
             self._publisher.show_tool(flange.inverse() @ as_pose(state.T_base_tool_c.matrix))
@@ -350,8 +350,8 @@ class ControlProcess:
             self._publisher.update(powered=None, inputs=-1, outputs_known=0, outputs=0)
 
 
-def _is_same(told: tuple[JointVector, Pose], before: tuple[JointVector, Pose]) -> bool:
-    (q, T), (q_before, T_before) = told, before
+def _is_same(now: tuple[JointVector, Pose], before: tuple[JointVector, Pose]) -> bool:
+    (q, T), (q_before, T_before) = now, before
     return (q is q_before or q.tobytes() == q_before.tobytes()) and (
         T is T_before or T.as_row_major() == T_before.as_row_major()
     )

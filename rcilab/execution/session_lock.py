@@ -100,7 +100,7 @@ class SessionLock:
                 self._disconnect()
 
     def stop(self, reason: str) -> None:
-        """Stops the motion that runs or is about to; does nothing when there is none.
+        """Stops the motion that runs or is about to; does nothing without one.
 
         Args:
             reason: Reason for its run; the first one counts.

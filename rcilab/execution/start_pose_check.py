@@ -26,7 +26,7 @@ def require_motion(motion: object, certificate: object) -> None:
     if isinstance(certificate, Report):
         raise InvalidValueError("certificate", "report", "is not the proof: pass report.certificate, not the report")
     if certificate is not None and not isinstance(certificate, Certificate):
-        raise InvalidValueError("certificate", certificate, "is none; pass check(motion, model).certificate")
+        raise InvalidValueError("certificate", certificate, "is not one; pass check(motion, model).certificate")
 
 
 def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:

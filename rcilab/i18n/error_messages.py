@@ -44,8 +44,8 @@ def tell_note(note: str) -> Message | Finished:
     if not (isinstance(note, Remark) and note.code):
         return Finished(note)
     if len(note.parts) != 1:
-        told = [tell_note(part) for part in note.parts] or [Finished(note)]
-        return reduce(_both, reversed(told))
+        parts = [tell_note(part) for part in note.parts] or [Finished(note)]
+        return reduce(_both, reversed(parts))
     facts: dict[str, Any] = {
         name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()
     }

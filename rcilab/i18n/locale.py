@@ -19,7 +19,7 @@ def require_language(language: str) -> Language:
     """Returns the language if there is one of this name.
 
     Raises:
-        InvalidValueError: There is none; the message lists those that exist.
+        InvalidValueError: It does not exist; the message lists those that do.
     """
     if language not in LANGUAGES:
         raise InvalidValueError("language", language, f"is unknown; known: {', '.join(LANGUAGES)}")

@@ -28,7 +28,7 @@ def chosen_language(asked: str | None, neighbour: Language | None = None) -> Lan
 
     Args:
         asked: "en" or "zh"; None leaves it open.
-        neighbour: What the part speaks that this one was made from; None where there is none.
+        neighbour: Language of the part that this one was made from; None without such a part.
 
     Raises:
         InvalidValueError: There is no such language.

@@ -18,12 +18,12 @@ _UNITS: dict[str, dict[str, float]] = {
     "mm": {"mm": 1.0, "m": 1000.0},
 }
 """What may stand behind a number, and how many of the field's own unit it is; longer names first."""
-_LONGEST = 40  # Characters; nobody types a longer number on purpose.
+_LONGEST = 40  # Characters; no number is longer on purpose.
 
 
 @dataclass(frozen=True)
 class Parsed:
-    """A number, or why there is none."""
+    """A number, or why the text is not one."""
 
     value: float | None
     problem: Message | None = None
@@ -32,7 +32,7 @@ class Parsed:
 def parse_number(
     typed: str, low: float, high: float, unit: str, *, soft_low: bool = False, soft_high: bool = False
 ) -> Parsed:
-    """Returns the number that somebody typed.
+    """Returns the number in a typed text.
 
     Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
     comma may as well group thousands, the answer asks which is meant.
@@ -84,14 +84,14 @@ def _bounds(low: float, high: float, unit: str) -> Message:
 
 @dataclass(frozen=True)
 class ParsedQuaternion:
-    """A unit quaternion, wxyz, or why there is none."""
+    """A unit quaternion, wxyz, or why the text is not one."""
 
     value: tuple[float, ...] | None
     problem: Message | None = None
 
 
 def parse_quaternion(typed: str) -> ParsedQuaternion:
-    """Returns the orientation that somebody typed as four numbers w x y z, brought to length 1.
+    """Returns the orientation typed as four numbers w x y z, normalised.
 
     Between the numbers stand blanks, semicolons or commas; decimal commas only where blanks or semicolons part them.
     """

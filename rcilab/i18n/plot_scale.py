@@ -15,7 +15,7 @@ ERRORS = ("error", "tool")
 """Of the joints and of the tool: what a plot of measured against planned shows."""
 _LEAST = {"q": math.radians(1.0), "dq": math.radians(1.0), "tau": 0.5, "error": math.radians(0.02), "tool": 2e-5}
 """In SI. Choices: errors below 0.02 degrees or 0.02 mm look like none."""
-_FINEST = 100.0  # Parts of the least range that a single value is told to; a choice.
+_FINEST = 100.0  # Parts of the least range to which a single value is rounded: finer digits are noise.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class PlotScale:
         """Behind the point of a single value."""
         return max(0, math.ceil(math.log10(_FINEST / self.least))) if self.least else 3
 
-    def told(self, number: str) -> str:
+    def with_unit(self, number: str) -> str:
         """Returns a single value with its unit."""
         return f"{number}·{self.unit}" if self.unit[0].isdigit() else f"{number} {self.unit}"
 
@@ -48,5 +48,5 @@ def plot_scale(name: str, units: Units = USUAL) -> PlotScale:
     """
     factor, unit = units.from_si(_SI[name])
     if name in ERRORS and factor == 1.0:  # Errors are small, and a plot's numbers end three digits behind the point.
-        factor, unit = 1e3, "10⁻³ m" if unit == "m" else f"m{unit}"  # Whoever has chosen metres reads no mm.
+        factor, unit = 1e3, "10⁻³ m" if unit == "m" else f"m{unit}"  # A user of metres reads no mm.
     return PlotScale(unit=unit, factor=factor, least=factor * _LEAST.get(name, 0.0))

@@ -64,12 +64,12 @@ class Remark(str):
     @classmethod
     def all(cls, remarks: Iterable[str]) -> Remark:
         """Returns several in one line."""
-        told: list[Remark] = []
+        parts: list[Remark] = []
         for remark in remarks:
-            told += remark.parts if isinstance(remark, Remark) else (cls(remark),)
-        if len(told) < 2:
-            return told[0] if told else cls("")
-        return cls("; ".join(told), "all", **{str(number): remark for number, remark in enumerate(told, 1)})
+            parts += remark.parts if isinstance(remark, Remark) else (cls(remark),)
+        if len(parts) < 2:
+            return parts[0] if parts else cls("")
+        return cls("; ".join(parts), "all", **{str(number): remark for number, remark in enumerate(parts, 1)})
 
     @property
     def parts(self) -> tuple[Remark, ...]:

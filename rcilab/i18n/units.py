@@ -105,7 +105,7 @@ class Units:
         """Returns numbers of an SI unit in that of the page, with as few digits as show which of them differ.
 
         Args:
-            unit: Such as rad/s^2; any unit that is none of an angle or a length stays.
+            unit: Such as rad/s^2; a unit of neither angle nor length stays.
             values: In that unit.
         """
         factor, _ = self.from_si(unit)

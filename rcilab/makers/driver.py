@@ -30,7 +30,7 @@ SIGNALS = range(6)
 LimitTable: TypeAlias = Literal["manual", "sdk"]
 """Which published bounds of the tool: those of the maker's manual, or of its client library."""
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
-"""Where constraints of hand guiding hold; in joint space there are none."""
+"""Where constraints of hand guiding hold; without effect in joint space."""
 GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
 """What stays free in Cartesian space."""
 

@@ -23,15 +23,15 @@ Frame: TypeAlias = Literal["base", "tool"]
 """Axes in which a twist is given; its point is the tool tip in both."""
 
 DAMPED_BELOW = 0.02
-"""Singular value of the Jacobian under which a direction is damped, metres and radians taken as they are. A choice: a
+"""Singular value of the Jacobian under which a direction is damped, metres and radians taken as they are. Reason: a
 tenth of all configurations of the xMates is that close to a singularity, their homes are at 0.15 and above."""
 
 RAMP_PART = 0.5
-"""Part of the joints' acceleration and jerk that changes of the twist use. A choice: the rest is for the bending of the
+"""Part of the joints' acceleration and jerk that changes of the twist use. Reason: the rest is for the bending of the
 joints' curves, so that the tool keeps its direction."""
 
 TOOL_MARGIN = 0.99
-"""Part of the tool's velocity limits that a twist uses. A choice: joints follow each cycle's velocity with a lag of up
+"""Part of the tool's velocity limits that a twist uses. Reason: joints follow each cycle's velocity with a lag of up
 to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
 
 MISSED_PART = 0.1

@@ -24,12 +24,12 @@ from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
 
 INTERVAL = 0.5  # [s] Between two questions.
-PATIENCE = 5  # A choice: so many questions in a row may stay without an answer while somebody listens, 2.5 s.
+PATIENCE = 5  # So many questions in a row may stay without an answer while there is a listener, 2.5 s.
 _DEAF = INTERVAL * PATIENCE  # [s] Without an answer, whyever: a press would wait as well.
 
 
 class _Answer(ipywidgets.IntText):
-    """A number that only the page changes, and nobody needs to be told."""
+    """A number that only the page changes, and that needs no echo."""
 
     value = traitlets.CInt(0).tag(sync=True, echo_update=False)
 
@@ -41,7 +41,7 @@ def kernel_heart() -> BrowserHeartbeat:
 
 
 class BrowserHeartbeat:
-    """Asks the page for signs of life while somebody wants to know. Where no page ever answered, none is missed."""
+    """Asks the page for heartbeats while there is a listener. Where no page ever answered, none is missed."""
 
     def __init__(self) -> None:
         self.is_cell_running: Callable[[], bool] = lambda: False

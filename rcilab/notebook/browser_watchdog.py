@@ -1,8 +1,8 @@
-"""Whoever moves an arm from a cell is in the notebook: when its page is gone, the arm is brought to rest.
+"""The operator of an arm moved from a cell is at the notebook's page: when it is gone, the arm is stopped.
 
 The page is asked from the first part, or the first sliders, that a notebook makes. Before, or where the kernel hears
 no page while a cell runs (ipykernel before 7; before 7.4 VS Code, too), nothing is known and nothing is stopped.
-Nor is it while a button of somebody's own runs the motion in the very thread that hears the page.
+Nor is it while a button of the user's own runs the motion in the thread that serves the page.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class BrowserWatchdog:
         self._thread.start()
 
     def halt(self) -> None:
-        """Brings every arm to rest that a session moves, also from a thread of somebody's own."""
+        """Stops every arm that a session moves, also from a thread of the user's own."""
         for session in _sessions():
             session.stop(_INTERRUPTED)
 
@@ -50,7 +50,7 @@ class BrowserWatchdog:
 
     def _watch(self) -> None:
         while not self._ending.wait(_LOOK):
-            self._look()  # Holding no session while it waits: one that nobody else holds is to go.
+            self._look()  # Holds no session while it waits: an unreferenced one is to be collected.
 
     def _look(self) -> None:
         sessions = _sessions()

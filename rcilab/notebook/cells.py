@@ -1,7 +1,7 @@
 """What a cell has made ends when the cell runs again, when it is interrupted, and with the kernel.
 
 A notebook has no window to close: a cell that is run again would leave its server, its process and its threads behind.
-JupyterLab and VS Code name the cell with every run; where nobody does (nbclient), its text is its name.
+JupyterLab and VS Code name the cell with every run; where no front end does (nbclient), its text is its name.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class CellResource(Protocol):
         ...
 
     def halt(self) -> None:
-        """Brings to rest what it moves; from any thread, without waiting."""
+        """Stops what it moves; from any thread, without waiting."""
         ...
 
 
@@ -151,8 +151,8 @@ def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
     """Has every interrupt of the kernel stop what moves, whatever its main thread does at that moment.
 
     ipykernel ignores an interrupt while it is idle, swallows one that comes while it handles a widget's message, and
-    does not wake its event loop for one that is to cancel a cell which awaits. A thread of ours is told of each by the
-    interpreter itself (`signal.set_wakeup_fd`), also while the main thread is in a library.
+    does not wake its event loop for one that is to cancel a cell which awaits. The interpreter informs a thread of
+    each (`signal.set_wakeup_fd`), also while the main thread is in a library.
     """
     kernel = getattr(shell, "kernel", None)
     if kernel is None or not hasattr(kernel, "io_loop"):
@@ -173,7 +173,7 @@ def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
     def install() -> None:
         nonlocal former
         former = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-        kernel.saved_sigint_handler = _do_nothing  # What is ignored wakes nobody.
+        kernel.saved_sigint_handler = _do_nothing  # An ignored signal wakes no thread.
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             signal.signal(signal.SIGINT, _do_nothing)
         threading.Thread(target=watch, name="interrupts", daemon=True).start()

@@ -14,7 +14,7 @@ from rcilab.notebook.style import head, soft, table
 from rcilab.notebook.svg_plot import Panel, draw
 from rcilab.views.plots import Quantity, build_frame, recorded_curves
 
-_RECORDED = 400  # Cycles before the end that are drawn; a choice: 0.4 s.
+_RECORDED = 400  # Cycles before the end that are drawn: 0.4 s.
 _LISTED = 8
 _QUANTITIES: tuple[Quantity, ...] = ("dq", "ddq", "jerk")
 _HEADS = ("cycle", "t", "success", "late", "joint", "velocity")
@@ -40,8 +40,8 @@ def record_html(state: LabState, text: Text) -> str:
     picture = draw(
         _panels(rows, model.limits.joint, text), list(range(model.n)), text("plot.time"), text("legend.limit")
     )
-    told = head(text("fault.recorder")) + soft(text("fault.record_of", cycles=len(rows)))
-    return f"{told}{picture}{table([text(f'fault.head.{name}') for name in _HEADS], cells, right=True)}"
+    heading = head(text("fault.recorder")) + soft(text("fault.record_of", cycles=len(rows)))
+    return f"{heading}{picture}{table([text(f'fault.head.{name}') for name in _HEADS], cells, right=True)}"
 
 
 def _last_rows(state: LabState) -> NDArray[Any] | None:

@@ -29,7 +29,7 @@ def writing(language: Language) -> Iterator[Language]:
 
     Yields:
         The language that can be written here: English where there is no font for Chinese, because rows of empty boxes
-        tell nobody anything.
+        are of no use to a reader.
     """
     family = chinese_font() if language == "zh" else None
     if family is None:
@@ -43,7 +43,7 @@ def writing(language: Language) -> Iterator[Language]:
 
 @cache
 def chinese_font() -> str | None:
-    """Returns the name of a font with Chinese characters that matplotlib finds on this machine; None: there is none."""
+    """Returns the name of a font with Chinese characters that matplotlib finds on this machine, or None."""
     from matplotlib.font_manager import fontManager
 
     names = sorted({font.name for font in fontManager.ttflist})

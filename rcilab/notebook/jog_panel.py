@@ -33,7 +33,7 @@ class JogPanel(Part):
         language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
 
     Raises:
-        InvalidValueError: The subject is none, or q is not n angles inside the limits.
+        InvalidValueError: The subject is unknown, or q is not n angles inside the limits.
     """
 
     def __init__(

@@ -10,7 +10,7 @@ The rule, first line that fits:
        path of its own (so something stands before it), or ssh          static where it is not
     5  else the browser is on this machine                              loopback
 
-Who asks is told by the cell that runs: VS Code names its cells by an address of its own. Where no cell runs, what VS
+The front end is known from the cell that runs: VS Code's cells have an address of its own. Where no cell runs, what VS
 Code has started is known by its variables (microsoft/vscode-jupyter hands its own environment on to its kernels).
 """
 
@@ -119,7 +119,7 @@ def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> KernelReacha
 
 
 def _find_cell() -> str | None:
-    """Returns what the notebook calls the cell that runs; None where none runs, or nobody names it."""
+    """Returns what the notebook calls the cell that runs; None where none runs, or it has no name."""
     found = shell()
     parent = found.get_parent() if hasattr(found, "get_parent") else {}
     name = parent.get("metadata", {}).get("cellId")
@@ -134,7 +134,7 @@ def _find_server(environment: Mapping[str, str]) -> Server | None:
     from jupyter_core.paths import jupyter_runtime_dir  # Asking jupyter_server itself would load it all: a second.
 
     try:
-        told: Any = json.loads((Path(jupyter_runtime_dir()) / f"jpserver-{parent}.json").read_text(encoding="utf-8"))
+        entry: Any = json.loads((Path(jupyter_runtime_dir()) / f"jpserver-{parent}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):  # Another program is the parent, or it runs elsewhere.
         return None
-    return Server(hostname=str(told.get("hostname", "")), base=str(told.get("base_url", "/")))
+    return Server(hostname=str(entry.get("hostname", "")), base=str(entry.get("base_url", "/")))

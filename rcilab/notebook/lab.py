@@ -67,7 +67,7 @@ def require_lab(*, allow_root: bool = False) -> None:
     """
     require_installed("jupyterlab", "the lab")
     if os.geteuid() == 0 and not allow_root:
-        raise UsageError("you are root, and JupyterLab refuses root unless it is told: add --allow-root")
+        raise UsageError("you are root, and JupyterLab refuses root by default: add --allow-root")
 
 
 def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rcilab.notebook.target_panel import TargetPanel
 
 _FRAME = 20  # [px] A tab's own frame is higher than the timeline below the scene by so much.
-_LOWEST_TAB = 420  # [px] A choice: a smaller scene has higher tabs beside it.
+_LOWEST_TAB = 420  # [px] A smaller scene has higher tabs beside it.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
 """Words of each tab, and the attribute of what is on it."""
 
@@ -37,7 +37,7 @@ class Lab(Part):
     """Everything in one cell; Stop is always in sight.
 
     The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a hand can. What is on
-    a tab is made when the tab is opened, or the attribute asked for: the cell need not wait for what nobody sees.
+    a tab is made when the tab is opened, or the attribute asked for: the cell need not wait for hidden tabs.
 
     Args:
         subject: A model, a session, or another part to look at the same arm as.
@@ -47,7 +47,7 @@ class Lab(Part):
         place: Where the browser is; found out when absent.
 
     Raises:
-        InvalidValueError: The subject, the view or the language is none.
+        InvalidValueError: The subject, the view or the language is unknown.
         UsageError: meshcat is not installed.
     """
 
@@ -113,7 +113,7 @@ class Lab(Part):
 
     @cached_property
     def report(self) -> ReportView:
-        """The judgement of the plan."""
+        """The report of the plan."""
         return self._make("report", "ReportView")
 
     @cached_property

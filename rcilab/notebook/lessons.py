@@ -26,7 +26,7 @@ class CopiedLessons:
     folder: Path
     """Where the copies are."""
     written: tuple[str, ...]
-    """Files that are new, or newer versions of copies that nobody had edited."""
+    """Files that are new, or newer versions of unedited copies."""
     beside: tuple[str, ...]
     """Newer versions of copies that had been edited, under names of their own."""
 
@@ -99,7 +99,7 @@ def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | N
 
 
 def _names(name: str) -> Iterator[str]:
-    """Yields 01_x.zh.ipynb, 01_x.new.zh.ipynb, 01_x.new2.zh.ipynb, ...: the ending tells the language."""
+    """Yields 01_x.zh.ipynb, 01_x.new.zh.ipynb, 01_x.new2.zh.ipynb, ...: the ending names the language."""
     yield name
     stem, _, ending = name.partition(".")
     number = 1

@@ -92,7 +92,7 @@ class LongTask(Generic[Context, Result]):
         self._work.cancel()
 
     def end(self) -> None:
-        """Drops what is being done and waits until nobody watches it any more."""
+        """Cancels the work and waits until its watcher has ended."""
         self._ending.set()
         self._work.cancel()
         watcher, self._watcher = self._watcher, None

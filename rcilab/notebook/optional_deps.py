@@ -1,4 +1,4 @@
-"""The lab's own packages are an extra: who lacks one is told how to get it."""
+"""The lab's own packages are an extra: the message for a missing one says how to install it."""
 
 from __future__ import annotations
 

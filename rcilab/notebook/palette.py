@@ -2,5 +2,5 @@
 
 from __future__ import annotations
 
-# Okabe and Ito's palette, told apart with every kind of colour vision, without its yellow (too pale on white).
+# Okabe and Ito's palette, distinct with every kind of colour vision, without its yellow (too pale on white).
 JOINT_COLORS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7", "#000000")

@@ -28,7 +28,7 @@ class Part(Closeable):
         language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
 
     Raises:
-        InvalidValueError: The subject is none of these, or the language is unknown.
+        InvalidValueError: The subject is not one of these, or the language is unknown.
     """
 
     def __init__(self, subject: object, language: str | None = None) -> None:
@@ -41,7 +41,7 @@ class Part(Closeable):
         kernel_cells().adopt(self)
 
     def __setattr__(self, name: str, value: object) -> None:
-        """Sets what there is: a slip in a name is no new attribute that nobody reads."""
+        """Sets existing attributes only: a misspelt name is an error."""
         is_known = name.startswith("_") or name in vars(self) or hasattr(type(self), name)
         if not is_known and vars(self).get("_root") is not None:
             known = [other for other in {*vars(self), *dir(type(self))} if not other.startswith("_")]
@@ -71,7 +71,7 @@ class Part(Closeable):
         self._root = lean(ipywidgets.VBox, [style_sheet(), *children], layout=own, classes=("rl-root", *classes))
 
     def halt(self) -> None:
-        """Brings to rest what this part moves; most move nothing."""
+        """Stops what this part moves; most move nothing."""
 
     def close(self) -> None:
         """Takes the part away and ends what it started. May be called twice."""

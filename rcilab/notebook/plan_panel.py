@@ -24,7 +24,7 @@ from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _SLOWEST = 1.0  # [%]
-_UNSEEN = 0.3  # [s] A choice: what is planned sooner needs no bar; most are.
+_UNSEEN = 0.3  # [s] What is planned sooner needs no bar; most are.
 
 
 class PlanPanel(Part):
@@ -139,7 +139,7 @@ class PlanPanel(Part):
             self.state.show(message("plan.failed", error=tell(found)))
         elif not isinstance(found, SlowDown):
             self.state.show(found)
-        elif about is not None and about is self.state.now.plan:  # Else somebody has planned anew.
+        elif about is not None and about is self.state.now.plan:  # Else it was planned again.
             if found.motion is None or found.report is None:
                 self._slowed = about, found
                 return

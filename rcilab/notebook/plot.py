@@ -42,7 +42,7 @@ _HEADROOM = 1.12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Panel:
-    """One row of the figure: what one condition judges, joint by joint."""
+    """One row of the figure: what one condition bounds, joint by joint."""
 
     condition: Condition
     values: Array
@@ -63,7 +63,7 @@ def plot(
 ) -> Figure:
     """Draws angle, velocity, acceleration and jerk of a motion against the arm's limits.
 
-    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller judges. Grey
+    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller checks. Grey
     lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is hatched
     in red over the time it lasts, and the title counts the places, a jump of all joints as one. With a run, what the
     robot did is drawn as a broad line under the dashed plan (acceleration and jerk: of its commanded angles), and a
@@ -78,7 +78,7 @@ def plot(
         language: "en" or "zh"; that of the notebook when absent. Without a Chinese font here it is English.
 
     Raises:
-        InvalidValueError: A joint number is none of this arm's, or an argument is something else altogether.
+        InvalidValueError: A joint number does not exist on this arm, or an argument has another type.
         UsageError: matplotlib is not installed.
     """
     chosen = chosen_language(language)

@@ -49,7 +49,7 @@ class Preview(Closeable):
 
     Raises:
         InvalidValueError: The pose is not n finite numbers, the motion is for another number of joints, or the language
-            is none.
+            is unknown.
         UsageError: meshcat is not installed.
     """
 
@@ -137,14 +137,14 @@ class Preview(Closeable):
         return f"<Preview of {self._model.name}, {self.url or 'static'}>"
 
     def _repr_html_(self) -> str:
-        told = self._text("preview.nothing", call="<code>preview(..., live=False)</code>")
+        note = self._text("preview.nothing", call="<code>preview(..., live=False)</code>")
         style = f"width: 100%; height: {self._height}px; border: none"
         if self.url is None:
             return f'<iframe srcdoc="{html.escape(self.html())}" style="{style}"></iframe>'
         url = html.escape(self.url)
         return (
             f'<iframe src="{url}" style="{style}"></iframe>'
-            f'<p><small><a href="{url}" target="_blank">{url}</a> {told}</small></p>'
+            f'<p><small><a href="{url}" target="_blank">{url}</a> {note}</small></p>'
         )
 
     def _animate(self, motion: Motion | None) -> None:

@@ -1,4 +1,4 @@
-"""The judgement of the plan in the controller's own terms: every condition, its worst value, its bound, its source."""
+"""The report of the plan in the controller's own terms: every condition, its worst value, its bound, its source."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcilab.i18n.shown import value_against_bound
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import Tone, block, esc, soft, verdict, write
 
-_TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
+_TIGHT = 0.95  # From this share of a bound on, a row is amber.
 _LISTED = 8
 
 
@@ -30,7 +30,7 @@ class ReportView(Part):
 
     @property
     def report(self) -> Report | None:
-        """What is shown; None while there is nothing to judge."""
+        """What is shown; None while there is no plan."""
         if self._own is not None:
             return self._own
         return None if self.state.now.plan is None else self.state.now.plan.report

@@ -328,7 +328,7 @@ class RunPanel(Part):
         )
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))
-        told = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
+        trouble = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
         is_cells = isinstance(state.robot, SessionConnection) and state.robot.is_cells
         if is_cells and not self._was_cells:
             write(self._outcome, "")
@@ -336,13 +336,13 @@ class RunPanel(Part):
         if is_cells:
             write(self._where, problem(text("run.deaf")) if self._heart.is_deaf else soft(text("run.by_cell")))
         else:
-            write(self._where, "" if is_moving or not told else soft(told))
+            write(self._where, "" if is_moving or not trouble else soft(trouble))
         plan = state.now.plan
         if plan is None:
             write(self._plan, "")
         else:
-            told, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
-            write(self._plan, verdict(told, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
+            tone, word = ("good", "check.passed") if plan.report.ok else ("bad", "check.failed")
+            write(self._plan, verdict(tone, text(word), text("plan.ready", duration=f"{plan.motion.duration:.3f}")))
         self._show_progress(status, is_moving)
         self.speed_override.show(status)
         self.modes.show(status)

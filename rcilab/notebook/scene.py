@@ -44,7 +44,7 @@ class Scene(Part):
         place: Where the browser is; found out when absent.
 
     Raises:
-        InvalidValueError: The subject, the view or the language is none.
+        InvalidValueError: The subject, the view or the language is unknown.
         UsageError: meshcat is not installed.
     """
 
@@ -113,7 +113,7 @@ class Scene(Part):
 
 
 class _LivePicture:
-    """What the served page shows; drawn by whoever changes the state, one at a time."""
+    """What the served page shows; drawn by the thread that changes the state, one at a time."""
 
     def __init__(self, part: Scene, view: Literal["meshcat", "viser"]) -> None:
         self._state = part.state

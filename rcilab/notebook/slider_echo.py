@@ -1,4 +1,4 @@
-"""What a browser's slider tells back when it is given numbers between its steps.
+"""What a browser's slider reports when it is given numbers between its steps.
 
 It rounds them and reports the result like a hand's; taken for one it would move what the slider shows by up to half a
 step, and when the report comes late, after other numbers were given, back to where it was.
@@ -13,7 +13,7 @@ _LONGEST = 20  # Numbers that are remembered: more than are given while a cell r
 
 
 class SliderEcho:
-    """Tells what a slider reports apart: a hand, or numbers that it was given.
+    """Distinguishes what a slider reports: a hand, or numbers that it was given.
 
     Args:
         slider: Of ipywidgets.
@@ -30,7 +30,7 @@ class SliderEcho:
     def is_hand(self, number: float) -> bool:
         """Returns whether a report is from a hand: nothing that the slider was given since the last one rounds to it.
 
-        The newest number is what it shows; those before it are forgotten once it is told back, or a hand came.
+        The newest number is what it shows; those before it are forgotten once it is reported back, or a hand came.
         """
         if abs(number - self._given[-1]) <= self._half_step:
             self._given = self._given[-1:]

@@ -42,11 +42,11 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
-"""goal: where the arm is wanted; plan: a motion and its judgement; moment: what time of it is looked at; robot: its
+"""goal: where the arm is wanted; plan: a motion and its report; moment: what time of it is looked at; robot: its
 status; run: what came of an execution."""
 Way = Literal["joint", "line"]
 WAYS: tuple[Way, ...] = ("joint", "line")
-_PLANNED = 0.5  # Part of the work when a plan is to be judged; about what was seen.
+_PLANNED = 0.5  # Part of the work when a plan is checked, too; as measured.
 
 
 class LabState:
@@ -59,7 +59,7 @@ class LabState:
 
     def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
         require_model(model)
-        self._own_limits = model.limits.joint  # Without what a controller was told here.
+        self._own_limits = model.limits.joint  # Without soft limits set here.
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotConnection | SessionConnection | None = None
@@ -70,7 +70,7 @@ class LabState:
         self.moment: float | None = None
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
         self.exhibition: Exhibition | None = None
-        """A fault, or what a cell did, looked at in place of the plan until somebody plans, poses or executes."""
+        """A fault, or what a cell did, looked at in place of the plan until the next plan, pose or execution."""
         self.run: Run | None = None
         """What came of the last execution."""
         self.is_run_of_plan = True
@@ -93,7 +93,7 @@ class LabState:
         return end
 
     def tell(self, *topics: Topic) -> None:
-        """Tells everybody that something has changed."""
+        """Calls the listeners of what has changed."""
         with self.lock:
             for topic in topics:
                 for act in list(self._hearers.get(topic, ())):
@@ -189,13 +189,13 @@ class LabState:
             self.tell("goal")
 
     def make_plan(self) -> None:
-        """Plans from where the arm stands to the goal and judges it, collisions too."""
+        """Plans from where the arm stands to the goal and checks it, collisions too."""
         self.show(self.planning()(lambda part: None))
 
     def planning(self) -> Callable[[ProgressCallback], Plan | Message]:
-        """Returns what plans from where the arm stands now to the goal of now, and judges it, collisions too.
+        """Returns what plans from where the arm stands now to the present goal, and checks it, collisions too.
 
-        It takes its time, so it is not for a thread that somebody waits for.
+        It takes long, so it is not for a thread that others wait for.
         """
         with self.lock:
             make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
@@ -208,7 +208,7 @@ class LabState:
         return run
 
     def take_motion(self, motion: Motion) -> None:
-        """Takes a motion that was planned elsewhere; it is judged as any other."""
+        """Takes a motion that was planned elsewhere; it is checked as any other."""
         from rcilab.conformance.check import check
         from rcilab.motion.motion import require_motion
 
@@ -218,7 +218,7 @@ class LabState:
         self.show(replace(build_plan_view(self.model, motion, report), mode=mode, complete=True))
 
     def follow(self, mode: Mode) -> None:
-        """Chooses how motions are commanded; the plan is judged by the conditions of that mode.
+        """Chooses how motions are commanded; the plan is checked by the conditions of that mode.
 
         Args:
             mode: One of `rcilab.core.state.MODES`.
@@ -228,7 +228,7 @@ class LabState:
             self.tell("plan")
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan, or why there is none."""
+        """Shows a plan, or why none was found."""
         with self.lock:
             self.goals.show(made)
             self.run, self.moment, self.exhibition, self._ran = None, None, None, None
@@ -251,7 +251,7 @@ class LabState:
                 self.take_motion(self.now.plan.motion)
 
     def free_joints(self) -> None:
-        """Takes the arm's range back that it had before a controller that is gone was told soft limits."""
+        """Restores the arm's range from before the soft limits of a controller that is gone."""
         own, now = self._own_limits, self.model.limits.joint
         if now is not own:
             self.limit_joints(own.lower, own.upper)
@@ -354,7 +354,7 @@ def state_of(subject: object) -> LabState:
         subject: A model, a session (all parts of one session share its state), another part, or a state.
 
     Raises:
-        InvalidValueError: It is none of them.
+        InvalidValueError: It is not one of them.
     """
     if isinstance(subject, LabState):
         return subject
@@ -368,6 +368,6 @@ def state_of(subject: object) -> LabState:
 
 
 def _is_session(subject: object) -> TypeGuard[RobotSession]:
-    """Returns whether it is a session, without loading what one is made of: then nobody can have made it."""
+    """Returns whether it is a session, without loading its module: where that is not loaded, there is no session."""
     module = sys.modules.get("rcilab.execution.session")
     return module is not None and isinstance(subject, module.RobotSession)

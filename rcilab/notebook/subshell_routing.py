@@ -11,7 +11,7 @@ from functools import cache, partial
 from typing import Any
 
 _ROUTE = "_reply_subshell_for"
-"""ipykernel 7.4 asks it where a message goes: to whoever spoke last, the very cell that is busy. Others have none."""
+"""ipykernel 7.4 asks it where a message goes: to the last sender, the very cell that is busy. Others lack it."""
 
 
 def hear_at_once(*widgets: Any) -> None:

@@ -20,7 +20,7 @@ from rcilab.notebook.style import block, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
-_FURTHEST = 3000.0  # [mm] A choice: no arm of ours reaches half as far.
+_FURTHEST = 3000.0  # [mm] No arm of ours reaches half as far.
 _WHOLE_TURN = 360.0  # [deg]
 
 

@@ -83,7 +83,7 @@ class PreviewPage(Closeable):
         return _MARKUP.format(url=self.url, height=height)
 
     def _run(self) -> None:
-        """Plays, and follows the hand: a time that is not the one we set last was set by somebody on the page."""
+        """Plays, and follows the hand: a time that is not the one we set last was set on the page."""
         t, shown, resting = 0.0, 0.0, 0.0
         while not self._closed.wait(_TICK):
             wanted = self._slider.value

@@ -1,6 +1,6 @@
 """Widgets that cost a browser little: what looks alike shares one layout and one style.
 
-Each layout and each style is a model of its own, told to the browser in a message of its own; with one of each for
+Each layout and each style is a model of its own, sent to the browser in a message of its own; with one of each for
 every label and button, two thirds of what a cell sends would say nothing new.
 """
 
@@ -39,7 +39,7 @@ def once(name: str, make: Any) -> Any:
         make: Makes it.
     """
     known = _shared.get(name)
-    if known is None or known.comm is None:  # Somebody has closed every widget of the kernel.
+    if known is None or known.comm is None:  # Every widget of the kernel was closed.
         known = _shared[name] = make()
     return known
 

@@ -34,7 +34,7 @@ class JointSliders:
         language: "en" or "zh"; that of the notebook when absent.
 
     Raises:
-        InvalidValueError: q is not n angles inside the limits, the model is no model, or the language is none.
+        InvalidValueError: q is not n angles inside the limits, the model is not one, or the language is unknown.
     """
 
     def __init__(
@@ -109,10 +109,10 @@ class JointSliders:
         T_base_tool = self._model.forward(self._q)
         numbers = np.concatenate((1e3 * T_base_tool.position, np.degrees(T_base_tool.rpy)))
         names = [self._text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
-        told = [
+        numbers = [
             f"{name} {number:.1f}" for name, number in zip(names, np.round(numbers, 1) + 0.0, strict=True)
         ]  # No -0.0.
-        parts = [f"{', '.join(told[:3])} mm", f"{', '.join(told[3:])}°"]
+        parts = [f"{', '.join(numbers[:3])} mm", f"{', '.join(numbers[3:])}°"]
         if self._model.redundancy:
             try:
                 psi = math.degrees(self._model.arm_angle(self._q))

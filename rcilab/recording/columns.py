@@ -30,7 +30,7 @@ def run_columns(run: Run) -> list[Column]:
 
 
 def run_facts(run: Run) -> dict[str, Any]:
-    """Returns what is known of a run beside its cycles, ready for JSON: arm, set-up, end, errors, health, verdict."""
+    """Returns a run without its cycles, ready for JSON: arm, configuration, end, errors, health, verdict."""
     timing, tracking, report = run.timing, run.tracking, run.report
     return {
         "arm": None if run.model is None else run.model.name,

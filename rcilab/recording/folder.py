@@ -42,7 +42,7 @@ def keep_newest(folder: str | PathLike[str], count: int) -> FolderStats:
         raise InvalidValueError("count", count, "is negative: 0 keeps none")
     deleted, freed = 0, 0
     for _, path, size in sorted(_runs(Path(folder)), reverse=True)[count:]:
-        with suppress(OSError):  # It is not ours to delete, or somebody was quicker.
+        with suppress(OSError):  # It is not ours to delete, or another process removed it first.
             path.unlink()
             deleted, freed = deleted + 1, freed + size
     return FolderStats(deleted, freed)

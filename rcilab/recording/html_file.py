@@ -83,7 +83,7 @@ def _digest(script: str) -> str:
 
 
 class _Packed:
-    """Arrays one after the other, compressed together; each is told by where it begins."""
+    """Arrays one after the other, compressed together; each is referred to by its offset."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
@@ -173,7 +173,7 @@ def _pack_path(
         "points": packed.add(model.position_path(run.q[rows])),
         "error": packed.add(error),
         "worst": worst,
-        "worst_told": scale.told(plain_number(worst, 2)),
+        "worst_text": scale.with_unit(plain_number(worst, 2)),
     }
     if run.plan is not None:
         place["plan"] = packed.add(model.position_path(run.planned[rows]))

@@ -83,7 +83,7 @@ class Run:
     """Every recorded cycle in full, see `cycle_dtype`. In a session with `record_all=True` a cycle holds the rest of
     the state, too, by the names of `RobotState`: `run.cycles["tau_filtered"]`."""
     stopped: str | None = None
-    """Why the motion was brought to rest before its end; None when it ran to its end."""
+    """Why the motion was stopped before its end; None when it ran to its end."""
     truncated: bool = False
     """Whether the beginning is missing because the run was longer than the recorder."""
     realtime: bool = True
@@ -205,7 +205,7 @@ class Run:
     def stop_time(self) -> float | None:
         """When the arm stopped following its plan, [s]; None: it followed to its end.
 
-        That is when somebody began to bring it to rest, or when the controller showed a fault or ended the motion.
+        That is when a stop began, or when the controller showed a fault or ended the motion.
         """
         return find_stop(self.cycles)
 
@@ -213,7 +213,7 @@ class Run:
     def error(self) -> JointPath:
         """Measured minus planned joint angles, shape (N, n), [rad], with the play-out delay taken out.
 
-        NaN from `stop_time` on: an arm that is brought to rest leaves its plan on purpose. Without a plan, measured
+        NaN from `stop_time` on: an arm that is stopped leaves its plan on purpose. Without a plan, measured
         minus commanded.
         """
         if self.plan is None:
@@ -286,8 +286,8 @@ class Run:
     def _told_error(self) -> str:
         """In words, and until when where it was stopped."""
         stop = self.stop_time if self.plan is not None else None
-        told = f"{self.largest_error:.3g} rad ({math.degrees(self.largest_error):.3g} deg)"
-        return told if stop is None else f"{told} until the stop at {stop:.3f} s"
+        deviation = f"{self.largest_error:.3g} rad ({math.degrees(self.largest_error):.3g} deg)"
+        return deviation if stop is None else f"{deviation} until the stop at {stop:.3f} s"
 
     @property
     def timing(self) -> Timing:
@@ -342,7 +342,7 @@ class Run:
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
-            UsageError: The format needs a library that is not installed, or an arm and there is none.
+            UsageError: The format needs a library that is not installed, or an arm, which this run does not have.
         """
         save_run(self, file, progress=progress, language=language, units=units)
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 def _error(run: Run, words: Mapping[str, str]) -> str:
     """Returns the largest error, and until when it was compared where the arm was stopped."""
-    told, stop = f"{math.degrees(run.largest_error):.3g} deg", run.stop_time
-    return told if stop is None or run.plan is None else words["card.until"].format(error=told, time=stop)
+    deviation, stop = f"{math.degrees(run.largest_error):.3g} deg", run.stop_time
+    return deviation if stop is None or run.plan is None else words["card.until"].format(error=deviation, time=stop)
 
 
 def run_html(run: Run, language: str = "en") -> str:

@@ -49,7 +49,7 @@ class Endpoint:
     Args:
         host: Address to listen on.
         channels: At least one of TCP, the main one first; at most one of UDP.
-        client: Host and port that states go to from power-up on, whoever connects; a port of None: the UDP channel's.
+        client: Host and port that states go to from power-up on, for any peer; a port of None: the UDP channel's.
             None: to the client that connects.
 
     Raises:

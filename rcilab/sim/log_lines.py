@@ -81,7 +81,7 @@ class LogLines:
             self._left_out += 1
             return
         if self._left_out:
-            self._lines.append(f"{self._left_out} lines were left out: nobody read them")
+            self._lines.append(f"{self._left_out} lines were left out: the stream was not read")
             self._left_out = 0
         self._lines.append(line)
         self._wake.set()

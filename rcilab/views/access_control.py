@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
-_FIRST_DELAY = 0.1  # [s] A tuning value: somebody who mistypes a token does not notice it.
+_FIRST_DELAY = 0.1  # [s] A tuning value: not noticed after a mistyped token.
 _LONGEST_DELAY = 5.0  # [s] A tuning value: as long as a browser and its user wait without giving up.
 _FORGOTTEN = 60.0  # [s] A tuning value: after so long without a wrong token the next one is the first again.
 
@@ -57,7 +57,7 @@ class Gate:
     def refuse_page(self, host: str | None, path: str, cookie: str | None) -> Refusal | None:
         """Returns why a page may not be served, or None when it may.
 
-        A foreign Host means that somebody's DNS points at this machine (rebinding), so it is refused too.
+        A foreign Host means that another domain's DNS points at this machine (rebinding), so it is refused too.
         """
         if self.names and host not in self.names:
             return Refusal(f"{self.title} answers to {' and '.join(sorted(self.names))} only")
@@ -96,7 +96,7 @@ class Gate:
 
 
 class Guesses:
-    """Makes whoever tries tokens wait for each answer: longer each time, until nobody has tried for a while.
+    """Delays the answer to each wrong token: longer each time, until none was tried for a while.
 
     Args:
         clock: Returns the time, [s].

@@ -1,4 +1,4 @@
-"""How many connections may be open that have not said what they want: who only connects takes nobody's place.
+"""Limits connections without a request: idle ones must not displace others.
 
 websockets waits 10 s for a request, and each connection that it waits for is an open file. Without a bound a stranger
 who opens some hundred, on a page that he has no token for, leaves none for pages and recordings.
@@ -12,9 +12,9 @@ import resource
 import time
 from typing import Any
 
-MOST_WAITING = 64  # Connections without a request yet; a browser that loads the page opens some 6. A choice.
+MOST_WAITING = 64  # Connections without a request yet; a browser that loads the page opens some 6.
 BACKLOG = 16  # Connections that asyncio takes at a time, of which it complains one by one where it can take none.
-_AGAIN = 60.0  # [s] A choice: that no connection can be taken is said so often.
+_AGAIN = 60.0  # [s] That no connection can be taken is said so often.
 
 _log = logging.getLogger("rcilab.arrivals")
 

@@ -38,7 +38,7 @@ _FACES = np.array(
 
 
 class ConfigurationView:
-    """Draws one set-up. Owned by the thread that draws.
+    """Draws one configuration. Owned by the thread that draws.
 
     Args:
         scene: Where to draw.

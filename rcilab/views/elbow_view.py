@@ -1,4 +1,4 @@
-"""The circle of a 7-axis arm's elbow in a scene: a ring of arcs, free or forbidden, told apart by pattern and colour.
+"""The circle of a 7-axis arm's elbow in a scene: a ring of arcs, free or forbidden by pattern and colour.
 
 Nodes: ROOT/free, a thick band, blue-green where the tool moves well and amber towards a singularity; ROOT/other, a
 thin line where only another way of standing is free; ROOT/limits, ROOT/singular, ROOT/box, ROOT/reach, forbidden, each
@@ -19,7 +19,7 @@ from rcilab.model.kinematics.elbow_circle import ElbowCircle
 from rcilab.views.scene import Color, Scene
 
 OUTWARD = 0.105
-"""How far outside the elbow's circle the ring is drawn, [m]: clear of the housings. A choice."""
+"""How far outside the elbow's circle the ring is drawn, [m]: clear of the housings."""
 ARC_COLORS: dict[str, Color] = {
     "free": (18, 150, 132),
     "other": (120, 175, 205),
@@ -30,11 +30,11 @@ ARC_COLORS: dict[str, Color] = {
 }
 """By kind of arc; each has a pattern of its own as well."""
 
-_PIECES = 120  # A choice: three degrees each.
+_PIECES = 120  # Three degrees each.
 _THICK = {"free": 0.016, "other": 0.006}  # [m]
 _FORBIDDEN_THICK = 0.009  # [m]
 _DASHES = {"limits": (4.0, 3.0), "singular": (1.2, 2.4), "box": (7.0, 2.5), "reach": (2.0, 5.0)}  # [deg] on, off
-_POOR, _GOOD = 0.03, 0.14  # Smallest singular value that is drawn amber, and from which on it is blue-green. A choice.
+_POOR, _GOOD = 0.03, 0.14  # Smallest singular value that is drawn amber, and from which on it is blue-green.
 _AMBER = (240, 150, 20)
 _SPOKE = (70, 84, 102)
 

@@ -28,7 +28,7 @@ _PATIENCE = 10.0  # [s] for the thread to answer; it does so in milliseconds
 
 
 def import_meshcat() -> Any:
-    """Returns the module; meshcat 0.3.2 imports a module that pyzmq has declared old, which is none of our business."""
+    """Returns the module; meshcat 0.3.2 imports a module that pyzmq has declared old, which is not ours to report."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         import meshcat.geometry

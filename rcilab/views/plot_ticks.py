@@ -6,7 +6,7 @@ import math
 
 _ROOMY, _CLOSE = 26.0, 13.0  # [px] From number to number: where there is room, and at least. Numbers are 11 px high.
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-_SHORT = 6  # Characters that a number has at most for a limit to be told beside the plot.
+_SHORT = 6  # Characters that a number has at most for a limit to be written beside the plot.
 
 
 def axis_ticks(low: float, high: float, height: float, limits: tuple[float, ...] = ()) -> tuple[float, ...]:
@@ -16,18 +16,18 @@ def axis_ticks(low: float, high: float, height: float, limits: tuple[float, ...]
         low: Lower end; `high` is -low, or low is 0.
         high: Upper end, more than `low`.
         height: Of the axis, [px].
-        limits: Bounds within the axis; those that can be said shortly are told, and nothing close to them.
+        limits: Bounds within the axis; the short ones are written, and nothing close to them.
     """
     per_pixel = (high - low) / height
     step = round_step(_ROOMY * per_pixel)
-    if step > high:  # Nothing but zero would be told.
+    if step > high:  # Nothing but zero would be written.
         step = round_step(_CLOSE * per_pixel)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    told = [limit for limit in limits if low <= limit <= high]
-    if any(len(_written(limit)) > _SHORT for limit in told):
-        told = []
+    written = [limit for limit in limits if low <= limit <= high]
+    if any(len(_written(limit)) > _SHORT for limit in written):
+        written = []
     rounds = (count * step for count in range(first, last + 1))
-    return tuple(sorted((*told, *(at for at in rounds if _is_clear(at, told, _CLOSE * per_pixel)))))
+    return tuple(sorted((*written, *(at for at in rounds if _is_clear(at, written, _CLOSE * per_pixel)))))
 
 
 def round_step(least: float) -> float:
@@ -41,5 +41,5 @@ def _written(value: float) -> str:
     return f"{value:,.3f}".rstrip("0").rstrip(".")
 
 
-def _is_clear(at: float, told: list[float], distance: float) -> bool:
-    return all(abs(at - limit) >= distance for limit in told)
+def _is_clear(at: float, written: list[float], distance: float) -> bool:
+    return all(abs(at - limit) >= distance for limit in written)

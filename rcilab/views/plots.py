@@ -28,7 +28,7 @@ ORDERS: dict[Quantity, int] = {quantity: order for order, quantity in enumerate(
 
 _WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
 _FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
-_LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for its ticks to be readable. A choice.
+_LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for its ticks to be readable.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 
@@ -248,7 +248,7 @@ def build_frame(
         buckets: Number of buckets the time is cut into.
         factor: How many of the unit to be shown one SI unit is; degrees as a rule.
     """
-    if quantity == "q" and plan is not None:  # As `check` judges it: who starts outside may lead back.
+    if quantity == "q" and plan is not None:  # As `check` does: a motion that starts outside may lead back.
         limits = range_from(limits, plan.values[0], RECOVERY_RANGE)
     low, high = bounds_of(limits, quantity)
 

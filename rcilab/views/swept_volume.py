@@ -13,7 +13,7 @@ from rcilab.robots.shapes import Capsule, build_shapes
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import DrawableModel
 
-_ROUND = 12  # Segments around a capsule; a choice.
+_ROUND = 12  # Segments around a capsule.
 
 
 def swept_mesh(model: DrawableModel, q: ArrayLike) -> Mesh:

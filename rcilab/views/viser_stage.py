@@ -26,7 +26,7 @@ def place_camera(server: viser.ViserServer) -> None:
 class ViserEnvironment:
     """A page's camera, and where it stands at first: further back as the window, or the panels, leave little room.
 
-    A camera that somebody has moved stays, until they bring it back.
+    A camera that was moved by hand stays until it is reset.
 
     Args:
         camera: Of a page that has just connected.

@@ -17,7 +17,7 @@ from rcilab.core.errors import UsageError
 from rcilab.views.access_control import is_loopback
 
 VARIABLE = "RCILAB_TOKEN"
-SHORTEST = 16  # Characters. A choice: 16 random letters are more than anybody can try.
+SHORTEST = 16  # Characters. 16 random letters cannot be found by trying.
 _BYTES = 24  # Of chance in a token that is made here: 32 URL-safe characters.
 
 _REDIRECT = """<!DOCTYPE html><meta charset="utf-8"><title>rcilab</title>
@@ -63,7 +63,7 @@ def is_local(host: str) -> bool:
     """Returns whether only this machine can reach an address.
 
     Raises:
-        UsageError: It is none.
+        UsageError: It is not a valid token.
     """
     try:
         return is_loopback(host)

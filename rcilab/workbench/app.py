@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 _LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Heights of a page's window that plots are laid out for.
-_BEAT = 0.4  # [s] A choice: the control process stops a motion when it has heard of nobody for 2 s.
+_BEAT = 0.4  # [s] The control process stops a motion after 2 s without an operator.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class WorkbenchConfig:
     runs: Path | None = None
     """Folder that every motion is recorded in, cycle by cycle; None keeps the last one in memory only."""
     replay: Run | None = None
-    """A run to look at; nothing is connected then until somebody asks for it."""
+    """A run to look at; nothing is connected then until asked for."""
 
 
 class Workbench:
@@ -99,7 +99,7 @@ class Workbench:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
         self.session = RobotConnection(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
-        is_own = config.port and replay is None  # Any free port is nobody's own, and whoever replays looks at a run.
+        is_own = config.port and replay is None  # A free port is not reused, and a replay only shows a run.
         keepsake = Autosave(keepsake_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()
         self.conductor = Dispatcher(self.store, self.session, self._deliver, keepsake, self._presence)
@@ -227,7 +227,7 @@ class Workbench:
             self.session.heartbeat()
 
     def _beat(self) -> None:
-        """Asks the pages, all the time, whether somebody is there to press Stop."""
+        """Asks the pages continuously whether an operator is there to press Stop."""
         while not self._stopped.wait(_BEAT):
             self.live.beat()
 

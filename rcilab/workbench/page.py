@@ -35,7 +35,7 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
 
 
 def introduce(client: viser.ClientHandle, key: str) -> None:
-    """Tells a page which of the server's clients it is, and the key that proves it on its live connection."""
+    """Informs a page which of the server's clients it is, and the key that proves it on its live connection."""
     call = f"window.rcilabPage?.({client.client_id}, {json.dumps(key)});"
     run_javascript(client, call)
 

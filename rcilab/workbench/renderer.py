@@ -58,10 +58,10 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_PERIOD = 1.0 / 30.0  # [s] A choice: the display's rate is enough, and it leaves the processor to the robot.
-_AT_REST = 0.25  # [s] A choice: so often counters and clocks are shown while nothing else changes.
+_PERIOD = 1.0 / 30.0  # [s] The display's rate is enough, and it leaves the processor to the robot.
+_AT_REST = 0.25  # [s] So often counters and clocks are shown while nothing else changes.
 _READ = 0.25
-"""[s] A choice: where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
+"""[s] Where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
 the arm: a page that draws in software shows the arm once it has applied all that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
@@ -89,7 +89,7 @@ _TABS = (
 
 
 def tab_name(index: int) -> str:
-    """Returns the key of a tab's label, counted from 0; "" where there is none."""
+    """Returns the key of a tab's label, counted from 0; "" for an unknown tab."""
     return _TABS[index][0] if index < len(_TABS) else ""
 
 
@@ -119,7 +119,7 @@ class Renderer:
         self._next = 0.0
         self._goal: object = None
         self._owed: float | None = None  # [s] Since when the panels show another goal.
-        self._told: tuple[object, ...] = ()
+        self._drawn: tuple[object, ...] = ()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
         self.errors = Failures()
@@ -175,14 +175,14 @@ class Renderer:
     def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:
         """Returns whether numbers and plots give way to the arm that follows a hand; news of the robot never do."""
         is_dragged = state.goal is not self._goal and self._stage.is_held
-        if state.quality != "light" or not is_dragged or self._told != _traits(status):
+        if state.quality != "light" or not is_dragged or self._drawn != _traits(status):
             return False
         now = time.monotonic()
         self._owed = now if self._owed is None else self._owed
         return now - self._owed < _READ
 
     def _show_panels(self, state: UiState, seen: UiState, status: SupervisorStatus) -> None:
-        self._goal, self._told, self._owed = state.goal, _traits(status), None
+        self._goal, self._drawn, self._owed = state.goal, _traits(status), None
         for panel in self._panels:
             panel.show(seen if panel is self._timeline else state, status)
 

@@ -25,7 +25,7 @@ def check_host(host: str, token: str | None) -> None:
         require_token(token, "WorkbenchConfig")
     elif not is_local(host):
         raise UsageError(
-            f"host {host} opens the workbench to the network, and whoever opens the page can move the robot; "
+            f"host {host} opens the workbench to the network, and anyone who opens the page can move the robot; "
             "give a token, or leave the host away to stay on this machine"
         )
 
@@ -41,7 +41,7 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
 
     Raises:
         ModelError: No robot has this name, or it does not speak the RCI.
-        UsageError: The address needs a token, or the controller's is none.
+        UsageError: The address needs a token, or the controller's is not valid.
     """
     check_host(host, token)
     _require_files()

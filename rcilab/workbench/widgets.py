@@ -19,11 +19,11 @@ from rcilab.i18n.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
 
-HAND_AWAY = 0.6  # [s] A choice: a control touched less long ago is not written to.
-_TYPING_PAUSE = 0.7  # [s] A choice: a typed number counts when no key came for so long.
-_ANSWER = 0.2  # [s] A choice: what a typed number came to stands in the state after that.
-_STANDS = 3.0  # [s] A choice: so long a number that was taken stands as it was typed; to write is to disturb the hand.
-_ENTERED = 0.5  # [s] A choice: the same of a number that was entered: the hand is done with it.
+HAND_AWAY = 0.6  # [s] A control touched less long ago is not written to.
+_TYPING_PAUSE = 0.7  # [s] A typed number counts when no key came for so long.
+_ANSWER = 0.2  # [s] What a typed number came to stands in the state after that.
+_STANDS = 3.0  # [s] So long a number that was taken stands as it was typed; to write is to disturb the hand.
+_ENTERED = 0.5  # [s] The same of a number that was entered: the hand is done with it.
 _NOBODY: Mapping[int | None, float] = MappingProxyType({})
 
 

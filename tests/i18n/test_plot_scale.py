@@ -24,9 +24,9 @@ def test_errors_are_shown_in_thousandths_of_the_unit_chosen_where_a_page_is_in_r
 
 
 def test_a_number_in_thousandths_of_a_metre_reads_as_a_product():
-    assert plot_scale("tool", SI).told("0.25") == "0.25·10⁻³ m"
-    assert plot_scale("tool").told("0.25") == "0.25 mm"
-    assert plot_scale("error").told("0.25") == "0.25 °"
+    assert plot_scale("tool", SI).with_unit("0.25") == "0.25·10⁻³ m"
+    assert plot_scale("tool").with_unit("0.25") == "0.25 mm"
+    assert plot_scale("error").with_unit("0.25") == "0.25 °"
 
 
 def test_the_smallest_range_is_the_same_angle_in_every_unit_and_its_hundredth_is_told():

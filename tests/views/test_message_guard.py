@@ -290,7 +290,7 @@ def test_what_is_no_message_is_dropped_counted_and_said_once(page, link, message
     page.settle(link)  # The page is still there.
     assert page.guard.guard.malformed == before + 5
     said = capfd.readouterr()
-    first = "a page has sent a message that is none of a page; such messages are dropped\n"
+    first = "a page has sent a malformed message; such messages are dropped\n"
     assert said.out + said.err == ("" if before else first)
 
 
@@ -313,4 +313,4 @@ def test_a_field_that_viser_would_warn_of_is_dropped_and_not_quoted(capfd, posit
             page.guard.close()
     assert quoted == []
     said = capfd.readouterr()
-    assert said.out + said.err == "a page has sent a message that is none of a page; such messages are dropped\n"
+    assert said.out + said.err == "a page has sent a malformed message; such messages are dropped\n"

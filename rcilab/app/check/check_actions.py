@@ -1,4 +1,4 @@
-"""What happens when somebody asks the Check tab for something. Owned by the conductor's thread."""
+"""Requests of the Check tab. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -181,7 +181,7 @@ class CheckActions:
 
 
 def plot_of(condition: Condition) -> str | None:
-    """Returns the plot that shows what a condition judges; None where there is none."""
+    """Returns the plot of the quantity that a condition bounds; None without such a plot."""
     match condition.signal, condition.order:
         case "joint", order:
             return ("q", "dq", "ddq", "jerk")[order]

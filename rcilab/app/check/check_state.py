@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
 
 Explained: TypeAlias = "tuple[Report, SlowDown | None]"
-"""A report that is told in words, and the slow-down that belongs to them; a report that is ok has none."""
+"""A report shown as text, and the slow-down that belongs to it; a report that is ok has none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,6 +47,6 @@ class CheckState:
     slowed: Slowed | None = None
     explained: Explained | None = None
     sought: int = 0
-    """How often somebody went to the moment of a row."""
+    """How often the moment of a row was shown."""
     row: str = ""
-    """Id of the condition that somebody went to last."""
+    """Id of the condition that was shown last."""

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def beside_program(state: UiState) -> Message | None:
-    """Returns that this plan is not the program's, which could not be planned; None where nobody would think so."""
+    """Returns the notice that this plan is not the program's, which could not be planned; None where that is clear."""
     plan, program = state.plan, state.program
     fails = program.planned is None and program.tone == "bad" and program.answer is not None
     if plan is None or plan.program is not None or not fails:

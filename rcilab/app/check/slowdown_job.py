@@ -1,4 +1,4 @@
-"""How a plan is slowed down until it passes: it is judged several times, so this takes a while."""
+"""Slows a plan down until it passes; it is checked several times, so this takes a while."""
 
 from __future__ import annotations
 

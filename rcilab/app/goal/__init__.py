@@ -1,1 +1,1 @@
-"""The pose that is wanted: asking for it, judging it, planning to it."""
+"""The target pose: posing it, checking it, planning to it."""

@@ -21,8 +21,8 @@ ArcKind: TypeAlias = Literal["free", "other", "limits", "singular", "box", "reac
 """free: in this way of standing; other: in another one only; or what forbids it."""
 
 LOOKS = 36
-"""Arm angles at which dexterity is looked at: every ten degrees. A choice."""
-SAID = math.radians(0.5)  # [rad] A choice: an arm angle that was moved by less is not worth a sentence.
+"""Arm angles at which dexterity is looked at: every ten degrees."""
+SAID = math.radians(0.5)  # [rad] An arm angle that was moved by less is not worth a sentence.
 
 _KINDS: dict[str, ArcKind] = {
     "joint limits": "limits",
@@ -62,7 +62,7 @@ class Elbow:
 
 
 def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow | None:
-    """Returns the circle of the elbow at these joint angles; None where there is none.
+    """Returns the circle of the elbow at these joint angles; None for an arm without one.
 
     Args:
         model: The arm, with its tool.

@@ -1,4 +1,4 @@
-"""What happens when somebody poses the goal: solve, plan, judge. Owned by the conductor's thread."""
+"""Requests that pose the goal: solve, plan, check. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
 """Name of the field that takes all four numbers of the orientation."""
-FURTHEST = 3.0  # [m] A choice: no arm of ours reaches half as far, and the gizmo should stay in sight.
+FURTHEST = 3.0  # [m] No arm of ours reaches half as far, and the gizmo should stay in sight.
 SLOWEST = 0.01
-SETTLED = 0.15  # [s] A choice: a goal that has not moved for so long has come to rest.
-_ONE_DRAG = 1.0  # [s] A choice: what moves again within that time is one drag, or one turn at a slider's keys.
+SETTLED = 0.15  # [s] A goal that has not moved for so long stands.
+_ONE_DRAG = 1.0  # [s] What moves again within that time is one drag, or one turn at a slider's keys.
 RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
 
 
@@ -317,7 +317,7 @@ class GoalActions:
         self.plan()
 
     def plan(self, request: PlanGoal | None = None) -> None:
-        """Plans from where the arm stands to the goal, unless it is moving: then when it has come to rest.
+        """Plans from where the arm stands to the goal, unless it is moving: then once it stands.
 
         A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
         """
@@ -370,7 +370,7 @@ class GoalActions:
         self.show(make_recovery(state.model, readonly_copy(status.q_c), state.box))
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan from its start, or why there is none."""
+        """Shows a plan from its start, or why none was found."""
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
@@ -384,9 +384,9 @@ class GoalActions:
             state = self._store.state
         if state.plan is None or time.monotonic() - self._planned < (RESTED if self._is_held else SETTLED):
             return
-        judged = state.plan.completed(state.drive.mode)
-        if judged is not state.plan:
-            self._store.update(plan=judged)
+        checked = state.plan.completed(state.drive.mode)
+        if checked is not state.plan:
+            self._store.update(plan=checked)
 
     def catch_up(self) -> None:
         """Plans what was put off while the arm was moving."""
@@ -394,7 +394,7 @@ class GoalActions:
             self.plan()
 
     def follow(self, q: JointVector) -> Goal:
-        """Puts the goal where the moving arm is and returns it; planned is when the arm has come to rest."""
+        """Puts the goal where the moving arm is and returns it; it is planned once the arm stands."""
         goal = goal_at(self._store.state.model, q)
         self._store.update(goal=goal)
         self._stale = True

@@ -1,4 +1,4 @@
-"""What happens when somebody stores, recalls or deletes a named pose. Owned by the conductor's thread."""
+"""Requests that store, recall or delete a named pose. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ from rcilab.model.robot_model import RobotModel
 
 Tone = Literal["good", "warn", "bad"]
 
-NEAR_LIMIT = math.radians(5.0)  # [rad] A choice: closer than this to a limit is worth saying.
-NEAR_SINGULAR = 0.03  # A choice: smallest singular value of the Jacobian below which the arm is as good as singular.
+NEAR_LIMIT = math.radians(5.0)  # [rad] Closer than this to a limit is worth saying.
+NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm is as good as singular.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,7 +32,7 @@ class TargetStatus:
     q: JointVector
     """The configuration at the nearest reachable pose, shape (n,), [rad]."""
     solutions: Solutions | None
-    """All branches at that pose; None when there is none."""
+    """All branches at that pose; None where it cannot be reached."""
     short: Message | None = None
     """How far that pose is from the target, in words; None when the target is reached."""
 
@@ -61,12 +61,12 @@ def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
         solutions: Joint angles, shape (N, n), [rad].
     """
     angles = np.degrees(solutions).round()
-    told: list[int] = []
+    named: list[int] = []
     for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
-        if len(np.unique(angles[:, told], axis=0)) == len(np.unique(angles, axis=0)):
+        if len(np.unique(angles[:, named], axis=0)) == len(np.unique(angles, axis=0)):
             break
-        told.append(joint)
-    return tuple(sorted(told))
+        named.append(joint)
+    return tuple(sorted(named))
 
 
 def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> TargetStatus:

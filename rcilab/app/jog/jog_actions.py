@@ -1,4 +1,4 @@
-"""What happens when somebody jogs: the goal or the robot moves while a button is held, or by one step a press.
+"""Requests that jog: the goal or the robot moves while a button is held, or by one step a press.
 
 Owned by the conductor's thread; it never waits for the robot.
 """
@@ -36,7 +36,7 @@ from rcilab.motion import Jog
 
 _LONGEST_LOOK = 100  # Cycles a preview goes on at most in one tick: a page that stood still does not jump.
 _SAME = 1e-9  # [rad]
-_FORGOTTEN = 2.0  # [s] A choice: so long a button that moves nothing any more is silent before it may move again.
+_FORGOTTEN = 2.0  # [s] So long a button that moves nothing any more is silent before it may move again.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,7 +138,7 @@ class JogActions:
             self._step_goal(axis)
 
     def release(self) -> None:
-        """Brings to rest what a button moves."""
+        """Stops what a button moves."""
         press, self._press = self._press, None
         if press is not None and press.is_robot:
             self._robot.let_go()
@@ -196,7 +196,7 @@ class JogActions:
             self._goal.pose(led.q)
 
     def _begin_anew(self) -> None:
-        """Another arm, destination or person: the buttons pose the goal again until somebody wants otherwise."""
+        """Another arm, destination or person: the buttons pose the goal again until changed."""
         self.release()
         self._preview = None
         self._robot.forget()

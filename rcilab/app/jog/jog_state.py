@@ -33,17 +33,17 @@ STEPS = (0.0, 0.1, 1.0, 5.0, 10.0)
 """Millimetres or degrees that one press goes; 0: as long as the button is held."""
 
 FASTEST_TOOL = 0.25  # [m/s] What ISO 10218-1 calls reduced speed; no jog moves the tool tip faster.
-FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool. A choice.
-FASTEST_JOINT = math.radians(30.0)  # [rad/s] A choice.
+FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool.
+FASTEST_JOINT = math.radians(30.0)  # [rad/s]
 SLOWEST = 0.01
-STILL = 1e-3  # [rad/s] A choice: below this a jogged joint stands.
+STILL = 1e-3  # [rad/s] Below this a jogged joint stands.
 
-_AT_LIMIT = math.radians(0.05)  # [rad] A choice: closer than this to its limit a jogged joint has arrived there.
-_REACTION = 0.5  # [s] A choice: a jog that nobody renews any more, 0.3 s, and the way to rest are shorter.
+_AT_LIMIT = math.radians(0.05)  # [rad] Closer than this to its limit a jogged joint has arrived there.
+_REACTION = 0.5  # [s] A jog that is not renewed ends in 0.3 s; with its stop it is shorter than this.
 _AHEAD = 0.1  # [s] How far ahead distances are looked at.
-_FACE = 1e-3  # [m] A choice: the tool stands so far before a face of the safety box.
-_APPROACH = 1e-4  # [m/s] A choice: slower than this nothing comes nearer.
-STANDING = 0.02  # A choice: a smaller part of a jog than that is none.
+_FACE = 1e-3  # [m] The tool stands so far before a face of the safety box.
+_APPROACH = 1e-4  # [m/s] Slower than this nothing comes nearer.
+STANDING = 0.02  # A smaller part of a jog than that does not count.
 
 _NO_JOG = {
     "starting": "ready.starting",
@@ -168,7 +168,7 @@ def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) 
     """Returns the part of a jog, 0 to 1, that keeps links from each other and the floor, and which come nearest.
 
     No controller looks for that. The arm may come nearer by what is left to `ADVISED_DISTANCE` within `_REACTION`, so
-    that it slows down on its way there, and stands in time even when nobody looks at it any more meanwhile.
+    that it slows down on its way there, and stands in time even without another update.
 
     Args:
         model: The arm.

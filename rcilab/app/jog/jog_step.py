@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 _NOWHERE = 1e-9  # [rad] Less than that is no step.
-_FARTHEST = math.radians(20.0)  # A choice: a joint that turns more for a step of the tool swings the arm elsewhere.
+_FARTHEST = math.radians(20.0)  # A joint that turns more for a step of the tool swings the arm elsewhere.
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The robot under the jog buttons: held through the supervisor, or by one judged motion a step; the goal goes along.
+"""The robot under the jog buttons: held through the supervisor, or by one checked motion a step; the goal goes along.
 
 Owned by the conductor's thread; it never waits for the robot.
 """
@@ -68,7 +68,7 @@ class RobotJog:
         return True
 
     def renew(self, axis: Axis, stops: int | None) -> bool:
-        """Tells the control process that a button is still held; returns False when that moves nothing any more.
+        """Informs the control process that a button is still held; returns False when that moves nothing any more.
 
         Args:
             axis: Which way.
@@ -105,7 +105,7 @@ class RobotJog:
             self._session.supervisor().release_jog()
 
     def step(self, axis: Axis, stops: int | None) -> None:
-        """Makes one step: a planned motion, judged like any other, collisions too.
+        """Makes one step: a planned motion, checked like any other, collisions too.
 
         Args:
             axis: Which way.
@@ -167,7 +167,7 @@ class RobotJog:
         self._ticket = self._followed = None
 
     def _follow(self, q: JointVector) -> None:
-        if self._followed in (None, self._store.state.goal):  # Not when somebody has posed the goal meanwhile.
+        if self._followed in (None, self._store.state.goal):  # Not when the goal was posed meanwhile.
             self._followed = self._goal.follow(q)
 
     def _end(self, ticket: PendingRequest, status: SupervisorStatus) -> None:

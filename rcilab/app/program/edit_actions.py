@@ -1,4 +1,4 @@
-"""What happens when somebody edits the program: its list, a step of it, its name. Owned by the conductor's thread."""
+"""Requests that edit the program: its list, a step of it, its name. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class EditActions:
         }
 
     def edit(self, request: EditProgram) -> None:
-        """Changes the program, or what of it is selected; what nobody can do just now is said."""
+        """Changes the program, or what of it is selected; what is not possible just now is reported."""
         self._shelves.open()
         whole = {
             "add": lambda: self._add(request), "start": self._start_here,

@@ -1,4 +1,4 @@
-"""What happens when somebody plans or loads a program. Owned by the conductor's thread."""
+"""Requests that plan or load a program. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class PlanProgram(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelProgram(Request):
-    """Drop the planning that is under way."""
+    """Cancel the planning in progress."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +98,7 @@ class ProgramActions:
         self._shelves.set(progress=0.0, answer=None, failed=None, notes=())
 
     def cancel(self, request: CancelProgram) -> None:
-        """Drops the planning that is under way; the plan there was before stays."""
+        """Cancels the planning in progress; the plan before it stays."""
         if self._planner.progress is not None:
             self._drop_planning()
             self._shelves.set(tone="warn", answer=message("program.cancelled"))
@@ -156,7 +156,7 @@ class ProgramActions:
             and self._shelves.state.tone != "bad"
             and is_moving(self._session.status())
         ):
-            self._shelves.set(tone="good", answer=None)  # It tells where the arm was before it moved.
+            self._shelves.set(tone="good", answer=None)  # It says where the arm was before it moved.
 
     def close(self) -> None:
         """Ends what is being planned."""

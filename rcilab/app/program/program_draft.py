@@ -1,4 +1,4 @@
-"""The program that somebody is writing on the page: values, and the edits that make new ones of them."""
+"""The program being edited: values, and the edits that return new ones."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
 FILE_FIELD = "program.0.file"
 """Names what is wrong with a file among `UiState.problems`."""
 MOST_ROUNDS = 100
-"""A choice: nobody watches more, and the motion stays one that can be looked at."""
+"""More is not watched, and the motion stays one that can be looked at."""
 
 _KEYS = count(1)
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A waypoint that can be told from all others, equal or not."""
+    """A waypoint that can be distinguished from all others, equal or not."""
 
     key: int
     waypoint: Waypoint
@@ -48,7 +48,7 @@ class Draft:
     """Pose of the tool in the flange frame, as in `Program`; None is the page's."""
 
     def place(self, key: int | None) -> int | None:
-        """Returns where a step stands, from 0, or None where there is none with this key."""
+        """Returns where a step stands, from 0, or None for an unknown key."""
         return next((place for place, step in enumerate(self.steps) if step.key == key), None)
 
     def waypoint(self, key: int | None) -> Waypoint | None:
@@ -128,12 +128,12 @@ class ProgramState:
     """How often to go through it."""
     is_script_shown: bool = False
     progress: float | None = None
-    """Of the planning that is under way, 0 to 1."""
+    """Of the planning in progress, 0 to 1."""
     planned: Draft | None = None
     """What was planned last."""
     tone: Tone = "good"
     answer: Message | None = None
-    """What came of it beside the plan: the way to the start, why there is none."""
+    """What came of it beside the plan: the path to the start, or why it was not found."""
     notes: tuple[Note, ...] = ()
     """What the planner remarks about the plan."""
     failed: int | None = None

@@ -32,7 +32,7 @@ class Job:
     """Where the arm stands, [rad]."""
     rounds: int
     box: SafetyBox | None
-    """The safety box to judge with."""
+    """The safety box to check with."""
 
 
 def plan_job(job: Job, tell: ProgressCallback) -> Plan:

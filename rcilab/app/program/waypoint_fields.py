@@ -20,8 +20,8 @@ from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint
 
 VIA_FIELDS = ("via_x", "via_y", "via_z")
-_BULGE = 0.25  # A choice: how far to the side of a new arc's way its via is, as a part of the way.
-_NO_WAY = 1e-3  # [m] A choice: from here on an arc is worth the name.
+_BULGE = 0.25  # How far to the side of a new arc's way its via is, as a part of the way.
+_NO_WAY = 1e-3  # [m] From here on an arc is worth the name.
 
 _Take = Callable[[Waypoint, float], Waypoint]
 _PLAIN: dict[str, tuple[float, float, str, _Take]] = {

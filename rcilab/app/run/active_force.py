@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-STRONGEST = 60.0  # [N] A choice: what one hand does without effort.
-SPRING = 200.0  # [N/m] between the grabbed point and the mouse: 0.3 m of pull is all the force there is; a choice.
+STRONGEST = 60.0  # [N] What one hand does without effort.
+SPRING = 200.0  # [N/m] between the grabbed point and the mouse: 0.3 m of pull is all the force there is.
 TOOL = 0  # Where a link's number stands: the tool.
 WAYS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
 DIRECTIONS = MappingProxyType(

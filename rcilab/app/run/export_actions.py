@@ -25,7 +25,7 @@ ENDINGS = (".csv", ".parquet", ".mcap", ".html", ".rcirun")
 """What the page offers, in the order of its buttons."""
 
 Deliver: TypeAlias = Callable[["int | None", str, "IO[bytes]", Callable[[], bool]], bool]
-"""Sends a file to a page: client id (None: nobody), name, content, whether to give up; returns whether all was sent."""
+"""Sends a file to a page: client id or None, name, content, whether to give up; returns whether all was sent."""
 
 _STEP = 0.05  # Share between two updates of the progress bar.
 
@@ -40,16 +40,16 @@ class ExportRun(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelExport(Request):
-    """Drop the export that is under way."""
+    """Cancel the export in progress."""
 
 
 class _UnwantedError(Exception):
-    """Somebody has cancelled."""
+    """The export was cancelled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """An export under way."""
+    """An export in progress."""
 
     ending: str
     share: float
@@ -78,7 +78,7 @@ class ExportActions:
         }
 
     def export(self, request: ExportRun) -> None:
-        """Begins an export; refused while another one is under way."""
+        """Begins an export; refused while another one is in progress."""
         recording = self._store.state.last_run
         run = None if recording is None else recording.run
         if request.ending not in ENDINGS:
@@ -96,11 +96,11 @@ class ExportActions:
             self._worker.start()
 
     def cancel(self, request: CancelExport) -> None:
-        """Drops the export under way, at its next report of progress."""
+        """Cancels the export in progress, at its next report of progress."""
         self._unwanted.set()
 
     def close(self) -> None:
-        """Ends an export under way."""
+        """Ends an export in progress."""
         self._unwanted.set()
         if self._worker is not None:
             self._worker.join(10.0)
@@ -110,9 +110,9 @@ class ExportActions:
             from rcilab.recording.export import write_export
 
             with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
-                told = self._store.state
+                state = self._store.state
                 write_export(
-                    run, ending, stream, progress=self._follow(ending), language=told.language, units=told.units
+                    run, ending, stream, progress=self._follow(ending), language=state.language, units=state.units
                 )
                 size = f"{max(stream.tell() / 1e6, 0.01):.2f}"
                 is_sent = self._deliver(page, file_name(run, ending), stream, self._unwanted.is_set)

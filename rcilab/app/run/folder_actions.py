@@ -1,4 +1,4 @@
-"""Clearing away recorded runs, when somebody asks for it twice. Owned by the conductor's thread."""
+"""Deletes recorded runs, after a second press. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rcilab.recording.folder import keep_newest, stored_runs
 KEEPS = (100, 20, 5, 0)
 """How many runs may be kept."""
 
-_LOOK = 5.0  # [s] A choice: between two looks into the folder.
+_LOOK = 5.0  # [s] Between two reads of the folder.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What happens when somebody pushes the virtual arm. Owned by the conductor's thread; it never waits for the arm."""
+"""Requests that push the virtual arm. Owned by the dispatcher's thread; it never waits for the arm."""
 
 from __future__ import annotations
 

@@ -85,5 +85,5 @@ def time_shown(state: UiState, status: SupervisorStatus) -> float:
 
 
 def is_connected(status: SupervisorStatus) -> bool:
-    """Returns whether a robot tells where it is."""
+    """Returns whether a robot reports where it is."""
     return status.q is not None and status.phase not in ("closed", "lost", "crashed")

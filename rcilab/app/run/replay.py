@@ -26,7 +26,7 @@ def require_replayable(run: Run) -> RobotModel:
     """Returns the arm of a run that can be shown.
 
     Raises:
-        UsageError: It has no cycle, or nobody knows which arm it was.
+        UsageError: It has no cycle, or its arm is unknown.
     """
     if run.model is None:
         raise UsageError("this run cannot be replayed: its file does not say which arm made it").coded("run_no_arm")

@@ -208,13 +208,13 @@ class RunActions:
         self._powered, self._power_asked = False, float("-inf")
 
     def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
-        """Takes note of the set-up that an arm had before it was exchanged for another."""
+        """Takes note of the configuration of an arm that is replaced by another."""
         fresh = SetupState()
         touched: frozenset[SetupPart] = frozenset(setup.parts)
         self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched)
 
     def _exchange_setups(self, state: UiState, name: str) -> SetupState:
-        """Returns the set-up of an arm that is chosen now, and keeps that of the one before."""
+        """Returns the configuration of an arm that is chosen now, and keeps that of the one before."""
         self._setups[state.model.name] = replace(state.setup, edited="", asked=None, refusal=None, can_undo=False)
         setup = self._setups.get(name, SetupState())
         if setup.touched:
@@ -358,7 +358,7 @@ def _unasked(state: UiState) -> dict[str, object]:
 
 
 def _own_setup(state: UiState, target: str) -> RobotConfiguration | None:
-    """Returns what our own controller is told at once; a foreign one is told nothing that was not agreed to."""
+    """Returns what a virtual controller is sent at once; a real one is sent nothing before a yes."""
     if target != "virtual":
         return None
     return replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)

@@ -1,4 +1,4 @@
-"""What happens when somebody chooses where motions go. Owned by the conductor's thread."""
+"""Requests that choose the robot that motions go to. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import Report, Violation
 
 MOST_BEADS = 24
-"""A choice: more hide the path; the worst are kept."""
-_TOGETHER = 0.02  # [s] A choice: violations closer in time than this share a bead.
+"""More hide the path; the worst are kept."""
+_TOGETHER = 0.02  # [s] Violations closer in time than this share a bead.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -22,12 +22,12 @@ Extra: TypeAlias = Literal["elbow", "frames", "ellipsoid", "cloud", "swept"]
 EXTRAS: tuple[Extra, ...] = ("elbow", "frames", "ellipsoid", "cloud", "swept")
 
 SHARE = 0.3
-"""Length that a tool speed of 1 m/s for joints at 1 rad/s is drawn with, [m]; a choice."""
+"""Length that a tool speed of 1 m/s for joints at 1 rad/s is drawn with, [m]."""
 
 _SAMPLES = 4000
-"""Points of the cloud; a choice."""
+"""Points of the cloud."""
 _MOMENTS = 16
-"""Moments of a plan whose arms make its swept volume; a choice."""
+"""Moments of a plan whose arms make its swept volume."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -1,4 +1,4 @@
-"""The set-up on the page: what is wanted of it, what the controller has, and what is said about the difference."""
+"""The configuration on the page: what is edited, what the controller has, and what differs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _FIRST_SETUP = RobotConfiguration(
     load=NO_LOAD,
     force=ForceControlFrame(),
 )
-"""That of an arm that nobody has set up; the box is a first proposal, and off."""
+"""That of an arm before any edit; the box is a first proposal, and off."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +48,7 @@ class SetupState:
     wanted: RobotConfiguration = field(default_factory=lambda: _FIRST_SETUP)
     """All four parts."""
     touched: frozenset[SetupPart] = frozenset()
-    """Parts that were edited here: those the controller is to be told."""
+    """Parts that were edited here: those to be sent to the controller."""
     inertia: tuple[float, ...] | None = None
     """Six typed moments, xx yy zz xy xz yz, [kg m^2], that no body has yet; None: those of the load."""
     edited: str = ""
@@ -56,7 +56,7 @@ class SetupState:
     seen: frozenset[str] = frozenset()
     """Parts that are drawn."""
     asked: RobotConfiguration | None = None
-    """The set-up that a foreign robot is to get and that awaits a second yes."""
+    """The configuration for a real robot that awaits a second yes."""
     refusal: Message | None = None
     """Why the controller did not take it."""
     can_undo: bool = False
@@ -84,7 +84,7 @@ def soft_limits(state: UiState) -> SoftJointLimits:
 
 
 def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
-    """Returns why nothing may run with this set-up, or None when the controller has it."""
+    """Returns why nothing may run with this configuration, or None when the controller has it."""
     parts = pending_parts(state, status)
     if not parts:
         return None

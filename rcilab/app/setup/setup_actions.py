@@ -1,4 +1,4 @@
-"""What happens when somebody edits the set-up: take it over, tell the controller, undo. Owned by the conductor."""
+"""Requests that edit the configuration: accept, send, undo. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 _UNDO_DEPTH = 100
 _ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.
-_HAND_GONE = 1.0  # [s] A choice: a drag that was not heard of for so long has ended, whatever became of its page.
+_HAND_GONE = 1.0  # [s] A drag that was not heard of for so long has ended, whatever became of its page.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,7 +65,7 @@ class OpenTab(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveSetup(Request):
-    """The handles of a part of the set-up were moved."""
+    """The handles of a part of the configuration were moved."""
 
     part: Literal["box", "tool", "load", "force"]
     position: tuple[float, ...]
@@ -96,7 +96,7 @@ class ResizeBox(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetSetup(Request):
-    """A switch of the set-up."""
+    """A switch of the configuration."""
 
     name: Literal["edited", "box", "tool", "load", "force", "active", "axes"]
     """What has handles; whether a part is drawn; whether the box bounds; what the force-control frame follows."""
@@ -105,7 +105,7 @@ class SetSetup(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressSetup(Request):
-    """A button of the set-up."""
+    """A button of the configuration."""
 
     what: Literal["whole", "undo", "send", "confirm", "cancel"]
 
@@ -124,7 +124,7 @@ class SetupActions:
         self._post = ConfigurationSender(session, self._refuse)
         self._told_of: object = None  # The program of which it was said what another tool makes of it.
         self._is_back = False  # What came back with this workbench: it was said already.
-        self._told = 0  # At how many connections the controller has taken a set-up, as far as that was said.
+        self._announced = 0  # At how many connections the controller has accepted a configuration, as far as reported.
 
     @property
     def handlers(self) -> Handlers:
@@ -282,7 +282,7 @@ class SetupActions:
             self._send(self._session.status())
 
     def restore(self, setup: RobotConfiguration) -> None:
-        """Takes a set-up over that was edited before; a foreign robot is not told without being asked about."""
+        """Restores a configuration edited before; it is sent to a real robot only after a question."""
         now = self._store.state.setup
         parts: set[SetupPart] = set(setup.parts)
         if parts:
@@ -290,17 +290,17 @@ class SetupActions:
             self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Looks what became of a set-up that was sent, and tells our own controller what is new."""
+        """Follows a configuration that was sent, and sends what is new to a virtual controller."""
         name = self._store.state.model.name
         if name != self._arm:
-            self._arm, self._past, self._told = name, [], 0
+            self._arm, self._past, self._announced = name, [], 0
             self._post.forget()
         if self._post.is_underway:
             self._post.collect()
             status = self._session.status()  # What was acknowledged in the meantime is not sent again.
         state = self._store.state
-        told, self._told = self._told, status.setup_times  # Another supervisor counts anew.
-        if self._told > told:
+        announced, self._announced = self._announced, status.setup_times  # Another supervisor counts from 0.
+        if self._announced > announced:
             if not self._is_back:
                 self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
             self._is_back = False
@@ -309,7 +309,7 @@ class SetupActions:
             self._send(status)
 
     def _send(self, status: SupervisorStatus) -> None:
-        """Tells the controller every part that it has not taken yet."""
+        """Sends the controller every part that it has not accepted yet."""
         state = self._store.state
         parts = pending_parts(state, status)
         if parts and not self._post.is_underway:
@@ -336,7 +336,7 @@ class SetupActions:
         if not self._past:
             return
         setup, (before, touched) = self._store.state.setup, self._past.pop()
-        touched |= frozenset(self._session.status().setup.parts)  # What it was told it must be told to forget.
+        touched |= frozenset(self._session.status().setup.parts)  # What it was sent has to be reset there.
         if self._post.is_underway:
             touched |= setup.touched
         parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
@@ -352,7 +352,7 @@ class SetupActions:
             self._store.say("warn", message("setup.program_moves"))
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
-        """Exchanges the set-up and what depends on it: the arm's tool and load, goal, path. The plan may go stale."""
+        """Replaces the configuration and what depends on it: tool and load, goal, path. The plan may go stale."""
         state = self._store.state
         changes: dict[str, object] = {}
         if parts & {"tool", "load", "joints"}:
@@ -372,5 +372,5 @@ class SetupActions:
 
 
 def is_setup_field(field: str) -> bool:
-    """Returns whether a typed field belongs to the set-up."""
+    """Returns whether a typed field belongs to the configuration."""
     return field.startswith("setup.")

@@ -1,4 +1,4 @@
-"""The numbers of a set-up by the names of their fields, in mm, deg, kg and kg m^2; what a changed one makes of it."""
+"""The numbers of a configuration by field, in mm, deg, kg and kg m^2, and the configuration with one changed."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ FIELD_NAMES = {
 }
 JOINT_ENDS = ("lower", "upper")
 """Beside FIELD_NAMES: setup.joints.lower.0 and so on."""
-THINNEST = 0.02  # [m] A choice: a box that the mouse cannot make thinner.
-FARTHEST_FACE = 5.0  # [m] A choice: no arm of ours reaches a third of it, so what is farther is a slip of units.
+THINNEST = 0.02  # [m] A box that the mouse cannot make thinner.
+FARTHEST_FACE = 5.0  # [m] No arm of ours reaches a third of it, so what is farther is a slip of units.
 
-_LARGEST_INERTIA = 10.0  # [kg m^2] A choice: ten times that of anything an xMate can carry.
+_LARGEST_INERTIA = 10.0  # [kg m^2] Ten times that of anything an xMate can carry.
 _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -82,10 +82,10 @@ def read_field(setup: SetupState, part: str, name: str) -> float:
 
 
 def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupState | Message:
-    """Returns the set-up with one number changed, or what is wrong with it.
+    """Returns the configuration with one number changed, or what is wrong with it.
 
     Args:
-        setup: The set-up so far.
+        setup: The configuration so far.
         part: A key of `FIELD_NAMES`.
         name: One of its names.
         value: In the unit of the field.
@@ -114,7 +114,7 @@ def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupSt
 
 
 def with_pose(setup: SetupState, part: str, pose: Pose) -> SetupState | Message:
-    """Returns the set-up with a part put elsewhere, or why it cannot be there."""
+    """Returns the configuration with a part moved, or why it cannot be there."""
     wanted = setup.wanted
     length = math.hypot(*pose.parts[1])
     if part != "box" and length > LONGEST_TOOL:
@@ -171,7 +171,7 @@ def _with_load_field(setup: SetupState, load: Payload, name: str, value: float) 
 
 
 def with_inertia(setup: SetupState) -> SetupState | Message:
-    """Returns the set-up with the typed moments of inertia in the load, or why no body has them."""
+    """Returns the configuration with the typed moments of inertia in the load, or why no body has them."""
     load = setup.wanted.load
     assert load is not None
     if setup.inertia is None:

@@ -171,9 +171,9 @@ def bench_check_full() -> Measurement:
 def bench_check_joint_rows() -> Measurement:
     """The check of a 7-joint motion of 10 s by the conditions on joint angles alone."""
     model = load_model(_ROBOT)
-    judge = check(motion_of(model, 1.0), model, distance=None).check_again
+    check_again = check(motion_of(model, 1.0), model, distance=None).check_again
     rows = tuple(row for row in RCI_CONDITIONS.motion if row.signal == "joint")
-    return _bench_check("check_joint_rows", lambda motion: judge(motion, rows), model, 5.0)
+    return _bench_check("check_joint_rows", lambda motion: check_again(motion, rows), model, 5.0)
 
 
 def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel, target: float) -> Measurement:

@@ -1,7 +1,7 @@
 """How fast this machine computes while something is measured on it.
 
 Other people's work on the same processor makes a virtual machine slower for seconds or minutes, without any sign inside
-of it: neither load nor stolen time tells. A fixed piece of Python that is timed now and then does.
+of it: neither load nor stolen time shows it. A fixed piece of Python that is timed now and then does.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@
   if (facts.notes.length) { const cell = element("td", facts.notes.join(" "), element("tr", undefined, element("tfoot", undefined, $("tables").lastChild))); cell.colSpan = 3; }
   table(words["facts.title"], null, facts.rows, "facts");
   $("ended").textContent = facts.rows.map(([, value]) => value).slice(0, 2).join(" · ") + " — " + words.foot;
-  if (scene && path) $("key").innerHTML = `${words.path}: 0<i></i>${path.worst_told}` + (signals.q_plan ? `<br>${words.ghost}` : "");
+  if (scene && path) $("key").innerHTML = `${words.path}: 0<i></i>${path.worst_text}` + (signals.q_plan ? `<br>${words.ghost}` : "");
   const sign = (text, color, look = "") => { const s = element("span", "", $("legend")); const i = element("i", undefined, s); i.className = look; if (look !== "area") i.style.borderColor = color; s.append(text); };
   COLORS.slice(0, run.n).forEach((color, j) => sign(`J${j + 1}`, color));
   if (signals.q_plan) sign(words["legend.plan"], "#111827", "dash");

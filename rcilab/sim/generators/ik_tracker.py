@@ -28,7 +28,7 @@ class IkTracker:
 
         Args:
             T_base_tool: Pose of the tool in base.
-            psi: Redundancy angle, [rad]; without effect where there is none.
+            psi: Redundancy angle, [rad]; without effect for an arm without redundancy.
             near: Last joint angles, n plain floats, [rad].
 
         Raises:

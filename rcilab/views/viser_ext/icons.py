@@ -60,7 +60,7 @@ def svg_of(icon: str) -> str:
         icon: Its name, such as "player-play".
 
     Raises:
-        KeyError: There is none of this name.
+        KeyError: No icon has this name.
     """
     return _archive().read(f"{icon}.svg").decode()
 

@@ -30,7 +30,7 @@ class LoopEvent:
 
     def __init__(self, loop: asyncio.AbstractEventLoop, is_held: Callable[[], bool] = lambda: False) -> None:
         self._loop, self._is_held = loop, is_held
-        self._lock = threading.Lock()  # Between a look at the flag and the beginning of a wait nobody may set it.
+        self._lock = threading.Lock()  # Between a look at the flag and the beginning of a wait it must not be set.
         self._is_set = False
         self._waiting: list[asyncio.Future[None]] = []
 
@@ -53,7 +53,7 @@ class LoopEvent:
         if _running_loop() is self._loop:
             self._wake()
         else:
-            with suppress(RuntimeError):  # The loop is closed: nobody waits any more.
+            with suppress(RuntimeError):  # The loop is closed: nothing waits any more.
                 self._loop.call_soon_threadsafe(self._wake)
 
     async def wait(self) -> bool:
@@ -102,7 +102,7 @@ def install() -> None:
                 self.atomic_end()
 
         def atomic_end(self) -> None:
-            """Ends a batch; the end of the last one tells the loop that there is something to send."""
+            """Ends a batch; the end of the last one informs the loop that there is something to send."""
             with self.buffer_lock:
                 self.atomic_counter -= 1
             self.message_event.set()

@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 if TYPE_CHECKING:
     import viser
 
-LARGEST_MESSAGE = 16 * 1024 * 1024  # [bytes] A choice; pictures of the scene that a page renders for Python are less.
-LARGEST_UPLOAD = 8 * 1024 * 1024  # [bytes] A choice: no program or run that we read is as large.
+LARGEST_MESSAGE = 16 * 1024 * 1024  # [bytes] Pictures of the scene that a page renders for Python are less.
+LARGEST_UPLOAD = 8 * 1024 * 1024  # [bytes] No program or run that we read is as large.
 LONGEST_TEXT = 10_000  # Characters; the longest text we ask for has some dozens.
 
 _UPLOADS = 2  # At a time and page.
@@ -32,7 +32,7 @@ _MOST_PARTS = 256
 _DEEPEST = 8
 
 
-_REFUSED_AGAIN = 1.0  # [s] A tuning value: a page that keeps pressing is told so often that it only watches.
+_REFUSED_AGAIN = 1.0  # [s] A tuning value: a page that keeps pressing is informed this often that it is a spectator.
 
 _for_anyone: set[str] = set()  # Identifiers of controls.
 
@@ -46,7 +46,7 @@ class MessageGuard:
     """Looks at every message of every page before viser does.
 
     Args:
-        server: A viser server that nobody has connected to yet.
+        server: A viser server without connections yet.
         may_act: Whether a page, by its client id, may use the controls; any may by default.
         refuse: Called with the client id of a page that has used one and may not, once a second at most.
 
@@ -66,7 +66,7 @@ class MessageGuard:
         self._kinds = _messages
         self._gui: Any = server.gui
         self._may_act, self._refuse = may_act, refuse
-        self._refused: dict[int, float] = {}  # Client -> when it was told last, [s].
+        self._refused: dict[int, float] = {}  # Client -> when it was informed last, [s].
         self._uploads: dict[str, list[int]] = {}  # Transfer -> client, declared and received bytes.
         self.malformed = 0
         sockets: Any = server._websock_server  # Neither this nor what is replaced has a public spelling in viser 1.1.
@@ -115,10 +115,10 @@ class MessageGuard:
         return not isinstance(message, kinds.FileTransferStartUpload) or self._admits_upload(client, message)
 
     def count_malformed(self) -> None:
-        """Counts a message that is none, and says so of the first."""
+        """Counts a malformed message, and reports the first."""
         self.malformed += 1
         if self.malformed == 1:
-            print("a page has sent a message that is none of a page; such messages are dropped", file=sys.stderr)
+            print("a page has sent a malformed message; such messages are dropped", file=sys.stderr)
 
     def _guard_camera(self, connection: Any) -> None:
         """Lets a client tell where its camera is and send its pictures, and nothing else about itself alone."""
@@ -139,7 +139,7 @@ class MessageGuard:
         return isinstance(message, self._kinds.GuiUpdateMessage) and message.uuid in _for_anyone
 
     def _put_back(self, client: int, message: Any) -> None:
-        """Shows a page that only watches what everybody sees, and has it told that it does."""
+        """Shows a spectator what all pages see, and has it informed that it is one."""
         state = self._sockets._client_state_from_id.get(client)
         if isinstance(message, self._kinds.GuiUpdateMessage) and state is not None:
             handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)

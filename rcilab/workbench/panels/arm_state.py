@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-_PERIOD = 0.2  # [s] A choice: numbers that change faster cannot be read.
+_PERIOD = 0.2  # [s] Numbers that change faster cannot be read.
 
 
 class ArmStatePanel:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_MOMENT = 0.5  # [s] A choice: what takes longer gets a bar and a way to end it.
+_MOMENT = 0.5  # [s] What takes longer gets a bar and a way to end it.
 
 
 class CheckPanel:

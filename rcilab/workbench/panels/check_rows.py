@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
     from rcilab.model.robot_model import RobotModel
 
-TIGHT = 0.95  # A choice: from this share of a bound on, a row is amber.
-_MANY = 10.0  # A choice: from here on a share of the bound is told as a factor.
+TIGHT = 0.95  # From this share of a bound on, a row is amber.
+_MANY = 10.0  # From here on a share of the bound is shown as a factor.
 _ORDER = {"bad": 0, "warn": 1, "good": 2}
 _SIGNS = {"good": "✓", "warn": "▲", "bad": "◆"}
 _AMBER = {True: "check.exceeded", False: "check.tight"}

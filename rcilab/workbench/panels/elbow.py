@@ -1,4 +1,4 @@
-"""Arm angle: a slider over the ring of a 7-axis arm's elbow, laid out flat, free and forbidden arcs told apart."""
+"""Arm angle: a slider over the ring of a 7-axis arm's elbow, laid out flat, free and forbidden arcs distinguished."""
 
 from __future__ import annotations
 

@@ -70,8 +70,8 @@ class FaultInjectionPanel:
         pressed = "none" if world.status is None else world.status.button
         for name, button in self._buttons.items():
             button.disabled = not ours or name == pressed
-        nobody = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
-        said = text(f"safety.{pressed}_is") if ours else nobody
+        missing = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
+        said = text(f"safety.{pressed}_is") if ours else missing
         tone = "good" if ours and pressed == "none" else "warn"
         self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(said)}</p>')
         for name, slider in self._sliders.items():
@@ -81,7 +81,7 @@ class FaultInjectionPanel:
         self._way.handle.disabled = not ours or world.pulled
         self._pull.visible, self._plug.visible = not world.pulled, world.pulled
         self._pull.disabled = self._plug.disabled = not ours
-        note = text("network.note") if ours else nobody
+        note = text("network.note") if ours else missing
         self._note.show(f'<p class="rl-note">{esc(note)}</p>')
         self._noticed.show(noticed_html(state, status, text) if ours else "")
 
@@ -104,8 +104,8 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 
 def _row(name: str, value: str, text: Text) -> str:
-    told = f"<th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td>"
-    return f'<tr title="{esc(text(f"network.{name}_help"))}">{told}</tr>'
+    cells = f"<th>{esc(text(f'network.{name}'))}</th><td>{esc(value)}</td>"
+    return f'<tr title="{esc(text(f"network.{name}_help"))}">{cells}</tr>'
 
 
 def _set(name: str, scale: float):  # type: ignore[no-untyped-def]

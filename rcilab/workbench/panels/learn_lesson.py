@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class LearnLessonPanel:
-    """A button a lesson; while one is under way, its steps."""
+    """A button a lesson; while one is in progress, its steps."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask

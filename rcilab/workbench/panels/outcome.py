@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns how far a motion, or the planning of a program, is, as a bar; nothing while neither is under way."""
+    """Returns how far a motion, or the planning of a program, is, as a bar; nothing while neither is in progress."""
     if state.program.progress is not None:
         return _bar(state.program.progress)
     if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
@@ -64,8 +64,8 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
     is_said = run.stopped is None or run.faults or run.is_safety_stop
-    told = "" if is_said else text.tell(Finished(_tell_stop(run, text)))
-    why = told and f"<br><small>{esc(told)}</small>"
+    reason = "" if is_said else text.tell(Finished(_tell_stop(run, text)))
+    why = reason and f"<br><small>{esc(reason)}</small>"
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rcilab.views.plots import Frame
 
 COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a")
-"""One colour a joint, told apart on white by people with common colour blindness; the number stands in the legend."""
+"""One colour a joint, distinct on white for people with common colour blindness; the number stands in the legend."""
 _DARK_COLORS = ("#5aaef2", "#ffab40", "#5fd38d", "#ff7eb6", "#b79bff", "#d9bd82", "#3fd0e0")
 _BROKEN = 4  # Joints from here on, from 0, are drawn with gaps: seven colours are too many for some eyes.
 _GAPS = (9, 3)

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.core.arrays import JointPath
 
-_REDRAW_TIME = 0.25  # [s] A choice: plots are redrawn at most so often while something is dragged or moves.
-_LEISURE = 8.0  # A choice: and take at most an eighth of the time, however long the motion is.
+_REDRAW_TIME = 0.25  # [s] Plots are redrawn at most so often while something is dragged or moves.
+_LEISURE = 8.0  # And take at most an eighth of the time, however long the motion is.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
 _MARGIN = 6  # [px] Above and below: half of a number that stands at the very end of an axis.

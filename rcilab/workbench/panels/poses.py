@@ -1,4 +1,4 @@
-"""Poses by name: those of the arm, and those that somebody has stored."""
+"""Poses by name: those of the arm, and those stored by the operator."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ _TOOLS = (
     ("redo", "arrow-forward-up"),
 )  # fmt: skip
 _SAME = math.radians(1e-4)  # [rad] A joint that is nearer to the start of the program stands there.
-_MOMENT = 0.25  # [s] A choice: a bar that comes and goes faster only flickers.
+_MOMENT = 0.25  # [s] A bar that comes and goes faster only flickers.
 
 
 class ProgramPanel:

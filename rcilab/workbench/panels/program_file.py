@@ -95,7 +95,7 @@ class ProgramFilePanel:
         )
 
     def _send(self, event: Any, kind: str) -> None:
-        """Has the browser of whoever asked save the program, or its script."""
+        """Has the browser of the page that asked save the program, or its script."""
         program = self._program
         if program is None or event.client is None:
             return

@@ -39,7 +39,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         for name in _HEADS
     )
     notes = state.program.notes
-    noted = {note.key: said for note, said in zip(notes, _told(notes, text), strict=True)}
+    noted = {note.key: said for note, said in zip(notes, _sentences(notes, text), strict=True)}
     rows = [_start_row(draft, arm, running == 0, text)]
     for number, step in enumerate(draft.steps, start=1):
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
@@ -67,10 +67,10 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
     if not notes:
         return ""
     if len(notes) == 1:
-        return f'<p class="rl-note">{_NOTED} {_told(notes, text)[0]}</p>'
+        return f'<p class="rl-note">{_NOTED} {_sentences(notes, text)[0]}</p>'
     codes = {note.code for note in notes}
     code = "program.shortened" if codes == {"blend"} else "program.noted"
-    listed = "".join(f"<li>{said}</li>" for said in _told(notes, text))
+    listed = "".join(f"<li>{said}</li>" for said in _sentences(notes, text))
     return (
         f'<details class="rl-noted"><summary>{_NOTED} {esc(text(code, count=len(notes)))}</summary>'
         f"<ul>{listed}</ul></details>"
@@ -78,7 +78,7 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
 
 
 @lru_cache(maxsize=4)
-def _told(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
+def _sentences(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
     """Returns remarks as HTML, once: a program may have a thousand, and its rows are drawn anew at every step."""
     return tuple(esc(text.tell(tell_note(note.remark))) for note in notes)
 

@@ -55,7 +55,7 @@ class RecordingPanel:
         self._summary.show(f'<p class="rl-note">{esc(text("record.nothing"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Follows the recording and the export under way."""
+        """Follows the recording and the export in progress."""
         text, export = self._text, state.export
         recording = state.recording if state.recording is not None else state.last_run
         if recording is not self._drawn:

@@ -69,7 +69,7 @@ class SettingsPanel:
         for choice, chosen in self._choices:
             choice.show(chosen(state))
         self._take.label = text("lease.take" if lease.holder is None else "lease.ask")
-        self._take.disabled = lease.holder is not None and len(lease.pages) < 2  # Nobody to ask.
+        self._take.disabled = lease.holder is not None and len(lease.pages) < 2  # No other page to ask.
         who = text("settings.free" if lease.holder is None else "settings.alone")
         if lease.holder is not None and len(lease.pages) > 1:
             who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))

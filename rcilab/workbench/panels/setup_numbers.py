@@ -1,4 +1,4 @@
-"""The numbers of the part of the set-up that is edited; the other parts' are folded away."""
+"""The numbers of the part of the configuration that is edited; the other parts' are folded away."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class SetupNumbersPanel:
             self._folders[part] = folder
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Follows the set-up."""
+        """Follows the configuration."""
         setup = state.setup
         for part, folder in self._folders.items():
             if folder.visible != (part == setup.edited):

@@ -47,7 +47,7 @@ class SoftLimitsPanel:
             gui.add_html(f'<p class="rl-note">{esc(text("softlimits.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Follows the set-up."""
+        """Follows the configuration."""
         limits = soft_limits(state)
         for end, joint, field in self._fields:
             number = shown(math.degrees(getattr(limits, end)[joint]))

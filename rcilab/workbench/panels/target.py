@@ -64,7 +64,7 @@ def quaternion_text(wxyz: np.ndarray) -> str:
 
 
 def planned_html(state: UiState, text: Text) -> str:
-    """Returns one line about the plan: how long it takes and whether it passed, or why there is none."""
+    """Returns one line about the plan: how long it takes and whether it passed, or why none was found."""
     if state.plan is None:
         return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
     changed = outdated(state)

@@ -38,7 +38,7 @@ class TargetRobotPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
-        with gui.add_folder(text("run.where"), order=0.0):  # First of its tab, whoever built before.
+        with gui.add_folder(text("run.where"), order=0.0):  # First of its tab, in any order of building.
             self._where = Html(gui)
             names = {text(f"destination.{name}"): name for name in DESTINATIONS}
             self._names = {name: label for label, name in names.items()}

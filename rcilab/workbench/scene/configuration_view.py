@@ -1,4 +1,4 @@
-"""The set-up in the scene: what is drawn of it, its handles, and the part of the path that leaves the safety box."""
+"""The configuration in the scene: its parts, their handles, and the part of the path outside the safety box."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class ElbowSceneView:
         return (_HANDLE,) if self._drawn is not None else ()
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
-        """Draws the circle of the goal; while the arm moves there is none."""
+        """Draws the circle of the goal; not while the arm moves."""
         elbow = state.scene.elbow if "elbow" in state.scene.extras and not is_moving(status) else None
         if elbow is None:
             self._view.set_visible(False)

@@ -26,7 +26,7 @@ _BESIDE = ("bottom-right", "bottom-left")
 """Where names stand in turn: the frames of two joints often have one origin."""
 _ELLIPSOID_COLOR, _SWEPT_COLOR = (126, 87, 194), (70, 140, 255)
 _POOR_COLOR, _GOOD_COLOR = np.array([240.0, 150.0, 20.0]), np.array([30.0, 140.0, 200.0])
-_GOOD = 0.25  # Smallest singular value from which on a point of the cloud is blue. A choice.
+_GOOD = 0.25  # Smallest singular value from which on a point of the cloud is blue.
 
 
 class ExtrasView:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
 
 _NAMED = 5
-"""Beads with words beside them; the others say theirs when they are clicked. A choice."""
+"""Beads with words beside them; the others say theirs when they are clicked."""
 _BEAD = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1.35), (0, 0, -1.35)]) * 0.024  # [m]
 _BEAD_FACES = np.array(
     [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 
 _Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
-_SAME_POSE = 2e-3  # [rad] A choice: ghosts closer than this to the arm would only flicker on its surface.
+_SAME_POSE = 2e-3  # [rad] Ghosts closer than this to the arm would only flicker on its surface.
 _ABSENT = 0.25  # Opacity of an arm that no robot stands for.
 _STRAYED, _BACK = 0.01, 0.006
-"""[rad] A choice: the commanded arm is drawn from where a joint is more than 0.6 degrees away from it, some 10 mm at
+"""[rad] The commanded arm is drawn from where a joint is more than 0.6 degrees away from it, some 10 mm at
 the tool, and until it is back within the second."""
 
 
@@ -113,16 +113,16 @@ class Stage:
         self._tool = model.T_flange_tool
 
     def _show_presence(self, is_there: bool) -> None:
-        """Draws the arm translucent while no robot tells where it is."""
+        """Draws the arm translucent while no robot reports where it is."""
         if is_there != self._is_there:
             self._is_there = is_there
             self._live.set_look(opacity=1.0 if is_there else _ABSENT)
 
     def _show_commanded(self, status: SupervisorStatus, live: np.ndarray) -> None:
-        """Draws where the arm is told to be, once that is somewhere else."""
-        told = status.q_c if status.q is not None else None
+        """Draws the commanded pose of the arm where it differs from the measured one."""
+        commanded = status.q_c if status.q is not None else None
         bound = _BACK if "commanded" in self._visible else _STRAYED
-        self._see("commanded", told, told is not None and _apart(told, live) > bound)
+        self._see("commanded", commanded, commanded is not None and _apart(commanded, live) > bound)
 
     def _show_candidate(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         """Draws the goal, or the branch of it that is under the mouse."""

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rcilab.app.control_lock import ControlLock
 
 _SETTLING = 10.0
-"""[s] For so long a change is told again and again: viser replays the scene to a new page, and tells all pages of nodes
+"""[s] For so long a change is sent repeatedly: viser replays the scene to a new page, and informs all pages of nodes
 that come back, in an order of its own. A tuning value."""
 _AGAIN = 0.5
 """[s] Between two messages. A tuning value."""
@@ -30,10 +30,10 @@ class Watchers:
         self._server = server
         self._handles: tuple[str, ...] = ()
         self._watching: dict[int, float] = {}  # Since when each watching page sees these handles no more, [s].
-        self._told = 0.0
+        self._sent = 0.0
 
     def show(self, lease: ControlLock, handles: tuple[str, ...]) -> None:
-        """Tells each page what has changed for it.
+        """Sends each page what has changed for it.
 
         Args:
             lease: Which pages there are, and which has the controls.
@@ -43,12 +43,12 @@ class Watchers:
         if handles != self._handles:
             self._handles, self._watching = handles, dict.fromkeys(self._watching, now)
         watching = {page: self._watching.get(page, now) for page in lease.pages if page != lease.holder}
-        is_time = now - self._told >= _AGAIN
+        is_time = now - self._sent >= _AGAIN
         hidden = [page for page, since in watching.items() if since == now or (is_time and now - since < _SETTLING)]
         shown = [page for page in self._watching if page == lease.holder]
         self._watching = watching
         if hidden or shown:
-            self._told = now
+            self._sent = now
             clients = self._server.get_clients()
             for page in (*hidden, *shown):
                 client = clients.get(page)

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
     from rcilab.app.store import UiState
 
-_MOST = 60  # A choice: more labels than that hide the arm, and cost the browser more than it has.
+_MOST = 60  # More labels than that hide the arm, and cost the browser more than it has.
 _NEAR = 0.03  # [m] A tuning value: at the home view, two numbers closer than that overlap.
 _CHARACTER, _LINE = 0.018, 0.05  # [m] A character at the home view, wide and high, about.
-_RANGES = 2  # A choice: a label that lists more is wider than what it labels.
+_RANGES = 2  # A label that lists more is wider than what it labels.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
 _SIZE = 0.016  # [m]
 _ABOVE = 0.022  # [m]

@@ -74,7 +74,7 @@ class RciCommands(RciSettings):
         """Lets a person guide the arm by hand, until `stop_drag`.
 
         Args:
-            space: Where constraints hold: in joint space there are none, the type has no effect.
+            space: Where constraints hold: in joint space the type has no effect.
             type: What stays free in Cartesian space.
         """
         self._ask(rci.StartDrag(member(rci.DragSpace, "space", space), member(rci.DragType, "type", type)))

@@ -85,7 +85,7 @@ class RciConnection:
         Raises:
             DeadlineError: No answer within the timeout.
             ConnectionLostError: The connection broke.
-            DecodeError: The answer is none.
+            DecodeError: The answer is malformed.
         """
         return self._request(request, timeout, self._wait_and_take_states)
 

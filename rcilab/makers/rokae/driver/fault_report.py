@@ -123,14 +123,14 @@ def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limi
 def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> tuple[str, bool]:
     """Returns the first command in the record that breaks a condition, and whether one does; else the last command.
 
-    What the controller measured, and the torques it computed, are not judged here. A condition of one of the faults is
+    What the controller measured, and the torques it computed, are not checked here. A condition of one of the faults is
     what is looked for; another that is broken only counts for the second answer.
     """
     sent = record[record["sent_ns"] != 0]
     is_broken = False
     if not len(sent):
         return "", is_broken
-    for field, judge, describe in (
+    for field, find, describe in (
         ("command", _judge_joints, _describe_joints),
         ("command_pose", _judge_poses, _describe_pose),
         ("command_tau", _judge_torques, _describe_torques),
@@ -143,7 +143,7 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
             stood = {"command": rows["q_c"][0], "command_pose": values[0], "command_tau": np.zeros_like(values[0])}
             values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
         first = len(values) - len(rows)
-        for place, breaches in judge(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
+        for place, breaches in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
             is_broken = is_broken or bool(breaches)
             for breach in breaches:
                 if breach.condition.fault in faults:

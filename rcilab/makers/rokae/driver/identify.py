@@ -1,4 +1,4 @@
-"""Which arm is at the other end: told from the Denavit-Hartenberg table that the controller serves."""
+"""Identifies the arm by the Denavit-Hartenberg table that the controller serves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def identify_robot(dh: Sequence[float]) -> str:
     name = _find_name(served)
     if name is None:
         raise ModelError(
-            f"the robot is none of those known ({', '.join(ROBOTS)}): its DH lengths d are {_in_mm(served)} "
+            f"the robot is not one of those known ({', '.join(ROBOTS)}): its DH lengths d are {_in_mm(served)} "
             "mm; say which model to use: connect(address, model=load_model(NAME))"
         )
     return name
@@ -39,7 +39,7 @@ def identify_robot(dh: Sequence[float]) -> str:
 def require_same_arm(dh: Sequence[float], name: str, lengths: Lengths, address: str) -> None:
     """Makes sure that the controller moves the arm that motions will be planned for.
 
-    A controller that serves zeros says nothing and is believed. An arm that is none of ours must have the given
+    A controller that serves zeros says nothing and is believed. An arm that rcilab does not know must have the given
     lengths, up to a calibration.
 
     Args:

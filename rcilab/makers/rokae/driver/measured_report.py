@@ -31,7 +31,7 @@ YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPED
 
 
 class _Measured(NamedTuple):
-    """The last cycles judged as our virtual controller does; a real one may allow less."""
+    """The last cycles, checked as our virtual controller does; a real one may allow less."""
 
     breaches: list[LimitViolation]
     ddq: Array

@@ -204,7 +204,7 @@ class RciDriver:
         self._commands.stop_move(timeout)
 
     def find_safety_stop(self, state: RobotState) -> SafetyStopReason | None:
-        """Returns which safety stop a state shows; the state tells that there is one, a query which."""
+        """Returns which safety stop a state shows; the state shows that there is one, a query which."""
         if state.robot_mode is not RobotMode.USER_STOPPED:
             return None
         try:

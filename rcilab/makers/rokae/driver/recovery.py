@@ -9,7 +9,7 @@ from rcilab.core.fault import name_faults
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
 
-RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them; a choice.
+RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them.
 _FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
 
 
