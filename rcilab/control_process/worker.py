@@ -83,7 +83,7 @@ class ControlProcess:
         self._next_look = 0.0
         self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
-        self._told: tuple[JointVector, Pose] | None = None  # Joint angles and pose that the tool was last found from.
+        self._reported: tuple[JointVector, Pose] | None = None  # Joint angles and pose that the tool was last found from.
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""
@@ -251,7 +251,7 @@ class ControlProcess:
         self._publisher.restart()
         if driver.latest is not None:
             self._record([driver.latest])  # Before it is said to be ready: the newest row may be a dead predecessor's.
-        self._told = None
+        self._reported = None
         self._learn_power()
         self._configure(request.configuration)
 

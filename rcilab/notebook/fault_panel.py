@@ -43,7 +43,7 @@ class FaultPanel(Part):
         self.exhibit: FaultDemo | None = None
         """The fault on show; None as long as none was provoked."""
         self._failed = ""  # Why it could not be provoked.
-        self._now, self._told, self._record = block(), block(), block()
+        self._now, self._shown_text, self._record = block(), block(), block()
         self._set: tuple[FaultCode, ...] | None = None
         self._arm = PrivateArm()
         self._work: LongTask[Fault, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
@@ -59,7 +59,7 @@ class FaultPanel(Part):
             [self.provoke, self.moment, self.progress, self.cancel],
             layout={"align_items": "center"},
         )
-        self.build([self._now, self.fault, self._buttons, self._told, self._record], min_width="360px")
+        self.build([self._now, self.fault, self._buttons, self._shown_text, self._record], min_width="360px")
         self.fault.observe(lambda _: self._on_fault(), names="value")
         self._tell()
         self.hear("robot", self._show)
@@ -112,11 +112,11 @@ class FaultPanel(Part):
         has_no_elbow = FAULTS[fault].needs_elbow and not self.model.redundancy
         self.moment.layout.display = "none" if exhibit is None else None
         if exhibit is not None:
-            told = _exhibit_html(exhibit, text)
+            details = _exhibit_html(exhibit, text)
         else:
             note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
-            told = _card_html(fault, text) + soft(note)
-        write(self._told, said + told)
+            details = _card_html(fault, text) + soft(note)
+        write(self._shown_text, said + details)
         self.provoke.disabled = has_no_elbow or self._work.is_busy
 
     def _provoke(self) -> None:
