@@ -9,7 +9,6 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rcilab.core.datagram_filter import keep_all_senders, keep_senders
 from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.arrivals import (
     Arrival,
@@ -25,7 +24,8 @@ from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpCh
 
 _LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot hold up the cycle.
-_FLOOD = 1000  # Strangers' datagrams beside a client after which the kernel drops the others; a tuning value.
+_STRANGERS_AT_ONCE = 64  # The same once the client's come to a socket of their own: the rest fills the kernel's buffer.
+_STRANGERS_TURN = 16  # [polls] From one look at what strangers sent to the next, from then on.
 _FRAME_BYTES_AT_ONCE = 4096
 _BACKLOG = 8  # [connections] That wait to be accepted.
 _ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
@@ -43,8 +43,8 @@ class Endpoint:
     Attributes:
         host: Address that it listens on.
         port: TCP port of the main channel.
-        strangers: Datagrams that were ignored because they did not come from the client; of a flood, how many were
-            read before the kernel was made to drop them.
+        strangers: Datagrams that were ignored because they did not come from the client; of a flood, those that were
+            read: the kernel drops what its buffer has no room for.
 
     Args:
         host: Address to listen on.
@@ -73,10 +73,14 @@ class Endpoint:
         self._owner: Peer | None = None  # The client of the main channel whose datagrams count.
         self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
         self._has_named_stranger = False
-        self.strangers = self._strangers_before = 0
+        self.strangers = 0
         self._arrivals: deque[Arrival] = deque()
+        self._apart: dict[socket.socket, tuple[str, int]] = {}  # Connected to the client, which strangers cannot fill.
+        self._is_apart = False  # Whether the client's datagrams are known to come to one of those.
+        self._polls = 0
         self._watched: list[socket.socket] = []
-        self._watch()
+        self._watched_mostly: list[socket.socket] = []  # Without the socket that then has strangers' datagrams only.
+        self._separate_client()
 
     @property
     def options(self) -> str:
@@ -114,14 +118,18 @@ class Endpoint:
             timeout: Longest wait, [s].
             extra_sockets: Sockets of other parts to be watched, too.
         """
-        watched = [*self._watched, *extra_sockets]
+        self._polls += 1
+        is_strangers_turn = self._polls % _STRANGERS_TURN == 0 or not self._is_apart
+        watched = [*(self._watched if is_strangers_turn else self._watched_mostly), *extra_sockets]
         readable = select.select(watched, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
         if not (readable or self._arrivals):
             return []
         extra: list[socket.socket] = []
         for sock in readable:  # In the order in which they are watched.
-            if self._datagrams is not None and sock is self._datagrams[0]:
-                self._receive_datagrams(sock)
+            if sock in self._apart:
+                self._receive_from_client(sock)
+            elif self._datagrams is not None and sock is self._datagrams[0]:
+                self._receive_from_anybody(sock)
             elif sock in self._connections:
                 self._receive_frames(sock)
             elif sock in self._listeners:
@@ -163,10 +171,10 @@ class Endpoint:
         sock.close()
         del self._connections[sock]
         if peer is self._owner:
-            self._owner = None
-            self._keep_all_senders()
+            self._owner = self._sender = None
             self._state_port = self._own_port
             self._target = self._fixed_target
+            self._separate_client()
         self._watch()
         self._arrivals.append(ClientDisconnected(peer, reason))
 
@@ -181,6 +189,7 @@ class Endpoint:
             self._own(peer)
         self._state_port = port
         self._target = (peer.address if self.fixed_host is None else self.fixed_host, port)
+        self._separate_client()
         return True
 
     def close(self) -> None:
@@ -189,28 +198,82 @@ class Endpoint:
             sock.close()
         self._connections.clear()
         self._sockets.clear()
+        self._apart.clear()
         self._watched = []
 
     def _own(self, peer: Peer) -> None:
         """Makes a client the one whose datagrams count."""
         self._owner = peer
-        self._keep_all_senders()
         self._sender, self._has_named_stranger = None, False
         if self._fixed_target is None and self._state_port:
             self._target = (peer.address, self._state_port)
+        self._separate_client()
 
-    def _keep_all_senders(self) -> None:
-        """Begins to read, and to count, datagrams of strangers again."""
-        self._strangers_before = self.strangers
-        if self._datagrams is not None:
-            keep_all_senders(self._datagrams[0])
+    def _separate_client(self) -> None:
+        """Has the client's datagrams come to sockets of their own: where states go, and where it sends from.
+
+        The kernel prefers a connected socket, so that no flood of strangers displaces a command.
+        """
+        self._is_apart = False
+        wanted = {address for address in (self._target, self._sender) if address is not None}
+        for sock, address in list(self._apart.items()):
+            if address in wanted:
+                wanted.remove(address)
+            else:
+                del self._apart[sock]
+                sock.close()
+        for address in wanted:
+            self._open_apart(address)
+        self._watch()
+
+    def _open_apart(self, address: tuple[str, int]) -> None:
+        if self._datagrams is None:
+            return
+        shared, channel = self._datagrams
+        host, port = shared.getsockname()
+        try:
+            sock = _bind(socket.SOCK_DGRAM, host, port, channel.option)
+        except (OSError, UsageError):  # No descriptor is left: the client's stay among the strangers'.
+            return
+        try:
+            sock.setblocking(False)
+            sock.connect(address)
+        except OSError:  # No route leads there.
+            sock.close()
+            return
+        self._apart[sock] = address
+        for _ in range(_DATAGRAMS_AT_ONCE):  # Until it was connected, anybody's came here.
+            try:
+                datagram, sender = sock.recvfrom(_LARGEST_DATAGRAM)
+            except OSError:
+                break
+            if sender == address:
+                self._arrivals.append(DatagramArrived(datagram))
+            else:
+                self.strangers += 1
 
     def _watch(self) -> None:
-        datagrams = () if self._datagrams is None else (self._datagrams[0],)
-        self._watched = [*datagrams, *self._connections, *self._listeners]
+        shared = () if self._datagrams is None else (self._datagrams[0],)
+        self._watched_mostly = [*self._apart, *self._connections, *self._listeners]
+        self._watched = [*shared, *self._watched_mostly]  # In this order: what came before a client had its own socket.
 
-    def _receive_datagrams(self, sock: socket.socket) -> None:
+    def _receive_from_client(self, sock: socket.socket) -> None:
+        before = len(self._arrivals)
         for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                self._arrivals.append(DatagramArrived(sock.recv(_LARGEST_DATAGRAM)))
+            except BlockingIOError:
+                break
+            except OSError:  # An earlier state met a closed port.
+                continue
+        is_known = self._is_apart and self._apart[sock] == self._sender
+        if not is_known and len(self._arrivals) > before:
+            self._sender = self._apart[sock]
+            self._separate_client()
+            self._is_apart = True
+
+    def _receive_from_anybody(self, sock: socket.socket) -> None:
+        for _ in range(_STRANGERS_AT_ONCE if self._is_apart else _DATAGRAMS_AT_ONCE):
             try:
                 datagram, sender = sock.recvfrom(_LARGEST_DATAGRAM)
             except OSError:  # Nothing more, or an error report that concerns an earlier send.
@@ -223,10 +286,9 @@ class Endpoint:
         client = "" if self._owner is None else self._owner.address
         if sender[0] in (client, self.fixed_host) and (self._sender is None or sender[1] == self._state_port):
             self._sender = sender
+            self._separate_client()
             return True
         self.strangers += 1
-        if client and self._datagrams is not None and self.strangers - self._strangers_before == _FLOOD:
-            keep_senders(self._datagrams[0], {client, self.fixed_host or client})
         if not self._has_named_stranger:
             self._has_named_stranger = True
             self._arrivals.append(StrangerDetected("{}:{}".format(*sender), client))

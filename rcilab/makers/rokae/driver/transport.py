@@ -6,9 +6,9 @@ import errno
 import select
 import socket
 import time
+from contextlib import suppress
 from typing import Protocol
 
-from rcilab.core.datagram_filter import keep_senders
 from rcilab.core.errors import ConnectionLostError, DecodeError
 from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import FrameReader
@@ -71,30 +71,32 @@ class SocketTransport:
     def __init__(self, address: RciAddress, state_size: int, timeout: float) -> None:
         self.address = address
         self.foreign = 0
-        """Datagrams dropped because of their size or sender, without those that the kernel dropped."""
-        self._sender: tuple[str, int] | None = None  # Where states come from, once one has come.
+        """Datagrams dropped because of their size or sender, as far as they were read."""
         self._state_size = state_size
         route = choose_route(address)
         self._robot_host = route.robot_udp[0]
-        self._command_address = route.robot_udp
         self._frames: list[bytes] = []
         self._was_answered = False
         self._reader = FrameReader()
-        self._udp = _bind_udp(address, route)
-        keep_senders(self._udp, [self._robot_host])
+        self._udp, rest = _bind_udp(address, route)
+        self._rest: socket.socket | None = rest  # What comes from other ports; until a state comes to the other socket.
+        self._other_port: int | None = None  # Of the robot, that states come from.
         try:
             self._tcp = _connect_tcp(address, route, timeout)
         except BaseException:
             self._udp.close()
+            rest.close()
             raise
-        self._udp_number = self._udp.fileno()
+        self._tcp_number = self._tcp.fileno()
         self._states_ready = select.poll()
         self._states_ready.register(self._udp, select.POLLIN)
+        self._states_ready.register(rest, select.POLLIN)
         self._states_ready.register(self._tcp, select.POLLRDHUP)
         self._frames_ready = select.poll()
         self._frames_ready.register(self._tcp, select.POLLIN)
         self._anything_ready = select.poll()
         self._anything_ready.register(self._udp, select.POLLIN)
+        self._anything_ready.register(rest, select.POLLIN)
         self._anything_ready.register(self._tcp, select.POLLIN)
 
     @property
@@ -139,31 +141,49 @@ class SocketTransport:
         states: list[bytes] = []
         for _ in range(_DATAGRAMS_AT_ONCE):
             try:
-                datagram, sender = self._udp.recvfrom(_LARGEST)
+                datagram = self._udp.recv(_LARGEST)
             except (BlockingIOError, InterruptedError):
                 break
             except ConnectionError:  # An earlier command met a closed port; its ICMP answer says nothing new.
                 continue
-            if len(datagram) == self._state_size and (sender == self._sender or self._accepts(sender)):
+            if len(datagram) == self._state_size:
                 states.append(datagram)
             else:
                 self.foreign += 1
             if not self._states_ready.poll(0):  # A third of what an exception takes, and there is mostly just one.
                 break
+        if self._rest is not None:
+            if not states:
+                return self._receive_from_other_port(self._rest)
+            self._states_ready.unregister(self._rest)
+            self._anything_ready.unregister(self._rest)
+            self._rest.close()
+            self._rest = None
         return states
 
-    def _accepts(self, sender: tuple[str, int]) -> bool:
-        """Returns whether a sender other than the last one is the robot."""
-        is_first = self._sender is None and sender[0] == self._robot_host
-        if is_first or sender == self._command_address:
-            self._sender = sender
-            return True
-        return False
+    def _receive_from_other_port(self, udp: socket.socket) -> list[bytes]:
+        """Returns the states of a robot that sends them from another port than commands go to."""
+        states: list[bytes] = []
+        for _ in range(_DATAGRAMS_AT_ONCE):
+            try:
+                datagram, (host, port) = udp.recvfrom(_LARGEST)
+            except (BlockingIOError, InterruptedError):
+                break
+            except ConnectionError:
+                continue
+            if len(datagram) != self._state_size or host != self._robot_host or port != (self._other_port or port):
+                self.foreign += 1
+                continue
+            states.append(datagram)
+            if self._other_port is None:
+                self._other_port = port
+                udp.connect((host, port))  # From here on its buffer, too, takes no strangers' datagrams.
+        return states
 
     def send_command(self, datagram: bytes) -> None:
         """Sends one command datagram; a full or refusing network drops it, as the network may at any time."""
         try:
-            self._udp.sendto(datagram, self._command_address)
+            self._udp.send(datagram)
         except (BlockingIOError, InterruptedError, ConnectionError):
             pass
         except OSError as error:
@@ -180,7 +200,7 @@ class SocketTransport:
         if frames:
             return bool(self._anything_ready.poll(max(0.0, timeout) * _MS))
         events = self._states_ready.poll(max(0.0, timeout) * _MS)
-        if len(events) == 1 and events[0][0] != self._udp_number:
+        if len(events) == 1 and events[0][0] == self._tcp_number:
             raise self._lost(None)
         return bool(events)
 
@@ -192,6 +212,8 @@ class SocketTransport:
         """Ends both channels. May be called twice."""
         self._tcp.close()
         self._udp.close()
+        if self._rest is not None:
+            self._rest.close()
 
     def _lost(self, error: OSError | None) -> ConnectionLostError:
         reason = "it closed the connection" if error is None else (error.strerror or str(error))
@@ -205,14 +227,30 @@ class SocketTransport:
         )
 
 
-def _bind_udp(address: RciAddress, route: Route) -> socket.socket:
+def _bind_udp(address: RciAddress, route: Route) -> tuple[socket.socket, socket.socket]:
+    """Returns a socket that is connected to the robot, and one for what comes from elsewhere to the same port of ours.
+
+    The kernel prefers the connected one. Only these two share the port: another client of the robot finds it taken.
+    """
     udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    rest = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        udp.setblocking(False)
+        for sock in (udp, rest):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+            sock.setblocking(False)
+        rest.bind(route.local_udp)
+        for sock in (udp, rest):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         udp.bind(route.local_udp)
+        for sock in (udp, rest):
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 0)
+        udp.connect(route.robot_udp)
+        with suppress(BlockingIOError):
+            while True:
+                udp.recv(_LARGEST)  # Until it was connected, anybody's came here.
     except OSError as error:
         udp.close()
+        rest.close()
         host, port = route.local_udp
         if error.errno == errno.EADDRINUSE:
             raise ConnectionLostError(
@@ -222,7 +260,7 @@ def _bind_udp(address: RciAddress, route: Route) -> socket.socket:
         raise ConnectionLostError(f"{address}: cannot receive at {host}:{port}: {error.strerror or error}").coded(
             "no_port", address=str(address), port=port
         ) from error
-    return udp
+    return udp, rest
 
 
 def _connect_tcp(address: RciAddress, route: Route, timeout: float) -> socket.socket:

@@ -21,7 +21,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
-from tests.makers.rokae.controller.test_server import running
+from tests.makers.rokae.controller.test_server import PATIENCE, Peer, Running, bind_udp, running
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -54,26 +54,111 @@ def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
         assert 1 <= robot.world.status().strangers <= len(sent)
 
 
-def test_a_flood_of_a_stranger_leaves_room_for_commands():
+@pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
+def test_a_flood_of_a_stranger_leaves_room_for_commands(host):
+    """From the first command on; it comes while the controller does not know yet which port the client sends from."""
     with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind(("127.0.0.9", 0))
-        host, port = robot.address.removeprefix("rci://").split("?")[0].split(":")
+        udp.bind((host, 0))
+        place = robot.address.removeprefix("rci://").split("?")[0].split(":")
         robot.power_on()
-        motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
+        send_command = robot._driver.connection._transport.send_command
 
-        def flood(t, duration):
-            for _ in range(2000):  # More than the buffer holds, between any two commands.
-                udp.sendto(bytes(1000), (host, int(port)))
+        def flood_and_send(datagram: bytes) -> None:
+            for _ in range(2000):  # More than the buffer holds.
+                udp.sendto(bytes(1000), (place[0], int(place[1])))
+            send_command(datagram)
 
-        def is_seen():
-            flood(0.0, 0.0)
-            return robot.world.status().strangers >= 1000
-
-        wait_for(is_seen, 30.0, "the controller to have seen the flood")
-        run = robot.execute(motion, progress=flood)
+        robot._driver.connection._transport.send_command = flood_and_send
+        run = robot.execute(plan_joint(MODEL, MODEL.home, MODEL.home + 0.01))
         assert run.faults == ()
-        assert np.array_equal(robot.state.q_c, motion.goal)
-        assert robot.world.status().strangers >= 1000
+        assert robot.world.status().strangers > 0
+
+
+class FloodedPeer(Peer):
+    """Sends its commands from a socket of choice, each after more of strangers' datagrams than a buffer holds."""
+
+    def __init__(self, found: Running, strangers: list[socket.socket]) -> None:
+        super().__init__(found, udp=bind_udp(0, "127.0.0.1"))
+        self.sender = self.udp
+        self.strangers = strangers
+
+    def direct_states_to(self, udp: socket.socket) -> None:
+        assert self.ask(rci.Connect(udp.getsockname()[1])) == 0
+        self.udp, old = udp, self.udp
+        old.close()
+
+    def send(self, message_id: int, q: np.ndarray) -> None:
+        for _ in range(1000):
+            for stranger in self.strangers:
+                stranger.sendto(bytes(290), self.controller)
+        self.sender.sendto(rci.encode_command(rci.CommandPacket(message_id, tuple(q.tolist()))), self.controller)
+
+    def hold(self, cycles: int) -> None:
+        self.run(np.tile(MODEL.home, (cycles, 1)))
+        assert self.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+
+
+def test_a_client_is_heard_in_a_flood_wherever_it_sends_from_and_when_its_port_changes():
+    with (
+        bind_udp(0, "127.0.0.1") as other_port, bind_udp(0, "127.0.0.1") as next_port,
+        bind_udp(0, "127.0.0.9") as stranger, bind_udp(0, "127.0.0.1") as neighbour,
+        running(lockstep=True) as found, FloodedPeer(found, []) as peer,
+    ):  # fmt: skip
+        peer.direct_states_to(bind_udp(0, "127.0.0.1"))
+        peer.sender = other_port
+        peer.hold(1)
+        peer.strangers = [stranger, neighbour]
+        peer.hold(20)
+        peer.sender = peer.udp
+        peer.hold(20)
+        peer.direct_states_to(next_port)
+        peer.sender = next_port
+        peer.hold(20)
+        assert found.server.controller.playout.lost == 0
+        assert found.server.bad_datagrams == 0
+
+
+def test_the_client_that_is_named_at_the_start_is_heard_in_a_flood():
+    with bind_udp(0, "127.0.0.1") as udp, bind_udp(0, "127.0.0.9") as stranger:
+        port = udp.getsockname()[1]
+        with running(lockstep=True, client_host="127.0.0.1", client_port=port) as found:
+            for _ in range(2):  # The second time, too: it is kept when the client leaves.
+                with FloodedPeer(found, [stranger]) as peer:
+                    peer.udp.close()
+                    peer.udp = peer.sender = udp.dup()
+                    peer.udp.settimeout(PATIENCE)
+                    peer.hold(20)
+            assert found.server.bad_datagrams == 0
+
+
+def test_strangers_in_the_moment_before_a_socket_is_connected_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between its bind and its connect, the socket of the client's commands takes anybody's datagrams."""
+    connect = socket.socket.connect
+    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as stranger:
+
+        def connect_late(sock: socket.socket, place: tuple[str, int]) -> None:
+            if sock.type == socket.SOCK_DGRAM and sock.getsockname() == (found.host, found.port):
+                stranger.sendto(absurd(1), (found.host, found.port))
+            connect(sock, place)
+
+        monkeypatch.setattr(socket.socket, "connect", connect_late)
+        with Peer(found, udp=bind_udp(found.port, "127.0.0.1")) as peer:
+            peer.receive_state()
+            assert found.server._endpoint.strangers == 1
+            assert found.server.bad_datagrams == 0
+
+
+def test_a_flood_does_not_keep_the_controller_from_its_cycles() -> None:
+    """Once the client's commands have a socket of their own, few of the strangers' are read at a time."""
+    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as stranger, FloodedPeer(found, []) as peer:
+        peer.direct_states_to(bind_udp(0, "127.0.0.1"))
+        peer.sender = peer.udp
+        peer.hold(1)
+        before = found.server._endpoint.strangers
+        peer.strangers = [stranger]
+        peer.hold(20)
+        cycles = found.server.controller.playout
+        assert 0 < found.server._endpoint.strangers - before < 64 * 20, cycles
 
 
 def test_strangers_are_counted_again_for_the_next_client():

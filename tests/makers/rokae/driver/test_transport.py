@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import pytest
 
+from rcilab.core.errors import ConnectionLostError
 from rcilab.makers.rokae.driver import transport as module
 from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.driver.transport import SocketTransport
@@ -49,17 +50,64 @@ def test_a_flood_from_another_address_leaves_room_for_a_state(wire: Wire):
         wire.send(stranger, b"stranger", 5000)
     wire.send(wire.robot, b"state")
     assert wire.received() == [b"state"]
-    assert wire.transport.foreign == 0, "the kernel dropped them"
 
 
-def test_the_robots_port_counts_and_no_other_once_it_is_known(wire: Wire):
+def test_a_flood_from_the_robots_address_leaves_room_for_a_state(wire: Wire):
+    with sender(HOST) as stranger:
+        wire.send(stranger, b"stranger", 5000)
+        wire.send(wire.robot, b"state")
+        wire.send(stranger, b"stranger", 5000)
+        wire.send(wire.robot, b"next")
+    assert wire.received() == [b"state", b"next"]
+
+
+def test_a_flood_leaves_room_for_a_robot_that_sends_from_another_port(wire: Wire):
+    with sender(HOST) as robot, sender(HOST) as stranger:
+        wire.send(robot, b"state")
+        assert wire.received() == [b"state"]
+        for host in (stranger, sender("127.0.0.9")):
+            with host:
+                wire.send(host, b"stranger", 5000)
+        wire.send(robot, b"next")
+        assert wire.received() == [b"next"]
+
+
+def test_strangers_are_kept_out_when_the_port_is_shared_for_a_moment(monkeypatch: pytest.MonkeyPatch):
+    """Between its bind and its connect, the socket of the robot's states takes anybody's datagrams."""
+    with socket.create_server((HOST, 0)) as listener, sender("127.0.0.9") as stranger:
+        port = listener.getsockname()[1]
+        connect = socket.socket.connect
+
+        def connect_late(sock: socket.socket, place: tuple[str, int]) -> None:
+            if sock.type == socket.SOCK_DGRAM and place[1] == port and sock.getsockname()[1] == port:
+                stranger.sendto(bytes(SIZE), sock.getsockname())
+            connect(sock, place)
+
+        monkeypatch.setattr(module.socket.socket, "connect", connect_late)
+        transport = SocketTransport(parse_address(f"rci://{HOST}:{port}"), SIZE, 10.0)
+        assert transport.receive_states() == []
+        transport.close()
+
+
+def test_a_second_client_of_the_same_robot_finds_the_port_taken(wire: Wire):
+    with pytest.raises(ConnectionLostError, match="already listens"):
+        SocketTransport(wire.transport.address, SIZE, 10.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        with pytest.raises(OSError, match="in use"):
+            other.bind(wire.transport.local_address)
+
+
+def test_the_robots_port_counts_and_no_other_once_a_state_came_from_there(wire: Wire):
     with sender(HOST) as stranger:
         wire.send(stranger, b"first")
+        assert wire.received() == [b"first"], "nothing has come from where commands go"
         wire.send(wire.robot, b"state")
         wire.send(stranger, b"stranger")
         wire.send(wire.robot, b"next")
-    assert wire.received() == [b"first", b"state", b"next"]
-    assert wire.transport.foreign == 1
+        assert wire.received() == [b"state", b"next"]
+        wire.send(stranger, b"stranger")
+        assert wire.received() == []
 
 
 def test_a_robot_that_sends_from_another_port_is_received(wire: Wire):
