@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf"
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
 
 _USAGE = 2  # Exit status of a request that cannot be served, as argparse uses it.
+_TOO_FEW_FILES = "fewer files may be open than this needs; close other programs or raise the limit: ulimit -n 256"
 _INTERRUPTED = 130  # Exit status after Ctrl-C, as shells use it.
 _CLOSED_PIPE = 141  # Exit status of a command that ended early because its output was no longer read, as shells use it.
 
@@ -50,6 +52,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         if is_starved(error):
             print(f"rcilab: {OUT_OF_MEMORY}", file=sys.stderr)
+            return _USAGE
+        if error.errno in (errno.EMFILE, errno.ENFILE):
+            print(f"rcilab: {_TOO_FEW_FILES}", file=sys.stderr)
             return _USAGE
         if not is_unwritable(error):
             raise

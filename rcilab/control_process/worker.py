@@ -83,7 +83,9 @@ class ControlProcess:
         self._next_look = 0.0
         self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
-        self._reported: tuple[JointVector, Pose] | None = None  # Joint angles and pose that the tool was last found from.
+        self._reported: tuple[JointVector, Pose] | None = (
+            None  # Joint angles and pose that the tool was last found from.
+        )
 
     def run(self) -> int:
         """Lives until asked to end or until the supervisor is gone; returns the exit code."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from math import prod
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Literal, TypeAlias, get_args
@@ -14,8 +15,8 @@ from rcilab.core.arrays import Array, JointPath, as_number, as_path, as_vector
 from rcilab.core.atomic_file import read_whole
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows
-from rcilab.motion.archive import read_arrays
+from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
+from rcilab.motion.archive import Shapes, read_arrays
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
 
@@ -27,6 +28,8 @@ MOST = 4.0 * math.pi
 _ON_GRID = 1e-6
 """How far times may be off whole cycles and still be them, [s]: what six decimals leave."""
 
+_TIME_KEYS = ("t", "time", "times")
+_MOST_JOINTS = 7
 _TIME = re.compile(r"(?:t|time|times|timestamp)[ _]*[\[(]?(s|ms|us|ns)?[\])]?")
 _JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _]*[\[(]?(rad|deg|°)?[\])]?")
 _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -119,17 +122,28 @@ def _from_npz(
     content: bytes, name: str, has_rate: bool, unit: AngleUnit, max_rows: int
 ) -> tuple[Array | None, Array, list[str]]:
     problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
-    arrays = read_arrays(content, "samples", name, problem, max_rows)
+    arrays = read_arrays(
+        content, "samples", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name, max_rows)
+    )
     if str(arrays.get("kind", "")) == KIND:
         raise InvalidValueError("samples", name, "is a saved motion; Motion.load reads it, to the last bit")
     if "q" not in arrays:
         found = ", ".join(arrays) or "nothing"
         raise InvalidValueError("samples", name, f"holds no array q of joint angles (found: {found})")
     q = as_path(arrays["q"], None, f"{name}, q", unit)
-    key = next((key for key in ("t", "time", "times") if key in arrays), None)
+    key = next((key for key in _TIME_KEYS if key in arrays), None)
     times = None if key is None else as_vector(arrays[key], len(q), f"{name}, {key}", "s")
     place = [f"{name}, row {row} (from 0)" for row in range(len(q))]
     return times, np.radians(q) if unit == "deg" else q, place
+
+
+def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
+    """Refuses arrays that are too long or too wide; what else may be wrong is found once they are read."""
+    for key in ("q", *_TIME_KEYS):
+        require_rows(next(iter(shapes.get(key, ())), 0), max_rows, "samples", name)
+    q = shapes.get("q", ())
+    if prod(q[1:]) > _MOST_JOINTS:
+        raise InvalidValueError(f"{name}, q", f"array of shape {q}", f"needs at most {_MOST_JOINTS} joints")
 
 
 _READERS = {".csv": _from_csv, ".npz": _from_npz}

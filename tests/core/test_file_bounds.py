@@ -101,6 +101,18 @@ def slow(path: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [((127_000_000, 1), "127000000 rows of 1 ms are more than 1000000"), ((2, 60_000_000), "at most 7 joints")],
+)
+def test_samples_are_refused_from_their_headers(tmp_path: Path, shape: tuple[int, int], said: str):
+    """Arrays of 1 GB, as their headers have it: below what a file may hold."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as file, file.open("q.npy", "w") as stream:
+        np.lib.format.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    with pytest.raises(InvalidValueError, match=said):
+        Motion.load_samples(tmp_path / "a.npz", rate_hz=1000.0)
+
+
 def sparse(path: Path) -> Path:
     """Two samples, two hours apart."""
     row = ",".join(f"{angle:.3f}" for angle in MODEL.home)

@@ -129,6 +129,7 @@ def test_a_bad_csv_is_named_with_its_line_in_one_sentence(tmp_path, text, option
     [
         ({"x": np.zeros(3)}, r"holds no array q of joint angles \(found: x\)"),
         ({"q": np.zeros(3)}, r"needs shape \(N, n\)"),
+        ({"q": np.zeros((3, 8)), "t": np.arange(3.0)}, "at most 7 joints"),
         ({"q": np.zeros((3, 7)), "t": np.zeros(2)}, r"t: .* needs \(3,\)"),
         ({"q": np.zeros((3, 7)), "t": [0.0, 2.0, 1.0]}, r"row 2 \(from 0\): 1.0 s is not later"),
         ({"q": np.zeros((3, 7))}, "pass rate_hz"),

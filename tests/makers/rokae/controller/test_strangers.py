@@ -259,3 +259,18 @@ def test_what_the_simulation_finds_odd_goes_the_way_of_all_lines(capfd: pytest.C
         log.removeHandler(handler)
     assert lines == ["MuJoCo: odd"]
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("files", [5, 6])
+def test_a_controller_with_too_few_descriptors_says_so_in_one_sentence(files: int) -> None:
+    """Too few for its sockets, or for what it reads once they are open."""
+    limited = f"import resource, runpy; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files})); "
+    start = "runpy.run_module('rcilab', run_name='__main__', alter_sys=True)"
+    done = subprocess.run(
+        [sys.executable, "-c", limited + start, "controller", "--model", "xMatePro7", "--port", "0"],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr == (
+        "rcilab: fewer files may be open than this needs; close other programs or raise the limit: ulimit -n 256\n"
+    )
