@@ -161,7 +161,7 @@ class Dispatcher:
         if self._store.state.lease.holder != self._refused_for:
             self._store.settle("lease")
         event = self.robot.watch()
-        if event == "placed":
+        if event == "placed" and self._store.state.plan is None:  # A plan may be quicker than this look at the arm.
             self._goal.plan()
         elif event == "rested":
             self._goal.catch_up()

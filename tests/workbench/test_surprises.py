@@ -170,7 +170,7 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
             wait(lambda: is_ready(bench), "motor power")
             start = float(bench.session.status().q_c[0])
             ask(MoveJoint(joint=0, angle=start + 0.1))
-            wait(lambda: bench.store.state.plan is not None, "a plan")
+            wait(lambda: obstacle(bench.store.state, bench.session.status()) is None, "a plan that may be executed")
             ask(RobotCommand(what="confirm"))
             ask(RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
@@ -179,6 +179,7 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
             assert "Joints: 1: " in question
             ask(MoveJoint(joint=0, angle=start + 0.2))
             wait(lambda: describe_move(bench.store.state) is None, "another plan to need another yes")
+            wait(lambda: obstacle(bench.store.state, bench.session.status()) is None, "a plan that may be executed")
             ask(RobotCommand(what="execute"))
             ask(RobotCommand(what="cancel"))
             ask(RobotCommand(what="execute"))
