@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from rcilab.core.spatial import Pose as Pose
     from rcilab.execution.session import RobotSession as RobotSession
     from rcilab.execution.session import connect as connect
-    from rcilab.makers.rokae.faults import Fault as Fault
     from rcilab.model.dynamics.payload import Payload as Payload
     from rcilab.model.robot_model import RobotModel as RobotModel
     from rcilab.model.robot_model import load_model as load_model
@@ -45,7 +44,6 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "CartesianPosition": "rcilab.core.command",
-    "Fault": "rcilab.makers.rokae.faults",
     "JointPosition": "rcilab.core.command",
     "JointTorque": "rcilab.core.command",
     "Monitor": "rcilab.conformance.motion_monitor",

@@ -17,9 +17,9 @@ from rcilab.core.errors import (
     RcilabError,
     UsageError,
 )
-from rcilab.core.fault import name_faults
+from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.error_messages import tell
-from rcilab.i18n.translator import Finished, Message, message
+from rcilab.i18n.translator import Finished, Message, Text, message
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -107,3 +107,9 @@ def _tell_loss(code: str, status: SupervisorStatus) -> Message:
         return message("incident.lost.virtual")
     known = code if code in _LOST else "lost.unreachable"
     return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")
+
+
+def tell_remedy(fault: FaultCode, text: Text) -> str:
+    """Returns what to do about a fault; "" where its maker gives no advice."""
+    key = next((key for key in (f"remedy.{fault.key}", f"remedy.{fault.maker}") if text.has(key)), None)
+    return "" if key is None else f"{text('run.remedy')} {text(key)}"

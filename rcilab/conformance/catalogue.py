@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from types import MappingProxyType
 
 from rcilab.i18n import catalogue
 from rcilab.i18n.locale import Language, require_language
 from rcilab.i18n.units import USUAL, Units
-from rcilab.robots import ROBOTS_BY_MAKER
 
 __all__ = ["Language", "Phrase", "load_catalogue", "say"]
 
@@ -49,10 +47,6 @@ def fill(language: Language, key: str, values: Mapping[str, object], units: Unit
     return units.fill(load_catalogue(require_language(language))[key], values)
 
 
-@lru_cache
 def load_catalogue(language: Language) -> Mapping[str, str]:
     """Returns all sentences of one language by key: those of the engine, and of every maker on its faults and rows."""
-    packages = ["rcilab.conformance", *(f"rcilab.makers.{maker}" for maker in ROBOTS_BY_MAKER)]
-    return MappingProxyType(
-        {key: text for package in packages for key, text in catalogue.load_catalogue(package, language).items()}
-    )
+    return catalogue.merge_catalogues(("rcilab.conformance", *catalogue.MAKERS), language)

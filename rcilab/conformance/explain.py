@@ -188,7 +188,7 @@ def _when(violation: Violation, voice: _Voice) -> str:
 def _fault(row: Condition, voice: _Voice) -> str:
     if row.fault is None:
         return voice.say("raises.nothing" if row.necessity == "recommended" else "raises.unnoticed")
-    cause = voice.say(f"fault.{row.fault.maker}.{row.fault.name}")
+    cause = voice.say(f"fault.{row.fault.key}")
     return voice.say("raises.fault", fault=row.fault.manual_name, cause=cause)
 
 

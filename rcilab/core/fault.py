@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from enum import IntEnum
 
+from rcilab.core.errors import InvalidValueError
+
 
 class FaultCode(IntEnum):
     """A fault that a controller reports; the value is its number. Every maker derives its own enumeration."""
@@ -13,6 +15,11 @@ class FaultCode(IntEnum):
     def maker(self) -> str:
         """Name of the maker: its folder in `rcilab/makers`."""
         raise NotImplementedError
+
+    @property
+    def key(self) -> str:
+        """Names it in the catalogues, such as `fault.KEY` for the cause and `remedy.KEY`."""
+        return f"{self.maker}.{self.name}"
 
     @property
     def manual_name(self) -> str:
@@ -28,6 +35,20 @@ class FaultCode(IntEnum):
     def remedy(self) -> str:
         """What to do about it, one sentence; empty if the maker gives no advice."""
         return ""
+
+
+def find_fault(faults: type[FaultCode], name: FaultCode | str) -> FaultCode:
+    """Returns a fault by its name, as the manual prints it or as the member is called, in any case.
+
+    Raises:
+        InvalidValueError: It does not exist; the message lists the maker's faults.
+    """
+    wanted = (name.name if isinstance(name, FaultCode) else name).replace("_", "").lower()
+    for fault in faults:
+        if wanted in (fault.manual_name.replace("_", "").lower(), fault.name.replace("_", "").lower()):
+            return fault
+    known = ", ".join(fault.manual_name for fault in faults)
+    raise InvalidValueError("fault", str(name), f"does not exist; known: {known}")
 
 
 def name_faults(faults: Iterable[object]) -> str:

@@ -9,12 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib.resources import files
+from pathlib import Path
 from types import MappingProxyType
 
 from rcilab.i18n.locale import Language
 
 SHARED = "rcilab.i18n"
 """The package whose catalogue every user interface has."""
+MAKERS = tuple(
+    f"rcilab.makers.{file.parents[1].name}"
+    for file in sorted(Path(__file__).parents[1].glob("makers/*/catalogues/zh.po"))
+)
+"""The packages of the makers: names of faults, parameters, conditions. Found by folder, as nothing here imports one."""
 
 
 @lru_cache
@@ -31,8 +37,14 @@ def load_catalogue(package: str, language: Language) -> Mapping[str, str]:
 
 @lru_cache
 def load_ui_catalogue(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all texts of one language that a user interface has: the shared ones and its own."""
-    return MappingProxyType({**load_catalogue(SHARED, language), **load_catalogue(package, language)})
+    """Returns all texts of one language that a user interface has: the shared ones, the makers' and its own."""
+    return merge_catalogues((SHARED, *MAKERS, package), language)
+
+
+@lru_cache
+def merge_catalogues(packages: tuple[str, ...], language: Language) -> Mapping[str, str]:
+    """Returns all texts of several packages; where two have the same key, that of the later one."""
+    return MappingProxyType({k: text for package in packages for k, text in load_catalogue(package, language).items()})
 
 
 @lru_cache

@@ -23,6 +23,7 @@ from rcilab.robots import ROBOTS_BY_MAKER
 if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
     from rcilab.makers.parameters import ParameterGroup
+    from rcilab.makers.scenario import FaultScenario
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.maker_server import MakerServer
     from rcilab.sim.virtual_arm import VirtualArm
@@ -105,6 +106,10 @@ class Maker(Protocol):
         """Returns what one of its controllers can be set to beside tool, load and limits, in the order to show it."""
         ...
 
+    def scenarios(self) -> tuple[FaultScenario, ...]:
+        """Returns how its faults are provoked on the virtual controller, in the order to show them."""
+        ...
+
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
         """Returns the virtual side of its wire for one of its arms; only where `capabilities.simulates`."""
         ...
@@ -127,6 +132,10 @@ class PlanningOnly:
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
         """Returns nothing: there is no controller to set."""
+        return ()
+
+    def scenarios(self) -> tuple[FaultScenario, ...]:
+        """Returns nothing: there is no virtual controller."""
         return ()
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:

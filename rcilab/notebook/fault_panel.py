@@ -11,12 +11,11 @@ from rcilab.app.exhibition import exhibit_fault
 from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
-from rcilab.app.fault_lab.table import FAULTS
-from rcilab.app.status_text import tell_error
+from rcilab.app.fault_lab.table import FaultTable
+from rcilab.app.status_text import tell_error, tell_remedy
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.i18n.translator import Text, message
-from rcilab.makers.rokae.faults import Fault
+from rcilab.i18n.translator import Message, Text, message
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask
@@ -42,14 +41,15 @@ class FaultPanel(Part):
         text = self.text
         self.exhibit: FaultDemo | None = None
         """The fault on show; None as long as none was provoked."""
+        self._faults = FaultTable(self.model)
         self._failed = ""  # Why it could not be provoked.
         self._now, self._shown_text, self._record = block(), block(), block()
         self._set: tuple[FaultCode, ...] | None = None
         self._arm = PrivateArm()
-        self._work: LongTask[Fault, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
+        self._work: LongTask[FaultCode, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
         self.fault: Any = lean(
             ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
-            options=[(f"{text(f'learn.fault.{fault.name}')} · {fault.manual_name}", fault) for fault in Fault],
+            options=[(_name(fault, text), fault) for fault in self.model.description.faults],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
         self.progress, self.cancel = self._work.progress, self._work.cancel
@@ -105,28 +105,38 @@ class FaultPanel(Part):
             self.state.exhibit(exhibit_fault(self._shown))
 
     def _tell(self) -> None:
-        fault, text, exhibit = self.fault.value, self.text, self._shown
+        fault: FaultCode | None = self.fault.value  # None: an arm of no maker has no faults.
+        text, exhibit = self.text, self._shown
         said = self._failed
-        if self._work.is_busy:
+        if self._work.is_busy and fault is not None:
             said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
-        has_no_elbow = FAULTS[fault].needs_elbow and not self.model.redundancy
+        obstacle = self._obstacle(fault)
         self.moment.layout.display = "none" if exhibit is None else None
         if exhibit is not None:
             details = _exhibit_html(exhibit, text)
         else:
-            note = text("fault.no_elbow", model=self.model.name) if has_no_elbow else text("fault.private")
-            details = _card_html(fault, text) + soft(note)
+            details = ("" if fault is None else _card_html(fault, text)) + soft(
+                text("fault.private") if obstacle is None else text.say(obstacle)
+            )
         write(self._shown_text, said + details)
-        self.provoke.disabled = has_no_elbow or self._work.is_busy
+        self.provoke.disabled = obstacle is not None or self._work.is_busy
+
+    def _obstacle(self, fault: FaultCode | None) -> Message | None:
+        """Returns why a fault cannot be provoked on this arm; None where it can."""
+        if fault is None or fault not in self._faults:
+            return message("learn.no_scenarios", model=self.model.name)
+        if self._faults[fault].needs_elbow and not self.model.redundancy:
+            return message("fault.no_elbow", model=self.model.name)
+        return None
 
     def _provoke(self) -> None:
-        fault: Fault = self.fault.value
+        fault: FaultCode = self.fault.value
         self.exhibit, self._failed = None, ""
         self.state.exhibit(None)
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
         self._tell()
 
-    def _take(self, fault: Fault, found: FaultDemo | RcilabError) -> None:
+    def _take(self, fault: FaultCode, found: FaultDemo | RcilabError) -> None:
         if isinstance(found, RcilabError):
             self._failed = problem(self.text.say(message("learn.failed", error=tell_error(found))))
             return
@@ -147,14 +157,17 @@ class FaultPanel(Part):
         return button
 
 
-def _card_html(fault: Fault, text: Text) -> str:
-    remedy = f"remedy.{fault.name}"
+def _name(fault: FaultCode, text: Text) -> str:
+    label = f"label.{fault.key}"
+    return f"{text(label)} · {fault.manual_name}" if text.has(label) else fault.manual_name
+
+
+def _card_html(fault: FaultCode, text: Text) -> str:
     return (
         f'<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
         f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
-        f"<p>{esc(text(f'fault.{fault.name}'))}</p>"
-        f'<p class="rl-soft">{esc(text("run.remedy"))} '
-        f"{esc(text(remedy) if text.has(remedy) else text('remedy.smoothness'))}</p></div>"
+        f"<p>{esc(text(f'fault.{fault.key}'))}</p>"
+        f'<p class="rl-soft">{esc(tell_remedy(fault, text))}</p></div>'
     )
 
 

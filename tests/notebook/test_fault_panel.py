@@ -56,13 +56,17 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             assert panel.cancel.layout.display is None
             wait_for(lambda: panel.exhibit is not None and not panel.provoke.disabled, 30.0, "the exhibit")
             assert panel.exhibit is not None
-            said = text_of(panel._told)
+            said = text_of(panel._shown_text)
             assert "kCommandJointAccelerationDiscontinuity" in said
             assert f"{math.degrees(5000.0):.0f}°/s³" in said  # Five thousand rad/s^3, in the degrees of every widget.
-            for part in (panel.exhibit.told("cause", "zh"), *panel.exhibit.tell_way_out("zh"), panel.exhibit.script):
+            for part in (
+                panel.exhibit.told("explanation", "zh"),
+                *panel.exhibit.tell_way_out("zh"),
+                panel.exhibit.script,
+            ):
                 assert part in said
-            assert "<circle" in panel._told.value
-            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._told.value)
+            assert "<circle" in panel._shown_text.value
+            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._shown_text.value)
             assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
             with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:
@@ -80,7 +84,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
                 panel.fault.value = Fault.COLLISION
                 assert timeline.moment is None
             assert panel.moment.layout.display == "none"
-            assert "<circle" not in panel._told.value
+            assert "<circle" not in panel._shown_text.value
             assert len(processes() - own) == 1
         assert processes() == own
         after = robot.receive_state()
@@ -104,11 +108,20 @@ def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
     with notebook.FaultPanel(rcilab.load_model("xMate7")) as panel:
         panel.fault.value = Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION
         assert panel.provoke.disabled
-        assert "7 axes" in text_of(panel._told)
+        assert "7 axes" in text_of(panel._shown_text)
         panel.fault.value = Fault.COLLISION
         assert not panel.provoke.disabled
 
 
+def test_an_arm_without_scenarios_shows_its_makers_faults_and_says_why_they_cannot_be_provoked() -> None:
+    with notebook.FaultPanel(rcilab.load_model("Panda")) as panel:
+        assert len(panel.fault.options) == 41
+        assert panel.provoke.disabled
+        told = text_of(panel._shown_text)
+        assert panel.fault.value.cause in told
+        assert "no fault scenarios for Panda" in told
+
+
 def test_every_fault_has_a_short_name_in_both_languages() -> None:
     for language in LANGUAGES:
-        assert {f"learn.fault.{fault.name}" for fault in Fault} <= load_ui_catalogue("rcilab.notebook", language).keys()
+        assert {f"label.{fault.key}" for fault in Fault} <= load_ui_catalogue("rcilab.notebook", language).keys()

@@ -21,6 +21,7 @@ from rcilab.app.goal.goal_actions import SetLaw
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.catalogue import load_catalogue, load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES
+from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.catalogues import require_equal
 from tests.waiting import wait_for
@@ -402,10 +403,10 @@ def test_every_part_shows_itself_in_chinese_and_closes_twice() -> None:
 
 def test_a_fault_is_told_with_its_cause_and_remedy() -> None:
     with notebook.FaultPanel(PRO7) as panel:
-        panel.fault.value = rcilab.Fault.COLLISION
-        told = text_of(panel._told)
+        panel.fault.value = Fault.COLLISION
+        told = text_of(panel._shown_text)
         assert "kCollision" in told
-        assert rcilab.Fault.COLLISION.cause in told
+        assert Fault.COLLISION.cause in told
 
 
 def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later():

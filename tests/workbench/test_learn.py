@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app.fault_lab import FAULTS
 from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch, GoalActions, SetArmAngle
@@ -137,7 +136,7 @@ def test_an_arm_of_six_axes_is_told_that_it_has_no_elbow() -> None:
 
 def test_every_button_step_and_lesson_has_words() -> None:
     known = set(load_catalogue("en"))
-    wanted = {f"learn.fault.{fault.name}" for fault in FAULTS}
+    wanted = {f"label.{fault.key}" for fault in Fault}
     wanted |= {f"lesson.{name}" for name in LESSONS}
     wanted |= {f"lesson.{name}.{step.name}" for name, steps in LESSONS.items() for step in steps}
     assert sorted(wanted - known) == []

@@ -30,7 +30,7 @@ from rcilab.workbench.panels.outcome import outcome_html
 from rcilab.workbench.panels.run import faults_html
 
 FAULTS = (Fault.INSTABILITY_DETECTION,)
-LOST = Text("en")("fault.INSTABILITY_DETECTION")
+LOST = Text("en")("fault.rokae.INSTABILITY_DETECTION")
 
 
 def world(code: str) -> WorldStatus:

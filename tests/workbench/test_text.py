@@ -9,20 +9,19 @@ import pytest
 
 import rcilab
 from rcilab.app.planning import LAWS
+from rcilab.app.status_text import tell_remedy
 from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.app.view_actions import QUALITIES
 from rcilab.control_process.status import PHASES
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.i18n.catalogue import load_catalogue as load_room_catalogue
+from rcilab.makers.maker import all_makers
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
-from rcilab.makers.rokae.faults import Fault
 from tests.catalogues import require_equal
 
 _ROOT = Path(rcilab.__file__).parent
-SOURCES = sorted(
-    path for part in ("app", "workbench") for path in (_ROOT / part).rglob("*.py") if path.parent.name != "fault_lab"
-)
+SOURCES = sorted(path for part in ("app", "workbench") for path in (_ROOT / part).rglob("*.py"))
 
 
 def test_every_language_has_the_same_keys_and_places_to_fill():
@@ -49,7 +48,6 @@ def test_every_key_written_in_the_code_exists():
 def test_every_name_that_becomes_a_key_has_one():
     known = set(load_catalogue("en"))
     wanted = [f"condition.{row.id}" for row in RCI_CONDITIONS.conditions]
-    wanted += [f"fault.{fault.name}" for fault in Fault]
     wanted += [f"phase.{phase}" for phase in PHASES]
     wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]
     wanted += [f"controller_mode.{mode.name}" for mode in ControllerMode]
@@ -59,10 +57,25 @@ def test_every_name_that_becomes_a_key_has_one():
     assert sorted(set(wanted) - known) == []
 
 
-def test_english_causes_are_the_manuals():
+@pytest.mark.parametrize("maker", all_makers(), ids=lambda maker: maker.name)
+def test_the_texts_of_a_makers_faults_are_those_of_its_fault_table(maker):
     text = Text("en")
-    for fault in Fault:
-        assert text(f"fault.{fault.name}") == fault.cause
+    for fault in maker.faults():
+        assert text(f"fault.{fault.key}") == fault.cause
+        assert tell_remedy(fault, text).removeprefix(text("run.remedy")).strip() == fault.remedy
+    for scenario in maker.scenarios():
+        for what in ("label", "sent", "explanation", "prevention"):
+            assert text.has(f"{what}.{scenario.fault.key}")
+
+
+def test_the_room_of_a_maker_is_the_only_one_that_names_its_faults():
+    keys = {
+        key
+        for package in ("rcilab.app", "rcilab.i18n", "rcilab.notebook")
+        for key in load_room_catalogue(package, "en")
+    }
+    names = {fault.name for maker in all_makers() for fault in maker.faults()}
+    assert not {key for key in keys if key.rpartition(".")[2] in names}
 
 
 def test_messages_inside_messages_are_translated_too():

@@ -1,27 +1,27 @@
-"""The fault gallery: each of the twenty faults, really provoked on a private virtual controller.
+"""The fault lab: every fault of a maker's arms, provoked for real on a private virtual controller.
 
     from rcilab.app import fault_lab
-    print(fault_lab.FAULTS)
-    exhibit = fault_lab.provoke("kCommandJointVelocityLimitsViolation")
-    print(exhibit)                                     # what was sent, why it is a fault, what to do, how to leave it
-    with fault_lab.FaultLab("xMatePro7") as booth:          # several on one controller
-        exhibits = [booth.provoke(fault) for fault in fault_lab.FAULTS]
+    print(fault_lab.FaultTable(rcilab.load_model("xMatePro7")))
+    demo = fault_lab.provoke("kCommandJointVelocityLimitsViolation", "xMatePro7")
+    print(demo)                                     # what was sent, why it is a fault, what to do, how to leave it
+    with fault_lab.FaultLab("xMatePro7") as lab:       # several on one controller
+        demos = [lab.provoke(fault) for fault in lab.faults]
 
-Nothing is made up: real commands go through the real client to a controller that nobody else is connected to.
+The commands go through the real client to a controller that has no other client.
 """
 
 from __future__ import annotations
 
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.lab import FaultLab
-from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
-from rcilab.app.fault_lab.table import FAULTS, FaultTable
-from rcilab.makers.rokae.faults import Fault
+from rcilab.app.fault_lab.table import FaultTable
+from rcilab.core.fault import FaultCode
+from rcilab.makers.scenario import GROUPS, FaultScenario, Group
 
-__all__ = ["FAULTS", "GROUPS", "FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
+__all__ = ["GROUPS", "FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
 
 
-def provoke(fault: Fault | str, model: str = "xMatePro7") -> FaultDemo:
+def provoke(fault: FaultCode | str, model: str) -> FaultDemo:
     """Provokes one fault on a private virtual controller and returns what it reported.
 
     Args:
@@ -32,5 +32,5 @@ def provoke(fault: Fault | str, model: str = "xMatePro7") -> FaultDemo:
         InvalidValueError: There is no such fault; the message lists those that exist.
         UsageError: This arm cannot have this fault.
     """
-    with FaultLab(model) as booth:
-        return booth.provoke(fault)
+    with FaultLab(model) as lab:
+        return lab.provoke(fault)

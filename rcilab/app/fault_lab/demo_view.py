@@ -51,15 +51,15 @@ def body_html(exhibit: FaultDemo, text: Text) -> str:
     legend = "".join(
         f'<span class="rl-sign-{sign}">{escape(text(f"learn.legend.{sign}"))}</span>' for sign in ("limit", "fault")
     )
-    source = explain_source(row, language)
+    source, manual = explain_source(row, language), f"manual.{exhibit.fault.maker}"
     rows = (
-        ("learn.cause", escape(exhibit.told("cause", language, text.units))),
-        ("learn.remedy", escape(exhibit.told("remedy", language, text.units))),
+        ("learn.cause", escape(exhibit.told("explanation", language, text.units))),
+        ("learn.remedy", escape(exhibit.told("prevention", language, text.units))),
         (
             "learn.condition",
             f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{escape(source)}</span>",
         ),
-        ("learn.manual", escape(text("learn.section", section=exhibit.section, number=exhibit.fault.value))),
+        *((("learn.manual", escape(text(manual, number=exhibit.fault.value))),) if text.has(manual) else ()),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
         ("learn.said", f"<code>{escape(text.tell(tell_note(exhibit.said)))}</code>"),
     )

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.app.fault_lab.catalogue import say
-from rcilab.app.fault_lab.scenario import FaultScenario
 from rcilab.app.fault_lab.signals import Signal
+from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.condition import Condition
+from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.i18n.locale import Language
 from rcilab.i18n.units import USUAL, Units
-from rcilab.makers.rokae.controller.fault_stop import FAULT_STOP, FaultSource
-from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.scenario import FaultScenario
 from rcilab.model.robot_model import RobotModel
 
 if TYPE_CHECKING:
@@ -27,20 +26,17 @@ if TYPE_CHECKING:
 Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
 """One step of the way out of a fault."""
 
-SECTION = "4.6"
-"""Where the manual lists its faults, with causes and remedies."""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FaultDemo:
     """A fault that a controller has really reported, with the cycles that led to it."""
 
-    fault: Fault
-    recipe: FaultScenario
+    fault: FaultCode
+    scenario: FaultScenario
     model: RobotModel
     limits: Limits
     """What the arm was judged by, narrowed limits included."""
-    reported: tuple[Fault, ...]
+    reported: tuple[FaultCode, ...]
     """Every error bit that was set in that cycle, in wire order."""
     said: str
     """The controller's own words and numbers."""
@@ -99,11 +95,6 @@ class FaultDemo:
         return self.condition.source
 
     @property
-    def section(self) -> str:
-        """Section of the manual that names the fault, its cause and its remedy."""
-        return SECTION
-
-    @property
     def commanded(self) -> Motion:
         """The joint angles that the arm was told: those sent, the wrong one too; or what the controller made of poses.
 
@@ -113,7 +104,7 @@ class FaultDemo:
         from rcilab.motion import Motion
 
         q, sent = self._every_cycle("q_c"), self.cycles["command"][:-1]
-        if self.recipe.mode == "torque":
+        if self.scenario.mode == "torque":
             q[:] = q[0]
         elif np.isfinite(sent).all():
             q[1 : len(self.cycles)] = sent
@@ -124,7 +115,7 @@ class FaultDemo:
         """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
         from rcilab.motion import Motion
 
-        if FAULT_STOP[self.fault].offender is FaultSource.COMMAND and self.recipe.mode != "torque":
+        if self.scenario.is_commanded:
             return self.commanded
         return Motion.from_cycles(self._every_cycle("q"))
 
@@ -137,13 +128,17 @@ class FaultDemo:
         after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
 
-    def told(self, what: Literal["sent", "cause", "remedy"], language: Language = "en", units: Units = USUAL) -> str:
-        """Returns what was done wrong, why the controller stops for it, or what to do about it.
+    def told(
+        self, what: Literal["sent", "explanation", "prevention"], language: Language = "en", units: Units = USUAL
+    ) -> str:
+        """Returns what was done, why the controller stops for it, or how to avoid it.
 
         Raises:
             InvalidValueError: There is no such language.
         """
-        return say(language, f"{what}.{self.fault.name}", units)
+        text = Text(language, units)
+        key = f"{what}.{self.fault.key}"
+        return text(key) if text.has(key) else {"explanation": self.fault.cause}.get(what, self.fault.remedy)
 
     def tell_way_out(self, language: Language = "en") -> tuple[str, ...]:
         """Returns the steps that led out of it, in words.
@@ -151,7 +146,8 @@ class FaultDemo:
         Raises:
             InvalidValueError: There is no such language.
         """
-        return tuple(say(language, f"step.{step}") for step in self.way_out)
+        text = Text(language)
+        return tuple(text(f"demo.step.{step}") for step in self.way_out)
 
     @property
     def script(self) -> str:
@@ -164,19 +160,19 @@ class FaultDemo:
         Raises:
             InvalidValueError: There is no such language.
         """
-        row = self.condition
+        row, text = self.condition, Text(language)
         formula, source = explain_formula(row, language), explain_source(row, language)
-        number = say(
-            language, "number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
+        number = text(
+            "demo.number", value=f"{self.value:.4g}", bound=f"{self.bound:.4g}", unit=row.unit,
             time=f"{self.time:.3f}",
         )  # fmt: skip
         return "\n".join(
             (
-                f"{self.fault.manual_name}: {self.told('cause', language)}",
-                f"  {say(language, 'head.sent')} {self.told('sent', language)}",
-                f"  {say(language, 'head.condition')} {formula}; {self.place}: {number} [{source}]",
-                f"  {say(language, 'head.remedy')} {self.told('remedy', language)}",
-                f"  {say(language, 'head.way_out')} {' → '.join(self.tell_way_out(language))}",
+                f"{self.fault.manual_name}: {self.told('explanation', language)}",
+                f"  {text('demo.head.sent')} {self.told('sent', language)}",
+                f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]",
+                f"  {text('demo.head.remedy')} {self.told('prevention', language)}",
+                f"  {text('demo.head.way_out')} {' → '.join(self.tell_way_out(language))}",
             )
         )
 
@@ -184,14 +180,14 @@ class FaultDemo:
         return self.explain()
 
     def __repr__(self) -> str:
-        return f"<Exhibit {self.fault.manual_name} at t = {self.time:.3f} s: {self.said}>"
+        return f"<FaultDemo {self.fault.manual_name} at t = {self.time:.3f} s: {self.said}>"
 
 
-def script(fault: Fault, model: str) -> str:
+def script(fault: FaultCode, model: str) -> str:
     """Returns Python that provokes a fault on a private virtual controller and prints what came of it."""
     return (
         "from rcilab.app import fault_lab\n\n"
-        f'exhibit = fault_lab.provoke("{fault.manual_name}", model="{model}")\n'
-        "print(exhibit)\n"
-        'print(exhibit.cycles[["t", "q"]][-3:])  # The flight recorder: the last cycles up to the fault.\n'
+        f'demo = fault_lab.provoke("{fault.manual_name}", model="{model}")\n'
+        "print(demo)\n"
+        'print(demo.cycles[["t", "q"]][-3:])  # The flight recorder: the last cycles up to the fault.\n'
     )

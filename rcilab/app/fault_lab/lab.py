@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.app.fault_lab.fault_demo import FaultDemo, Step
-from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.app.fault_lab.signals import Signals
-from rcilab.app.fault_lab.table import FAULTS
+from rcilab.app.fault_lab.table import FaultTable
 from rcilab.control_process.simulate import simulate
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.command import Command
 from rcilab.core.errors import CommandRejectedError, ControlError, RcilabError, UsageError
+from rcilab.core.fault import FaultCode, find_fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
@@ -25,18 +25,21 @@ from rcilab.execution.control_loop import Callback
 from rcilab.execution.motion_callback import follow
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
-from rcilab.makers.rokae.faults import Fault, find_fault
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
+from rcilab.makers.maker import maker_of, parameters_of, require_simulator
+from rcilab.makers.parameters import default_parameters
+from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
 
-_CAPACITY = 4096  # [cycles] More than any recipe takes.
+_CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
-_CALM = 1.0  # [N, N m] A choice: far below any threshold that a recipe sets.
+_CALM = 1.0  # [N, N m] A choice: far below any threshold that a scenario sets.
 _CALM_STATES = 500
 _GAP = 5  # [cycles] A choice: so many states may be missing between two that are shown, as on any network.
 _AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
 _NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
-_THERE = 1e-6  # [rad] What counts as standing where a recipe begins.
+_THERE = 1e-6  # [rad] What counts as standing where a scenario begins.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
 """Parts of the work: the controller is up, the arm stands where it begins, the fault has come. About what was seen."""
 
@@ -51,11 +54,13 @@ class FaultLab(Closeable):
         model: The arm, without tool and load: what is shown is the bare arm's.
     """
 
-    def __init__(self, model: RobotModel | str = "xMatePro7") -> None:
-        self.model = load_model(model if isinstance(model, str) else model.name)
+    def __init__(self, model: RobotModel | str) -> None:
+        self.model = require_simulator(load_model(model if isinstance(model, str) else model.name))
+        self.faults = FaultTable(self.model)
+        """What can be provoked."""
         self._robot: RobotSession | None = None
 
-    def provoke(self, fault: Fault | str, progress: Tell = lambda share: None) -> FaultDemo:
+    def provoke(self, fault: FaultCode | str, progress: Tell = lambda share: None) -> FaultDemo:
         """Provokes a fault and returns what the controller reported; afterwards the arm stands ready for the next one.
 
         Args:
@@ -64,15 +69,18 @@ class FaultLab(Closeable):
 
         Raises:
             InvalidValueError: There is no such fault.
-            UsageError: This arm cannot have this fault: it has no elbow.
+            UsageError: This arm cannot have this fault: it has no arm angle, or there is no scenario for it.
             RcilabError: The controller did not report it.
         """
-        recipe = FAULTS[find_fault(fault)]
-        if recipe.needs_elbow and not self.model.redundancy:
-            said = f"{recipe.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
+        known = find_fault(self.model.description.faults, fault)
+        if known not in self.faults:
+            raise UsageError(f"{self.model.name}: there is no scenario for {known.manual_name}")
+        scenario = self.faults[known]
+        if scenario.needs_elbow and not self.model.redundancy:
+            said = f"{scenario.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
             raise UsageError(said).coded("no_psi")
         try:
-            return self._provoke(recipe, progress)
+            return self._provoke(scenario, progress)
         except BaseException:
             self.close()  # Whatever state it is in: the next one gets a fresh controller.
             raise
@@ -84,58 +92,64 @@ class FaultLab(Closeable):
             robot.close()
 
     def __repr__(self) -> str:
-        return f"<Booth with a private {self.model.name}{'' if self._robot else ', not opened yet'}>"
+        return f"<FaultLab with a private {self.model.name}{'' if self._robot else ', not opened yet'}>"
 
-    def _provoke(self, recipe: FaultScenario, progress: Tell) -> FaultDemo:
+    def _provoke(self, scenario: FaultScenario, progress: Tell) -> FaultDemo:
         progress(0.02)
         if self._robot is None:
             self._robot = simulate(self.model)
             self._robot.power_on()
         robot = self._robot
         progress(_OPENED)
-        start = recipe.start(self.model.home)
+        start = scenario.start(self.model.home)
         if np.abs(robot.receive_state().q_c - start).max() > _THERE:
             self._go(robot, start)
-        scene = recipe.prepare(Scene(robot=robot, start=robot.receive_state(), limits=self.model.limits))
+        scene = scenario.prepare(self._scene(robot))
         progress(_PLACED)
         log = CycleLog(Recorder(self.model.n, _CAPACITY))
         try:
-            robot.control(_logged(recipe.act(scene), log, progress), recipe.mode)
+            robot.control(_logged(scenario.act(scene), log, progress), scenario.mode)
         except ControlError as error:
-            if recipe.fault not in error.faults:
+            if scenario.fault not in error.faults:
                 raise
             fault = error
         else:
-            error = RcilabError(f"{self.model.name}: {recipe.fault.manual_name} did not come")
-            raise error.coded("no_fault", fault=recipe.fault.manual_name)
+            error = RcilabError(f"{self.model.name}: {scenario.fault.manual_name} did not come")
+            raise error.coded("no_fault", fault=scenario.fault.manual_name)
         assert fault.record is not None
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
         after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are coming in already.
         status = robot.world.status()
         progress(_SHOWN)
-        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(recipe.fault)
+        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(scenario.fault)
         if signal is None:
             raise RcilabError(
-                f"{recipe.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
-            ).coded("no_fault", fault=recipe.fault.manual_name)
+                f"{scenario.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
+            ).coded("no_fault", fault=scenario.fault.manual_name)
         return FaultDemo(
-            fault=recipe.fault,
-            recipe=recipe,
+            fault=scenario.fault,
+            scenario=scenario,
             model=self.model,
             limits=scene.limits,
-            reported=tuple(bit for bit in fault.faults if isinstance(bit, Fault)),
+            reported=tuple(bit for bit in fault.faults if isinstance(bit, FaultCode)),
             said=status.reason,
             cycles=rows,
             after=after,
             signal=signal,
-            way_out=tuple(self._leave(robot, recipe)),
+            way_out=tuple(self._leave(robot, scenario)),
         )
 
-    def _leave(self, robot: RobotSession, recipe: FaultScenario) -> list[Step]:
+    def _scene(self, robot: RobotSession) -> Scene:
+        maker = maker_of(self.model)
+        assert maker is not None  # It has a virtual controller.
+        commands = getattr(robot, maker.scheme)
+        return Scene(robot=robot, commands=commands, start=robot.receive_state(), limits=self.model.limits)
+
+    def _leave(self, robot: RobotSession, scenario: FaultScenario) -> list[Step]:
         """Leads out of a fault and returns what it took."""
         done: list[Step] = []
-        if recipe.fault is Fault.INSTABILITY_DETECTION:
+        if scenario.cuts_network:
             robot.world.set_network(None)
             done.append("network")
         if robot.world.status().pushed:
@@ -144,7 +158,7 @@ class FaultLab(Closeable):
             self._wait_for_calm(robot)
         done += self._recover(robot)
         self._widen(robot)
-        robot.rci.set_collision_behavior(self.model.limits.joint.collision_threshold)
+        robot.configure(RobotConfiguration(control=default_parameters(parameters_of(self.model))))
         nudged = np.array(robot.receive_state().q_c)
         nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
         self._go(robot, nudged)
@@ -157,8 +171,8 @@ class FaultLab(Closeable):
 
     def _widen(self, robot: RobotSession) -> None:
         limits = self.model.limits.joint
-        robot.rci.set_joint_limit(limits.lower, limits.upper)
-        robot.set_safety_box(_OPEN)
+        whole = SoftJointLimits(lower=tuple(limits.lower.tolist()), upper=tuple(limits.upper.tolist()))
+        robot.configure(RobotConfiguration(joints=whole, box=_OPEN))
 
     def _wait_for_calm(self, robot: RobotSession) -> None:
         """Returns once the controller feels nothing any more: its estimate takes a moment to forget a push."""
@@ -169,23 +183,15 @@ class FaultLab(Closeable):
     def _recover(self, robot: RobotSession) -> list[Step]:
         try:
             robot.recover()
-        except CommandRejectedError as error:
-            if not _is_far_outside(error):
-                raise
+        except CommandRejectedError:  # The arm is too far outside its range or its box.
             robot.power_off()
             self._widen(robot)
             robot.power_on()
             return ["refused", "power_off", "widen", "power_on"]
-        if robot.rci.motor_state():
+        if robot.is_powered():
             return ["recover"]
         robot.power_on()  # A joint limit and an emergency stop take the motor power.
         return ["recover", "power_on"]
-
-
-def _is_far_outside(error: CommandRejectedError) -> bool:
-    from rcilab.makers.rokae.wire import RecoveryStatus
-
-    return error.status == RecoveryStatus.MANUAL_RECOVERY_NEEDED
 
 
 def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> NDArray[np.void]:

@@ -7,7 +7,7 @@ import threading
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.lab import FaultLab
 from rcilab.core.background_job import ProgressCallback
-from rcilab.makers.rokae.faults import Fault
+from rcilab.core.fault import FaultCode
 
 IDLE_TIME = 60.0  # [s] A tuning value: starting a controller takes two seconds, keeping one 8 % of a core.
 
@@ -21,19 +21,19 @@ class PrivateArm:
 
     def __init__(self, idle_time: float = IDLE_TIME) -> None:
         self._idle_time = idle_time
-        self._booth: FaultLab | None = None
-        self._lock = threading.Lock()  # Held by the thread that uses the booth.
+        self._lab: FaultLab | None = None
+        self._lock = threading.Lock()  # Held by the thread that uses the lab.
         self._timer: threading.Timer | None = None
 
-    def provoke(self, fault: Fault, model: str, tell: ProgressCallback) -> FaultDemo:
+    def provoke(self, fault: FaultCode, model: str, tell: ProgressCallback) -> FaultDemo:
         """Returns what came of provoking a fault; who gives up meanwhile leaves the arm at rest."""
         with self._lock:
             tell(0.0)
-            if self._booth is None or self._booth.model.name != model:
+            if self._lab is None or self._lab.model.name != model:
                 self._drop()
-                self._booth = FaultLab(model)
+                self._lab = FaultLab(model)
             try:
-                return self._booth.provoke(fault, tell)
+                return self._lab.provoke(fault, tell)
             finally:
                 self._start_timer()
 
@@ -58,6 +58,6 @@ class PrivateArm:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._booth is not None:
-            self._booth.close()
-            self._booth = None
+        if self._lab is not None:
+            self._lab.close()
+            self._lab = None

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF
+from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, condition_table
 from rcilab.conformance.tool_signals import turns
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
+from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
-from rcilab.makers.rokae.conditions import RCI_CONDITIONS
-from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
@@ -83,9 +82,10 @@ class Signals:
         self._rows, self._model, self._limits, self._box, self._lost = rows, model, limits, box, lost
         self._closed_form = model.solver
 
-    def find(self, fault: Fault) -> Signal | None:
+    def find(self, fault: FaultCode) -> Signal | None:
         """Returns the signal that raised a fault: the one farthest past its bound in the last row."""
-        found = [signal for row in RCI_CONDITIONS.raising(fault) for signal in self._signals(row) if signal.is_broken]
+        rows = condition_table(self._model.description).raising(fault)
+        found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
 
     def _signals(self, condition: Condition) -> list[Signal]:

@@ -1,43 +1,46 @@
-"""The gallery's wall: every fault with its recipe, in wire order."""
+"""The faults of a maker's arms that the fault lab can provoke."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from rcilab.app.fault_lab.command_faults import COMMAND_RECIPES
-from rcilab.app.fault_lab.measured_faults import ARM_RECIPES
-from rcilab.app.fault_lab.scenario import GROUPS, FaultScenario, Group
-from rcilab.makers.rokae.faults import Fault
+from rcilab.core.fault import FaultCode
+from rcilab.makers.maker import maker_of
+from rcilab.makers.scenario import GROUPS, FaultScenario, Group
+from rcilab.model.robot_model import RobotModel
 
 
-class FaultTable(Mapping[Fault, FaultScenario]):
-    """Recipes by fault; `print` shows it as a table."""
+class FaultTable(Mapping[FaultCode, FaultScenario]):
+    """Scenarios by fault; `print` shows them as a table.
 
-    def __init__(self, *recipes: FaultScenario) -> None:
-        self._recipes = {recipe.fault: recipe for recipe in sorted(recipes, key=lambda recipe: recipe.fault)}
+    Args:
+        model: The arm; an arm without a virtual controller has no scenarios.
+    """
 
-    def __getitem__(self, fault: Fault) -> FaultScenario:
-        return self._recipes[fault]
+    def __init__(self, model: RobotModel) -> None:
+        maker = maker_of(model)
+        scenarios = () if maker is None else maker.scenarios()
+        self._scenarios = {scenario.fault: scenario for scenario in scenarios}
 
-    def __iter__(self) -> Iterator[Fault]:
-        return iter(self._recipes)
+    def __getitem__(self, fault: FaultCode) -> FaultScenario:
+        return self._scenarios[fault]
+
+    def __iter__(self) -> Iterator[FaultCode]:
+        return iter(self._scenarios)
 
     def __len__(self) -> int:
-        return len(self._recipes)
+        return len(self._scenarios)
 
     def group(self, group: Group) -> tuple[FaultScenario, ...]:
-        """Returns the recipes of a group, in wire order."""
-        return tuple(recipe for recipe in self.values() if recipe.group == group)
+        """Returns the scenarios of a group, in the order to show them."""
+        return tuple(scenario for scenario in self.values() if scenario.group == group)
 
     def __str__(self) -> str:
         return "\n".join(
             f"{group}\n"
-            + "\n".join(f"  {recipe.fault.value:2} {recipe.fault.manual_name}" for recipe in self.group(group))
+            + "\n".join(f"  {found.fault.value:2} {found.fault.manual_name}" for found in self.group(group))
             for group in GROUPS
         )
 
     def __repr__(self) -> str:
         return f"<FaultTable of {len(self)} faults: print it, or fault_lab.provoke(name)>"
-
-
-FAULTS = FaultTable(*COMMAND_RECIPES, *ARM_RECIPES)

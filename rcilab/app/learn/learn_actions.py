@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rcilab.app.exhibition import exhibit_fault
-from rcilab.app.fault_lab import FAULTS, FaultDemo
+from rcilab.app.fault_lab import FaultDemo, FaultTable
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.learn.learn_state import LearnState, LessonState, Show
 from rcilab.app.learn.lessons import LESSONS, Watcher
@@ -22,7 +22,7 @@ from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
-from rcilab.makers.rokae.faults import Fault
+from rcilab.core.fault import FaultCode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class LearnActions:
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self._arm = PrivateArm()
-        self._work: BackgroundJob[Fault, FaultDemo] = BackgroundJob("gallery")
+        self._work: BackgroundJob[FaultCode, FaultDemo] = BackgroundJob("gallery")
         self._watcher = Watcher()
 
     @property
@@ -101,14 +101,15 @@ class LearnActions:
         self._store.update(learn=replace(self._learn, **changes))
 
     def _provoke(self, fault: int) -> None:
-        if fault not in FAULTS:
+        model = self._store.state.model
+        scenario = next((scenario for known, scenario in FaultTable(model).items() if known == fault), None)
+        if scenario is None:
             return
-        recipe, model = FAULTS[Fault(fault)], self._store.state.model
-        if recipe.needs_elbow and not model.redundancy:
+        if scenario.needs_elbow and not model.redundancy:
             self._set(problem=message("learn.no_elbow", model=model.name))
             return
-        self._work.start(recipe.fault, partial(self._arm.provoke, recipe.fault, model.name))
-        self._set(provoking=recipe.fault, progress=0.0, problem=None)
+        self._work.start(scenario.fault, partial(self._arm.provoke, scenario.fault, model.name))
+        self._set(provoking=scenario.fault, progress=0.0, problem=None)
 
     def _finish(self, result: FaultDemo | RcilabError) -> None:
         if isinstance(result, RcilabError):

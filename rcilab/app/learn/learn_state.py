@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.run.recording import Recording
 from rcilab.app.text import Message
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.makers.rokae.faults import Fault
+from rcilab.core.fault import FaultCode
 
 if TYPE_CHECKING:
     from rcilab.app.exhibition import Exhibition
@@ -48,7 +48,7 @@ class LessonState:
 class LearnState:
     """Everything of the Learn tab."""
 
-    provoking: Fault | None = None
+    provoking: FaultCode | None = None
     progress: float = 0.0
     """Of what is being provoked, 0 to 1."""
     show: Show | None = None

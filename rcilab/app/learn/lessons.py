@@ -104,7 +104,7 @@ def _let_go(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 def _provoked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
     show = now.learn.show
-    return show is not None and show.exhibit.fault.name == "INSTABILITY_DETECTION"
+    return show is not None and show.exhibit.scenario.cuts_network
 
 
 def _script(then: UiState, now: UiState, status: SupervisorStatus) -> bool:

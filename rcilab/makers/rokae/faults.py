@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rcilab.core.errors import InvalidValueError
 from rcilab.core.fault import FaultCode
 
 
@@ -75,22 +74,6 @@ class Fault(FaultCode):
 FAULT_COUNT = len(Fault)
 
 
-def find_fault(name: Fault | str) -> Fault:
-    """Returns a fault by its name, as the manual prints it or as the member is called, in any case.
-
-    Raises:
-        InvalidValueError: There is no such fault; the message lists those that exist.
-    """
-    if isinstance(name, Fault):
-        return name
-    wanted = name.replace("_", "").lower()
-    for fault in Fault:
-        if wanted in (fault.manual_name.lower(), fault.manual_name[1:].lower()):
-            return fault
-    known = ", ".join(fault.manual_name for fault in Fault)
-    raise InvalidValueError("fault", name, f"is unknown; known: {known}")
-
-
 def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
     """Returns the faults whose error byte is set, in wire order."""
     return tuple(Fault(place) for place, bit in enumerate(bits) if bit)
@@ -155,14 +138,15 @@ _MEASURED_RATES = frozenset(
 )
 
 _BOX = (
-    "keep the tool inside the safety box; a motion that starts outside it may only lead into it: after recover(), or "
-    "power_off() and power_on() where that is refused, execute(plan_recovery(robot.model, robot.state.q_c, "
-    "robot.safety_box)) does"
+    "keep the tool inside the safety box; a motion that starts outside it may only lead into it: recover, or "
+    "switch the power off and on where that is refused (in Python, execute(plan_recovery(robot.model, "
+    "robot.state.q_c, robot.safety_box)) then leads it back)"
 )
 
 _RANGE = (
-    "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: power_off() and "
-    "power_on(), then execute(plan_recovery(robot.model, robot.state.q_c)) leads it back inside"
+    "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: switch the "
+    "power off and on, then lead the joint back inside (“Lead back inside” on the Run tab; in Python: "
+    "execute(plan_recovery(robot.model, robot.state.q_c)))"
 )
 RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
 """After which `recover()` may not do: the arm can be farther out than it recovers from by itself."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rcilab.makers.rokae.controller.rci_server import RciServer
     from rcilab.makers.rokae.driver.address import RciAddress
     from rcilab.makers.rokae.driver.rci_driver import RciDriver
+    from rcilab.makers.scenario import FaultScenario
     from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.virtual_arm import VirtualArm
@@ -45,6 +46,12 @@ class Rokae:
         from rcilab.makers.rokae.parameters import parameter_groups
 
         return parameter_groups(model.limits)
+
+    def scenarios(self) -> tuple[FaultScenario, ...]:
+        """Returns one scenario for each fault."""
+        from rcilab.makers.rokae.scenarios import SCENARIOS
+
+        return SCENARIOS
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> RciServer:
         """Returns the virtual side of the RCI."""

@@ -18,6 +18,7 @@ from rcilab.app.run.readiness import (
     obstacle,
 )
 from rcilab.app.run.run_actions import RobotCommand
+from rcilab.app.status_text import tell_remedy
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Remark
@@ -149,12 +150,7 @@ def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None)
         return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
-        f'<div class="rl-facts">{esc(text(f"fault.{fault.name}"))}</div>'
-        f'<div class="rl-source">{esc(text("run.remedy"))} {esc(_remedy(fault, text))}</div></div>'
+        f'<div class="rl-facts">{esc(text(f"fault.{fault.key}"))}</div>'
+        f'<div class="rl-source">{esc(tell_remedy(fault, text))}</div></div>'
         for fault in status.faults
     )
-
-
-def _remedy(fault: Any, text: Text) -> str:
-    key = f"remedy.{fault.name}"
-    return text(key) if text.has(key) else text("remedy.smoothness")

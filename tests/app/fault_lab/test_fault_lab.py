@@ -9,20 +9,21 @@ import numpy as np
 import pytest
 
 from rcilab.app import fault_lab
-from rcilab.app.fault_lab.catalogue import load_catalogue
 from rcilab.app.fault_lab.fault_demo import script
-from rcilab.core.errors import InvalidValueError, UsageError
-from rcilab.i18n.locale import LANGUAGES
-from rcilab.makers.rokae.faults import Fault, find_fault
-from tests.catalogues import require_equal
+from rcilab.core.errors import InvalidValueError, ModelError, UsageError
+from rcilab.core.fault import FaultCode, find_fault
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.rokae.faults import Fault
+from rcilab.model.robot_model import load_model
 
-BY_POSE = sorted(Fault, key=lambda fault: (fault_lab.FAULTS[fault].pose or (), fault))
+FAULTS = fault_lab.FaultTable(load_model("xMatePro7"))
+BY_POSE = sorted(Fault, key=lambda fault: (FAULTS[fault].pose or (), fault))
 """So that the arm need not travel between any two."""
 
 
 @pytest.fixture(scope="module")
 def booth() -> Iterator[fault_lab.FaultLab]:
-    with fault_lab.FaultLab() as found:
+    with fault_lab.FaultLab("xMatePro7") as found:
         yield found
 
 
@@ -45,20 +46,25 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.Fau
     assert np.isfinite(exhibit.moved.q).all()
 
 
-def test_every_fault_hangs_in_the_gallery_once() -> None:
-    assert list(fault_lab.FAULTS) == list(Fault)
-    assert sum(len(fault_lab.FAULTS.group(group)) for group in fault_lab.GROUPS) == len(Fault)
-    assert str(fault_lab.FAULTS).count(" k") == len(Fault)
+def test_every_fault_is_in_the_table_once() -> None:
+    assert sorted(FAULTS) == list(Fault)
+    assert sum(len(FAULTS.group(group)) for group in fault_lab.GROUPS) == len(Fault)
+    assert str(FAULTS).count(" k") == len(Fault)
+    sent, measured = FAULTS.group("position")[:2]
+    assert sent.fault.name.removeprefix("COMMAND_") == measured.fault.name.removeprefix("ACTUAL_")
 
 
-def test_it_speaks_both_languages() -> None:
-    require_equal(load_catalogue, LANGUAGES)
+@pytest.mark.parametrize("kind", [Fault, FrankaError])
+def test_a_fault_is_found_by_any_of_its_names(kind: type[FaultCode]) -> None:
+    assert all(find_fault(kind, fault.manual_name) is find_fault(kind, fault.name) is fault for fault in kind)
+    with pytest.raises(InvalidValueError, match=list(kind)[-1].manual_name):
+        find_fault(kind, "kJam")
 
 
-def test_a_fault_is_found_by_any_of_its_names() -> None:
-    assert all(find_fault(fault.manual_name) is find_fault(fault.name) is fault for fault in Fault)
-    with pytest.raises(InvalidValueError, match="kCollision"):
-        find_fault("kJam")
+def test_an_arm_without_a_virtual_controller_has_no_scenarios() -> None:
+    assert len(fault_lab.FaultTable(load_model("Panda"))) == 0
+    with pytest.raises(ModelError, match="simulate"):
+        fault_lab.FaultLab("Panda")
 
 
 def test_an_arm_without_an_elbow_has_no_fault_of_it() -> None:

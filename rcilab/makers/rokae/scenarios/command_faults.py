@@ -11,15 +11,14 @@ from math import radians
 
 import numpy as np
 
-from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
-from rcilab.execution.control_loop import Callback
 from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.scenario import Callback, FaultScenario, Scene
 
 LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
 """Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
@@ -86,7 +85,7 @@ def soften_joint_1(scene: Scene) -> Scene:
     """Sets a soft limit of joint 1 just beside where it stands."""
     upper = np.array(scene.limits.joint.upper)
     upper[0] = scene.start.q_c[0] + _SOFT_LIMIT
-    scene.robot.rci.set_joint_limit(scene.limits.joint.lower, upper)
+    scene.commands.set_joint_limit(scene.limits.joint.lower, upper)
     return scene.narrowed(upper)
 
 
@@ -171,7 +170,7 @@ def _torque_range(scene: Scene) -> Callback:
     def callback(state: RobotState, t: float) -> Command:
         cycle = round(t / CYCLE_TIME)
         if cycle % _TOLD == 0 and tau[cycle] <= strongest:
-            robot.world.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
+            robot.simulation.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
         return stream(state, t)
 
     return callback
@@ -194,43 +193,43 @@ def _rotation(turn: Array) -> Array:
     return Pose((0.0, 0.0, 0.0), (np.cos(angle / 2.0), *half)).rotation
 
 
-COMMAND_RECIPES = (
+COMMAND_SCENARIOS = (
     FaultScenario(
         fault=Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_position",
-        prepare=soften_joint_1, act=_soft_limit,
+        prepare=soften_joint_1, act=_soft_limit, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION, group="position", mode="cartesian_position",
-        prepare=box_around_tool, act=_box,
+        prepare=box_around_tool, act=_box, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
-        mode="cartesian_position", act=_elbow, needs_elbow=True,
+        mode="cartesian_position", act=_elbow, is_commanded=True, needs_elbow=True,
         pose=LIVELY_ELBOW,
     ),
     FaultScenario(
         fault=Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="joint_position",
-        act=_joint_velocity,
+        act=_joint_velocity, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="cartesian_position",
-        act=_tool_velocity,
+        act=_tool_velocity, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="joint_position",
-        act=_joint_acceleration,
+        act=_joint_acceleration, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, group="acceleration", mode="cartesian_position",
-        act=_tool_acceleration,
+        act=_tool_acceleration, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY, group="acceleration", mode="joint_position",
-        act=_joint_jerk,
+        act=_joint_jerk, is_commanded=True,
     ),
     FaultScenario(
         fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, group="command", mode="cartesian_position",
-        act=_singular, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
+        act=_singular, is_commanded=True, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
     ),
     FaultScenario(
         fault=Fault.COMMAND_TORQUE_DISCONTINUITY, group="command", mode="torque", act=_torque_rate,

@@ -6,13 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcilab.app.fault_lab.command_faults import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
-from rcilab.app.fault_lab.scenario import FaultScenario, Scene
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.state import RobotState
-from rcilab.execution.control_loop import Callback
 from rcilab.makers.rokae.faults import Fault
+from rcilab.makers.rokae.scenarios.command_faults import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
+from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.sim.api import NetworkFaults
 
 _PAUSE = 20  # [cycles] of standing still before; a choice.
@@ -45,31 +44,31 @@ def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> 
     def act(cycle: int) -> None:
         since = cycle - _PAUSE
         if since >= 0 and since % _STEP == 0:
-            scene.robot.world.push(push(since), link=link)
+            scene.robot.simulation.push(push(since), link=link)
 
     return held(scene, act, tool=tool)
 
 
 def _soft_joints(scene: Scene) -> Scene:
     n = scene.robot.model.n
-    scene.robot.rci.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
+    scene.commands.set_joint_impedance([100.0] * (n - 3) + [20.0] * 3)
     return scene.yielding()
 
 
 def _loose_tool(scene: Scene) -> Scene:
     """The tool keeps its place and turns freely."""
-    scene.robot.rci.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
+    scene.commands.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
     return scene.yielding()
 
 
 def _firm_tool(scene: Scene) -> Scene:
-    scene.robot.rci.set_cartesian_impedance([3000.0] * 3 + [300.0] * 3)
+    scene.commands.set_cartesian_impedance([3000.0] * 3 + [300.0] * 3)
     return scene.yielding()
 
 
 def _touchy(scene: Scene) -> Scene:
     thresholds = np.full(scene.robot.model.n, 10.0)
-    scene.robot.rci.set_collision_behavior(thresholds)
+    scene.commands.set_collision_behavior(thresholds)
     return scene.guarded(thresholds)
 
 
@@ -122,9 +121,9 @@ def _hit(scene: Scene) -> Callback:
 def _cut_off(scene: Scene) -> Callback:
     def act(cycle: int) -> None:
         if cycle == _CUT - 1:  # From now on lock-step waits for commands that may be lost for a moment only.
-            scene.robot.world.set_network(NetworkFaults(jitter=1e-6), "commands")
+            scene.robot.simulation.set_network(NetworkFaults(jitter=1e-6), "commands")
         elif cycle == _CUT:
-            scene.robot.world.set_network(NetworkFaults(loss=1.0), "commands")
+            scene.robot.simulation.set_network(NetworkFaults(loss=1.0), "commands")
 
     return held(scene, act, tool=False)
 
@@ -133,7 +132,7 @@ def _both(first: Callable[[Scene], Scene], second: Callable[[Scene], Scene]) -> 
     return lambda scene: second(first(scene))
 
 
-ARM_RECIPES = (
+MEASURED_SCENARIOS = (
     FaultScenario(
         fault=Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, group="position", mode="joint_impedance",
         prepare=_both(_soft_joints, soften_joint_1), act=_sideways,
@@ -168,6 +167,7 @@ ARM_RECIPES = (
     ),
     FaultScenario(
         fault=Fault.INSTABILITY_DETECTION, group="contact", mode="joint_position", act=_cut_off,
+        cuts_network=True,
     ),
 )  # fmt: skip
 """Every fault of the arm itself."""

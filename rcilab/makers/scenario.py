@@ -1,0 +1,122 @@
+"""A fault scenario: how one fault is provoked on a virtual controller, as a value. Every maker brings its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, Protocol, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcilab.conformance.common_conditions import yielding_limits
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.command import Command
+from rcilab.core.fault import FaultCode
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.state import Mode, RobotState
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.api import Direction, NetworkFaults
+
+Callback: TypeAlias = Callable[[RobotState, float], Command]
+"""`(state, t) -> command`; t counts controller cycles, [s]."""
+
+Group: TypeAlias = Literal["position", "velocity", "acceleration", "command", "contact"]
+GROUPS: tuple[Group, ...] = ("position", "velocity", "acceleration", "command", "contact")
+"""How user interfaces group faults: position, velocity, acceleration and jerk, pose and torque, contact and network."""
+
+
+class SimulatedWorld(Protocol):
+    """Control of the simulation; a session's `SimulationControl`."""
+
+    def push(self, wrench: ArrayLike, link: int | None = None) -> None:
+        """Applies a force and a moment to a link, or to the tool."""
+        ...
+
+    def set_network(self, faults: NetworkFaults | None, direction: Direction = "both") -> None:
+        """Impairs the network; None repairs it."""
+        ...
+
+
+class ScenarioRobot(Protocol):
+    """The private robot; a session."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm."""
+        ...
+
+    @property
+    def simulation(self) -> Any:
+        """A `SimulatedWorld`."""
+        ...
+
+    def set_safety_box(self, box: SafetyBox) -> None:
+        """Sets the safety box of the tool."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scene:
+    """The private robot as a scenario has prepared it."""
+
+    robot: ScenarioRobot
+    commands: Any
+    """The maker's own commands of the session, such as `robot.rci`."""
+    start: RobotState
+    """Where the arm stands."""
+    limits: Limits
+    """What its commands are checked with: the arm's own limits, narrowed or widened by what was set."""
+    box: SafetyBox | None = None
+    """The safety box that was set."""
+
+    def narrowed(self, upper: JointVector) -> Scene:
+        """Returns the scene with soft limits of the joints, `upper` of shape (n,), [rad]."""
+        joint = replace(self.limits.joint, upper=readonly_copy(upper))
+        return replace(self, limits=replace(self.limits, joint=joint))
+
+    def guarded(self, thresholds: JointVector) -> Scene:
+        """Returns the scene with these collision thresholds, shape (n,), [N m]."""
+        joint = replace(self.limits.joint, collision_threshold=readonly_copy(thresholds))
+        return replace(self, limits=replace(self.limits, joint=joint))
+
+    def yielding(self) -> Scene:
+        """Returns the scene with the wider bounds on accelerations of a compliant arm."""
+        return replace(self, limits=yielding_limits(self.limits))
+
+
+def _as_it_is(scene: Scene) -> Scene:
+    return scene
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FaultScenario:
+    """One fault, and what makes a controller report it."""
+
+    fault: FaultCode
+    group: Group
+    mode: Mode
+    """How the arm is commanded."""
+    act: Callable[[Scene], Callback]
+    """Returns the callback that provokes the fault."""
+    prepare: Callable[[Scene], Scene] = field(default=_as_it_is)
+    """Prepares the scene: narrows a limit, softens the arm. Nothing moves."""
+    pose: tuple[float, ...] | None = None
+    """Joint angles of a 7-axis arm that it begins at, [rad]; None: the arm's home."""
+    needs_elbow: bool = False
+    """Whether it needs an arm with an arm angle."""
+    is_commanded: bool = False
+    """Whether a command breaks the condition, so that the arm does not follow it."""
+    cuts_network: bool = False
+    """Whether the network has to be repaired afterwards."""
+
+    def start(self, home: JointVector) -> JointVector:
+        """Returns the joint angles that the arm begins at, shape (n,), [rad]."""
+        if self.pose is None:
+            return home
+        pose = np.array(self.pose)
+        return pose if len(home) == 7 else np.delete(pose, 2)
+
+    def __repr__(self) -> str:
+        return f"<FaultScenario {self.fault.manual_name}, commanded as {self.mode}>"
