@@ -79,7 +79,10 @@ def swing(bench: Workbench) -> None:
     ask(PlanGoal())
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a judged plan")
     ask(RobotCommand(what="execute"))
-    wait(lambda: abs(float(status().q_c[0]) - goal) < 1e-6, "the arm to arrive")
+    wait(
+        lambda: abs(float(status().q_c[0]) - goal) < 1e-6,
+        lambda: f"the arm to arrive ({status().message}; {all_told(bench)})",
+    )
 
 
 def stop_everything(plant: str, seconds: float) -> None:
