@@ -231,9 +231,11 @@ class ArmServer:
         is_first = not controller.arm.playout.is_playing
         late = controller.arm.playout.late
         deadline = self._clock.now() + self._command_timeout
+        resend = self._clock.now() + RESEND_TIME
         while True:
             remaining = min(deadline - self._clock.now(), _LOOK)
-            self._poll(0.0 if len(controller.arm.playout) else RESEND_TIME if is_first else remaining)
+            remaining = resend - self._clock.now() if is_first else remaining
+            self._poll(0.0 if len(controller.arm.playout) else remaining)
             self._check_parent()
             if len(controller.arm.playout) or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
@@ -243,8 +245,10 @@ class ArmServer:
             if self._has_timed_out and controller.arm.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
-            if is_first:
-                self._server.send_states()
+            if is_first:  # Not at every datagram of a stranger's: states would fill the client's buffer.
+                if self._clock.now() >= resend:
+                    self._server.send_states()
+                    resend = self._clock.now() + RESEND_TIME
             elif self._clock.now() >= deadline:
                 self._has_timed_out = True
                 return
