@@ -9,9 +9,9 @@ from rcilab.core.condition import Condition, Signal
 from rcilab.motion.motion import Motion, TimeLaw
 
 
-def amount(value: float, bound: float) -> tuple[str, str]:
-    """Returns value and bound with as few digits as show that they differ."""
-    for digits in range(4, 17):
+def amount(value: float, bound: float, least: int = 4) -> tuple[str, str]:
+    """Returns value and bound with as few digits, from `least` on, as show that they differ."""
+    for digits in range(least, 17):
         texts = f"{value:.{digits}g}", f"{bound:.{digits}g}"
         if texts[0] != texts[1] or value == bound:
             return texts

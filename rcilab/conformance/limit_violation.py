@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from rcilab.conformance.advice import amount
 from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition
 from rcilab.core.fault import FaultCode
@@ -36,7 +37,8 @@ class LimitViolation(NamedTuple):
             return f"{row.place(0)}: {row.quantity} is improper, out of reach or singular"
         if row.signal == "elbow_sign":
             return f"{row.place(0)}: it is flipped to the other side than at the start"
-        return f"{row.place(self.axis)}: {row.quantity} {self.value:.6g} {row.unit} passes {self.bound:.6g} {row.unit}"
+        value, bound = amount(self.value, self.bound, least=6)
+        return f"{row.place(self.axis)}: {row.quantity} {value} {row.unit} passes {bound} {row.unit}"
 
     @property
     def remark(self) -> Remark:

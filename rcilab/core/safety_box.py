@@ -114,14 +114,30 @@ class EntryBox:
         Args:
             position: The point in the base frame, three numbers, [m].
         """
+        beyond = self._beyond(self._local(position))
+        deepest = max(beyond)
+        return deepest if deepest <= 0.0 else hypot(*(max(0.0, distance) for distance in beyond))
+
+    def passed_face(self, position: Sequence[float]) -> tuple[float, str, float]:
+        """Returns how far a point exceeds a face beyond what is allowed, which one, and how far beyond the box's own.
+
+        Args:
+            position: The point in the base frame, three numbers, [m].
+        """
         local = self._local(position)
+        beyond = self._beyond(local)
+        axis = beyond.index(max(beyond))
+        name = ("+" if local[axis] >= 0.0 else "−") + "xyz"[axis]
+        return beyond[axis], name, abs(local[axis]) - self._half[axis]
+
+    def _beyond(self, local: Sequence[float]) -> list[float]:
+        """Returns how far a point exceeds the faces along each axis, which then follow it inwards."""
         beyond = [max(low - x, x - high) for x, (low, high) in zip(local, self._faces, strict=True)]
         self._faces = [
             (min(-half, max(low, x - self._ROUNDING)), max(half, min(high, x + self._ROUNDING)))
             for x, half, (low, high) in zip(local, self._half, self._faces, strict=True)
         ]
-        deepest = max(beyond)
-        return deepest if deepest <= 0.0 else hypot(*(max(0.0, distance) for distance in beyond))
+        return beyond
 
     def _local(self, position: Sequence[float]) -> tuple[float, float, float]:
         r, (cx, cy, cz) = self._box.T_base_box.parts

@@ -178,6 +178,10 @@ class RobotSession(Closeable):
         hint = f"; it is .{scheme}.{name}" if scheme and hasattr(type(commands), name) else ""
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}", name=name, obj=self)
 
+    def __dir__(self) -> list[str]:
+        """Lists the maker's own commands, too, so that completion finds them."""
+        return sorted({*super().__dir__(), self._driver.scheme})
+
     @property
     def model(self) -> RobotModel:
         """The arm, with the tool, the load and the soft limits set by this session."""

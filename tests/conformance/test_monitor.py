@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.check import HOLD_SAMPLES, check
-from rcilab.conformance.limit_violation import faults_of
+from rcilab.conformance.limit_violation import LimitViolation, faults_of
 from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.start import StartState
 from rcilab.core.errors import InvalidValueError
@@ -138,3 +138,9 @@ def test_a_command_of_too_few_joints_is_never_judged_by_those_that_are_there() -
     monitor = JointMonitor(load_model("xMatePro7").limits.joint, RCI_JOINT_CONDITIONS)
     with pytest.raises(ValueError, match="longer"):
         monitor.step([0.0] * 6)
+
+
+def test_a_value_just_past_its_bound_is_written_with_the_digits_that_differ():
+    row = RCI_JOINT_CONDITIONS[0]
+    text = LimitViolation(row, 6, 2.09439511, 2.0943951).text
+    assert text.endswith("2.09439511 rad passes 2.0943951 rad"), text

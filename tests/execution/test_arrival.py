@@ -93,6 +93,23 @@ def test_a_tool_that_passes_a_face_of_its_box_is_told_which_and_how_far(mode):
             robot.control(callback, mode)
 
 
+def test_a_tool_that_began_beyond_one_face_is_told_the_other_face_that_it_passed():
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        T = robot.state.T_base_tool_c
+        below = Pose(T.position - [0.0, 0.0, 0.15])
+        robot.set_safety_box(SafetyBox(size=(0.2, 0.2, 0.2), T_base_box=below))
+
+        def callback(state, t):
+            share = min(t, 1.0)
+            smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+            return CartesianPosition(Pose([0.0, 0.12 * smooth, 0.0]) @ T)
+
+        with pytest.raises(ControlError, match=r"past the \+y face of the safety box") as caught:
+            robot.control(callback, "cartesian_position")
+        assert "+z face" not in str(caught.value)
+
+
 def test_limits_that_another_session_has_narrowed_are_guessed_from_the_fault():
     joint = MODEL.limits.joint
     upper = joint.upper.copy()

@@ -203,3 +203,9 @@ def test_names_will_do_for_enumerations(make_robot, name):
     robot.rci.set_fc_coor(Pose(), "path")
     assert peer.requests[-2] == rci.StartDrag(rci.DragSpace[name.upper()], rci.DragType.ROTATION)
     assert peer.requests[-1].type == rci.ForceFrame.PATH
+
+
+def test_completion_finds_the_commands_of_the_protocol(make_robot):
+    _, robot = make_robot(Script())
+    assert "rci" in dir(robot)
+    assert robot.rci.n == robot.n

@@ -15,7 +15,7 @@ from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
-from rcilab.core.safety_box import SafetyBox
+from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae.conditions import RCI_MEASURED_CONDITIONS
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
@@ -81,15 +81,22 @@ def describe_measured(
 
 
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
-    """Returns which face of the safety box the tool passed, and how far; "" where that is not known."""
+    """Returns which face of the safety box the tool passed, and how far; "" where that is not known.
+
+    A face that the tool was beyond at the first of these cycles counts only as far as the tool moved farther out.
+    """
     if box is None or not BOX_FAULTS & set(faults) or not len(record):
         return ""
-    measured = record["T_base_tool"][:, :3, 3]
-    sent = record["command_pose"][:, :3, 3]
-    places = [place for place in (*sent, *measured) if np.isfinite(place).all()]
-    if not places:
+    passed = []
+    for field in ("command_pose", "T_base_tool"):
+        path = record[field][:, :3, 3]
+        places = path[np.isfinite(path).all(axis=1)].tolist()
+        if places:
+            entered = EntryBox(box, places[0])
+            passed += map(entered.passed_face, places)
+    if not passed:
         return ""
-    face, beyond = max((box.passed_face(place) for place in places), key=lambda passed: passed[1])
+    _, face, beyond = max(passed)
     return f"the tool came {1e3 * max(beyond, 0.0):.1f} mm past the {face} face of the safety box"
 
 
