@@ -44,7 +44,7 @@ def test_soft_limits_of_the_model_reach_the_controller_and_can_be_widened():
     upper[0] = 0.3
     with simulate(MODEL.with_joint_limits(joint.lower, upper)) as robot:
         robot.power_on()
-        with pytest.raises(ControlError, match=r"kCommandJointPosition.*power_off\(\) and power_on\(\)") as caught:
+        with pytest.raises(ControlError, match=r"kCommandJointPosition.*switch the power off and on") as caught:
             robot.control(lambda state, t: JointPosition(state.q_c + 2e-4 * np.eye(7)[0] * min(t / 0.2, 1.0)))
         assert "recover()" not in str(caught.value)
         robot.power_off()
