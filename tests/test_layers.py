@@ -66,6 +66,8 @@ LATE_TARGETS = {  # What a function may import, and why not the module.
 LATE_PARTS = {"cli": "a command loads what it needs and not what the others do"}
 LATE_FILES = re.compile(r"rcilab\.makers\.\w+\.maker")
 """A maker is cheap to import: its codec, controller and driver are loaded by the methods that need them."""
+NAMES_A_MAKER = {"rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI"}
+"""Modules outside `makers` that import a maker's folder, and why."""
 LATE_LEFT = {"app": 8, "execution": 3, "notebook": 7}
 """Function-level imports of rcilab that are still to go, a part: a smaller number here with each that goes."""
 CIRCLES_LEFT: set[tuple[str, ...]] = set()
@@ -143,6 +145,19 @@ def test_imports_go_down_only_and_heavy_libraries_stay_fenced(path: Path) -> Non
             assert other == own or HEIGHT[other] < HEIGHT[own], f"{place} imports {module}, which is not below it"
         fence = FENCES.get(library)
         assert fence is None or place.startswith(fence), f"{place} imports {library}, fenced to {', '.join(fence)}"
+
+
+def test_nothing_outside_the_makers_imports_one() -> None:
+    folders = {f"rcilab.makers.{path.parent.name}" for path in (ROOT / "rcilab/makers").glob("*/maker.py")}
+    assert folders >= {"rcilab.makers.rokae", "rcilab.makers.franka"}
+    found = {
+        name_of(path)
+        for path in MODULES
+        if part_of(name_of(path)) != "makers"
+        for module in imports(path)
+        if ".".join(module.split(".")[:3]) in folders
+    }
+    assert found == NAMES_A_MAKER.keys()
 
 
 def test_the_application_layer_loads_no_user_interface() -> None:

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Prints every finding as it is found; returns 1 when something does not work, else 0."""
     from rcilab.diagnostics.doctor.run_checks import examine
     from rcilab.diagnostics.doctor.system import System
-    from rcilab.makers.rokae.driver.address import parse_address
+    from rcilab.makers.driver import parse_address
 
     if not 0.0 <= args.seconds <= LONGEST:
         raise InvalidValueError("--seconds", args.seconds, f"must be from 0 to {LONGEST:g} s")

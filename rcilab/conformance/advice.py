@@ -9,15 +9,6 @@ from rcilab.core.condition import Condition, Signal
 from rcilab.motion.motion import Motion, TimeLaw
 
 
-def amount(value: float, bound: float, least: int = 4) -> tuple[str, str]:
-    """Returns value and bound with as few digits, from `least` on, as show that they differ."""
-    for digits in range(least, 17):
-        texts = f"{value:.{digits}g}", f"{bound:.{digits}g}"
-        if texts[0] != texts[1] or value == bound:
-            return texts
-    return repr(value), repr(bound)
-
-
 def share(ratio: float) -> str:
     """Returns how much of a bound is used: in percent, or as a factor far beyond it."""
     return f"{100.0 * ratio:.1f} %" if ratio < 10.0 else f"{ratio:.0f} x"

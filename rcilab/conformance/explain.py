@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING
 
-from rcilab.conformance.advice import amount, with_degrees
+from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
+from rcilab.i18n.rounding import amount
 from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from rcilab.conformance.advice import amount
 from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition
 from rcilab.core.fault import FaultCode
+from rcilab.i18n.rounding import amount
 from rcilab.i18n.translator import Remark
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from rcilab.conformance.advice import amount, share, with_degrees
+from rcilab.conformance.advice import share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
 from rcilab.conformance.explain import LISTED, explain_report, explain_violation
@@ -18,6 +18,7 @@ from rcilab.core.condition import Condition, Necessity
 from rcilab.core.errors import ConformanceError
 from rcilab.core.fault import FaultCode
 from rcilab.i18n.localized_text import language as notebook_language
+from rcilab.i18n.rounding import amount
 from rcilab.i18n.units import Units
 from rcilab.motion.motion import Motion
 

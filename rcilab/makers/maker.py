@@ -37,6 +37,8 @@ class Capabilities:
     """Whether there is a virtual controller."""
     drives: bool = False
     """Whether there is a driver for the real controller."""
+    longest_tool: float = 2.0
+    """Farthest that tool, force-control frame and the load's centre of mass may be from the flange, [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,6 +162,12 @@ def all_makers() -> tuple[Maker, ...]:
 def maker_of(model: RobotModel) -> Maker | None:
     """Returns the maker of an arm; None for an arm without a maker."""
     return next((maker for maker in all_makers() if maker.name == model.description.maker), None)
+
+
+def capabilities_of(model: RobotModel) -> Capabilities:
+    """Returns what can be done with an arm; with one without a maker, nothing but computing."""
+    maker = maker_of(model)
+    return Capabilities() if maker is None else maker.capabilities
 
 
 def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:

@@ -4,10 +4,10 @@ import re
 import numpy as np
 import pytest
 
-from rcilab.conformance.advice import amount
 from rcilab.conformance.check import check
 from rcilab.conformance.html import COLORS
 from rcilab.conformance.report import Report
+from rcilab.i18n.rounding import amount
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 

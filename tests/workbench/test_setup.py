@@ -307,11 +307,11 @@ def test_after_a_new_connection_the_controller_is_told_again_and_the_page_says_s
 def test_every_number_comes_back_as_it_was_typed():
     setup = SetupState()
     setup = replace(setup, wanted=setup.wanted.updated(RobotConfiguration(tool=Pose((0.1, 0.2, 0.3)))))
-    turned = with_field(setup, "box", "yaw", 30.0)
+    turned = with_field(setup, "box", "yaw", 30.0, 2.0)
     assert isinstance(turned, SetupState)
     for part, names in FIELD_NAMES.items():
         for name in names:
-            changed = with_field(turned, part, name, 20.0)
+            changed = with_field(turned, part, name, 20.0, 2.0)
             assert isinstance(changed, SetupState), (part, name)
             assert read_field(changed, part, name) == pytest.approx(20.0), (part, name)
 

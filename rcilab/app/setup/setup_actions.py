@@ -43,6 +43,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
 from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
+from rcilab.makers.maker import capabilities_of
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
@@ -147,13 +148,14 @@ class SetupActions:
         if name not in FIELD_NAMES.get(part, ()):
             return
         state = self._store.state
-        bounds = field_range(part, name, state.model.description.rated_payload)
+        longest = capabilities_of(state.model).longest_tool
+        bounds = field_range(part, name, state.model.description.rated_payload, longest)
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
             self._store.complain(request.field, parsed.problem)
             return
-        changed = with_field(state.setup, part, name, parsed.value)
+        changed = with_field(state.setup, part, name, parsed.value, longest)
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
             self._store.update(setup=changed)  # The moments stand as typed, also while no body has them yet.
             changed = with_inertia(changed)
@@ -210,7 +212,8 @@ class SetupActions:
             return  # A drag that ends after its edit, or nothing of ours.
         if math.hypot(*request.wxyz) < 1e-6:
             return
-        changed = with_pose(self._store.state.setup, request.part, Pose(request.position, request.wxyz))
+        state, pose = self._store.state, Pose(request.position, request.wxyz)
+        changed = with_pose(state.setup, request.part, pose, capabilities_of(state.model).longest_tool)
         if isinstance(changed, Message):
             self._store.say("warn", changed)
         else:

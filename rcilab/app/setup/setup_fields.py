@@ -13,7 +13,6 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.rokae.wire.bounds import LONGEST_TOOL
 from rcilab.model.dynamics.payload import Payload
 
 POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -43,13 +42,14 @@ class Range:
     unit: str
 
 
-def field_range(part: str, name: str, rated_payload: float) -> Range:
+def field_range(part: str, name: str, rated_payload: float, longest_tool: float) -> Range:
     """Returns the range of a field, in the unit of the field.
 
     Args:
         part: A key of `FIELD_NAMES`.
         name: One of its names.
         rated_payload: Of the arm, [kg].
+        longest_tool: See `Capabilities.longest_tool`, [m].
     """
     if name in POSE_NAMES[3:]:
         return Range(-360.0, 360.0, "deg")
@@ -57,7 +57,7 @@ def field_range(part: str, name: str, rated_payload: float) -> Range:
         return Range(0.0, rated_payload, "kg")
     if name in INERTIA_NAMES:
         return Range(0.0 if name in INERTIA_NAMES[:3] else -_LARGEST_INERTIA, _LARGEST_INERTIA, "kg·m²")
-    farthest = 1000.0 * (FARTHEST_FACE if part == "box" else LONGEST_TOOL)
+    farthest = 1000.0 * (FARTHEST_FACE if part == "box" else longest_tool)
     return Range(-farthest, farthest, "mm")
 
 
@@ -81,7 +81,7 @@ def read_field(setup: SetupState, part: str, name: str) -> float:
     return 1000.0 * float(pose.position[index]) if index < 3 else math.degrees(float(pose.rpy[index - 3]))
 
 
-def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupState | Message:
+def with_field(setup: SetupState, part: str, name: str, value: float, longest_tool: float) -> SetupState | Message:
     """Returns the configuration with one number changed, or what is wrong with it.
 
     Args:
@@ -89,6 +89,7 @@ def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupSt
         part: A key of `FIELD_NAMES`.
         name: One of its names.
         value: In the unit of the field.
+        longest_tool: See `Capabilities.longest_tool`, [m].
     """
     wanted = setup.wanted
     assert wanted.box is not None
@@ -107,18 +108,18 @@ def with_field(setup: SetupState, part: str, name: str, value: float) -> SetupSt
         box = wanted.box
         return _with(setup, box=replace(box, T_base_box=_turned(box.T_base_box, name, value)))
     if part == "tool":
-        return with_pose(setup, "tool", _turned(wanted.tool, name, value))
+        return with_pose(setup, "tool", _turned(wanted.tool, name, value), longest_tool)
     if part == "force":
-        return with_pose(setup, "force", _turned(wanted.force.T_flange_force, name, value))
+        return with_pose(setup, "force", _turned(wanted.force.T_flange_force, name, value), longest_tool)
     return _with_load_field(setup, wanted.load, name, value)
 
 
-def with_pose(setup: SetupState, part: str, pose: Pose) -> SetupState | Message:
+def with_pose(setup: SetupState, part: str, pose: Pose, longest_tool: float) -> SetupState | Message:
     """Returns the configuration with a part moved, or why it cannot be there."""
     wanted = setup.wanted
     length = math.hypot(*pose.parts[1])
-    if part != "box" and length > LONGEST_TOOL:
-        return message("setup.far", length=length, bound=LONGEST_TOOL)
+    if part != "box" and length > longest_tool:
+        return message("setup.far", length=length, bound=longest_tool)
     if part == "box":
         assert wanted.box is not None
         if float(np.abs(pose.position).max()) > FARTHEST_FACE:

@@ -17,7 +17,6 @@ from rcilab.core.errors import UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.diagnostics.bench.fastest import fastest_straight, slowest_alone
 from rcilab.diagnostics.bench.measure import Measurement, cost_by_length, summarise, time_calls
-from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion.joint import plan_joint
@@ -171,8 +170,9 @@ def bench_check_full() -> Measurement:
 def bench_check_joint_rows() -> Measurement:
     """The check of a 7-joint motion of 10 s by the conditions on joint angles alone."""
     model = load_model(_ROBOT)
+    assert model.description.conditions is not None
     check_again = check(motion_of(model, 1.0), model, distance=None).check_again
-    rows = tuple(row for row in RCI_CONDITIONS.motion if row.signal == "joint")
+    rows = tuple(row for row in model.description.conditions().motion if row.signal == "joint")
     return _bench_check("check_joint_rows", lambda motion: check_again(motion, rows), model, 5.0)
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from rcilab.core.errors import ConnectionLostError
 from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.doctor.system import System
-from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
-from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
+from rcilab.makers.driver import RobotAddress
+from rcilab.makers.network import RECEIVE_BUFFER, HostRoute, find_route
 from rcilab.realtime.scheduling import PRIORITY
 
 _POLICIES = {"0": "SCHED_OTHER", "1": "SCHED_FIFO", "2": "SCHED_RR", "3": "SCHED_BATCH", "5": "SCHED_IDLE"}
@@ -58,15 +58,15 @@ def check_softirq(system: System) -> Finding:
     return Finding(name, "note", f"{found}: packets can wait behind SCHED_FIFO loops", advice)
 
 
-def check_route(address: RciAddress, system: System) -> tuple[Finding, Route | None]:
+def check_route(address: RobotAddress, system: System) -> tuple[Finding, HostRoute | None]:
     """Does a cable lead from here to the robot, without anything in between? The route goes with the answer."""
     name = "route"
     try:
-        route = choose_route(address)
+        route = find_route(address)
     except ConnectionLostError as error:
         advice = f"give this computer an address in its network: sudo ip addr add {_OWN_ADDRESS} dev INTERFACE"
         return Finding(name, "bad", str(error), f"{advice} (RCI manual 2.5)"), None
-    host, local = route.robot_tcp[0], route.local_tcp[0]
+    host, local = route.host, route.local
     if is_here(route):
         return Finding(name, "ok", f"{local} to {host}, on this machine"), route
     way = find_way(host, system)
@@ -86,10 +86,9 @@ def check_route(address: RciAddress, system: System) -> tuple[Finding, Route | N
     return Finding(name, "ok", found + (f", {speed} Mbit/s" if speed.isdecimal() else "")), route
 
 
-def is_here(route: Route) -> bool:
+def is_here(route: HostRoute) -> bool:
     """Returns whether the robot is a virtual one on this machine."""
-    host = route.robot_tcp[0]
-    return ipaddress.ip_address(host).is_loopback or host == route.local_tcp[0]
+    return ipaddress.ip_address(route.host).is_loopback or route.host == route.local
 
 
 def find_way(host: str, system: System) -> NetworkRoute | None:

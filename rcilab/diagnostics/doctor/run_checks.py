@@ -12,13 +12,13 @@ from rcilab.diagnostics.doctor.jitter import check_jitter
 from rcilab.diagnostics.doctor.round_trip import check_controller, check_round_trip
 from rcilab.diagnostics.doctor.system import System
 from rcilab.diagnostics.host import BROWSERS, probe_realtime
-from rcilab.makers.rokae.driver.address import RciAddress
+from rcilab.makers.driver import RobotAddress
 
 
 def examine(
     system: System,
     *,
-    robot: RciAddress | None = None,
+    robot: RobotAddress | None = None,
     seconds: float = 0.0,
     progress: Callable[[float, float], None] = lambda spent, worst: None,
 ) -> Iterator[Finding]:
@@ -57,7 +57,7 @@ def examine(
         yield finding
         if route is not None:
             is_for_real = not network.is_here(route)
-            yield check_controller(route.robot_tcp, is_here=not is_for_real)
-            yield check_round_trip(route.robot_tcp[0])
+            yield check_controller((route.host, robot.port), is_here=not is_for_real)
+            yield check_round_trip(route.host)
     if seconds > 0.0:
         yield check_jitter(seconds, system, progress, is_for_real=is_for_real)

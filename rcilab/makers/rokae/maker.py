@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
 from rcilab.makers.maker import Capabilities, Timing
+from rcilab.makers.rokae.bounds import LONGEST_TOOL
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.robots import ROBOTS
@@ -30,7 +31,7 @@ class Rokae:
     interface = "the RCI"
     scheme = "rci"
     robots = ROBOTS
-    capabilities = Capabilities(simulates=True, drives=True)
+    capabilities = Capabilities(simulates=True, drives=True, longest_tool=LONGEST_TOOL)
     timing = Timing()
 
     def conditions(self) -> ConditionTable:

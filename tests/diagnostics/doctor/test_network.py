@@ -7,8 +7,8 @@ import pytest
 from rcilab.diagnostics.doctor import network
 from rcilab.diagnostics.doctor.network import NetworkRoute
 from rcilab.diagnostics.doctor.system import System
-from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.transport import RECEIVE_BUFFER
+from rcilab.makers.driver import parse_address
+from rcilab.makers.network import RECEIVE_BUFFER, HostRoute
 
 ROUTES = """\
 Iface\tDestination\tGateway \tFlags\tRefCnt\tUse\tMetric\tMask\t\tMTU\tWindow\tIRTT
@@ -95,10 +95,8 @@ FAR = parse_address("rci://192.0.2.77:1337")  # Reserved for documentation: no m
     ],
 )
 def test_a_way_without_detours_is_good(tree, monkeypatch, routes, extra, verdict, said) -> None:
-    from rcilab.makers.rokae.driver.address import Route
-
-    ends = Route(("192.0.2.77", 1337), ("192.0.2.77", 1337), ("192.0.2.22", 0), ("192.0.2.22", 1337))
-    monkeypatch.setattr(network, "choose_route", lambda address: ends)
+    ends = HostRoute("192.0.2.77", "192.0.2.22")
+    monkeypatch.setattr(network, "find_route", lambda address: ends)
     finding, route = network.check_route(FAR, tree({"/proc/net/route": f"Iface ...\n{routes}\n", **extra}))
     assert route == ends
     assert finding.verdict == verdict

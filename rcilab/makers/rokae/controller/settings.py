@@ -17,7 +17,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.wire.bounds import (
+from rcilab.makers.rokae.bounds import (
     FARTHEST_BOX,
     FILTER_OFF,
     LARGEST_BOX,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import socket
 from dataclasses import dataclass
 from ipaddress import AddressValueError, IPv4Address
 from urllib.parse import parse_qsl, urlsplit
 
-from rcilab.core.errors import ConnectionLostError, InvalidValueError
+from rcilab.core.errors import InvalidValueError
+from rcilab.makers.network import find_route
 
 DEFAULT_PORT = 1337  # By convention of the manual; the teach pendant's RCI page shows the one in force.
 SPARE_LOOPBACK = "127.0.0.3"
@@ -122,23 +122,8 @@ def choose_route(address: RciAddress) -> Route:
     Raises:
         ConnectionLostError: The host name has no address, or no network of ours leads there.
     """
-    try:
-        host = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0]
-    except OSError as error:
-        raise ConnectionLostError(
-            f"{address}: the host {address.host!r} is not known ({_reason(error)}); "
-            "check its spelling, or write the IP address that the teach pendant's RCI page shows"
-        ).coded("unknown_host", host=address.host) from error
-    host = str(host)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect((host, address.port))  # Sends nothing: asks the kernel which source address it would use.
-            local = str(probe.getsockname()[0])
-        except OSError as error:
-            raise ConnectionLostError(
-                f"{address}: no network of this computer leads to {host} ({_reason(error)}); check the cable and "
-                "that this computer has an address in the robot's network"
-            ).coded("no_network", host=host) from error
+    route = find_route(address)
+    host, local = route.host, route.local
     if local == host and address.state_port == address.command_port:
         local = SPARE_LOOPBACK
     return Route(
@@ -171,7 +156,3 @@ def _port(text: str, name: str, value: str) -> int:
     if not value.isdecimal() or not 1 <= int(value) <= 65535:
         raise InvalidValueError("address", text, f"has {name} {value!r}, needs a number from 1 to 65535")
     return int(value)
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)

@@ -19,9 +19,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.rokae import wire as rci
-from rcilab.makers.rokae.driver.connection import RciConnection
-from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
-from rcilab.makers.rokae.wire.bounds import (
+from rcilab.makers.rokae.bounds import (
     FARTHEST_BOX,
     FILTER_OFF,
     LARGEST_BOX,
@@ -29,6 +27,8 @@ from rcilab.makers.rokae.wire.bounds import (
     LONGEST_TOOL,
     LOWEST_FREQUENCY,
 )
+from rcilab.makers.rokae.driver.connection import RciConnection
+from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
 from rcilab.model.dynamics.payload import Payload
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")

@@ -10,10 +10,10 @@ from contextlib import suppress
 from typing import Protocol
 
 from rcilab.core.errors import ConnectionLostError, DecodeError
+from rcilab.makers.network import RECEIVE_BUFFER
 from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import FrameReader
 
-RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
 _LARGEST = 2048  # [bytes] More than any datagram of the RCI.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call: more than the buffer holds of states, and no flood keeps the caller.
 _MS = 1000.0

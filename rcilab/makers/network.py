@@ -1,0 +1,52 @@
+"""How a controller's host is reached from here; the same for every maker's driver."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rcilab.core.errors import ConnectionLostError
+
+if TYPE_CHECKING:
+    from rcilab.makers.driver import RobotAddress
+
+RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
+
+
+@dataclass(frozen=True, slots=True)
+class HostRoute:
+    """The two ends of the way to a controller, as IPv4 addresses."""
+
+    host: str
+    local: str
+    """Our address that the kernel uses towards the host."""
+
+
+def find_route(address: RobotAddress) -> HostRoute:
+    """Returns which addresses a connection to a controller has; nothing is sent but a question for its name.
+
+    Raises:
+        ConnectionLostError: The host name has no address, or no network of ours leads there.
+    """
+    try:
+        found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)[0][4][0]
+    except OSError as error:
+        raise ConnectionLostError(
+            f"{address}: the host {address.host!r} is not known ({_reason(error)}); "
+            "check its spelling, or write the IP address that the teach pendant's RCI page shows"
+        ).coded("unknown_host", host=address.host) from error
+    host = str(found)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((host, address.port))  # Sends nothing: asks the kernel which source address it would use.
+            return HostRoute(host, str(probe.getsockname()[0]))
+        except OSError as error:
+            raise ConnectionLostError(
+                f"{address}: no network of this computer leads to {host} ({_reason(error)}); check the cable and "
+                "that this computer has an address in the robot's network"
+            ).coded("no_network", host=host) from error
+
+
+def _reason(error: OSError) -> str:
+    return error.strerror or str(error)
