@@ -347,7 +347,7 @@ class Report:
             if worst.condition.is_clearance:
                 near = f"{worst.place}, {worst.value:.4g} m apart"
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
-            return f"conforms{advice}; nearest: {near}"
+            return f"conforms{advice}; nearest necessary bound: {near}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
         names = ", ".join(dict.fromkeys(row.fault.manual_name for row in broken if row.fault is not None))
         outcome = f"the robot would stop with {names}" if names else "the robot would not notice before it hits"

@@ -58,7 +58,7 @@ def test_rows_name_joint_time_value_bound_and_source():
 
 def test_the_text_says_the_verdict_and_lists_every_condition():
     good, bad = check(GOOD, MODEL), check(spoiled(), MODEL)
-    assert "conforms; nearest: " in str(good)
+    assert "conforms; nearest necessary bound: " in str(good)
     assert "does not conform" in str(bad)
     assert "kCommandJointAccelerationDiscontinuity" in str(bad)
     assert all(row.id in str(good) for row in good.rows)
