@@ -32,6 +32,15 @@ class CommitField(Request):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DropProblem(Request):
+    """The field that a problem stands beside does not show any more what it is about."""
+
+    needs_control: ClassVar[bool] = False
+    field: str
+    """As in `TypeField`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DrawInSoftware(Request):
     """The browser has no graphics card to draw with."""
 
@@ -92,6 +101,7 @@ class ViewActions:
         """What it does for each of its requests."""
         return {
             CommitField: self.enter,
+            DropProblem: lambda request: self._store.clear_problems(request.field),
             DrawInSoftware: self.draw_in_software,
             Seek: self.seek,
             Play: self.play,

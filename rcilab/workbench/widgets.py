@@ -13,6 +13,7 @@ import numpy as np
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.request import Request, TypeField
 from rcilab.app.text import Message
+from rcilab.app.view_actions import DropProblem
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import fixed
 from rcilab.i18n.units import Unit
@@ -89,6 +90,10 @@ class NumberField:
         self._typed: tuple[float, str, int | None, str] | None = None
         self._committed, self._stands_for = float("-inf"), _STANDS
         self._answer: str | None = None  # What the state made of it.
+        self._is_typed = False  # Whether what stands here is as it was typed.
+        self._shown: str | None = None  # The field that it was shown for last.
+        self._problem: Message | None = None
+        self._beside: str | None = None  # The state's number when the problem came; None: it came elsewhere.
 
         @handle.on_update
         async def _(event: Any) -> None:
@@ -100,7 +105,7 @@ class NumberField:
 
         Args:
             text: The state's number as it is to be shown, in degrees or millimetres where it has a unit of the page.
-            problem: What is wrong with the typed number; it is then left as it is.
+            problem: What is wrong with the typed number; it is then left as it is, until the state's number changes.
             entered: When a page last said that what is typed in it is complete, `UiState.entered`.
         """
         typed = self._typed
@@ -111,11 +116,26 @@ class NumberField:
             self._stands_for = _ENTERED if is_entered else _STANDS
             self._committed = time.monotonic() if is_shown else float("-inf")
             self._typed, self._answer = None, None
+            if is_shown:
+                self._is_typed, self._shown = True, self.field
             self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
             return
         said = self._unit.convert(text)
-        if problem is None and not self._stands(said) and self._handle.value != said:
+        if problem is not None and not self._is_about(problem, said):
+            self._ask(DropProblem(field=self.field))
+        elif self._is_typed and (problem is not None or self._stands(said)):
+            return
+        self._is_typed, self._shown = False, self.field
+        if problem is None:
+            self._problem = None
+        if self._handle.value != said:
             self._handle.value = said
+
+    def _is_about(self, problem: Message, said: str) -> bool:
+        """Returns whether a problem came while the field showed this number, or what was typed in its place."""
+        if problem != self._problem:
+            self._problem, self._beside = problem, said if self._shown == self.field else None
+        return self._shown == self.field and said == self._beside
 
     def _stands(self, said: str) -> bool:
         """Returns whether what was typed is left as it is: the answer is on its way, or has not changed since."""

@@ -11,6 +11,7 @@ import pytest
 
 from rcilab.app.request import Request, TypeField
 from rcilab.app.text import message
+from rcilab.app.view_actions import DropProblem
 from rcilab.workbench import widgets
 from rcilab.workbench.widgets import BoundControl, NumberField
 
@@ -104,6 +105,65 @@ def test_what_is_wrong_is_left_as_it_is(now: SimpleNamespace) -> None:
         now.time += 0.1
         field.show("30.00", message("number.not_a_number", typed="abc"))
     assert box.value == "abc"
+
+
+WRONG = message("number.not_a_number", typed="abc")
+
+
+def refused(now: SimpleNamespace) -> tuple[Box, NumberField, list[Request]]:
+    box, field, asked = make()
+    box.type("")
+    for seconds, problem in ((0.8, None), (0.3, WRONG), (5.0, WRONG)):
+        now.time += seconds
+        field.show("30.00", problem)
+    assert box.value == ""
+    asked.clear()
+    return box, field, asked
+
+
+def test_what_is_wrong_goes_when_the_number_changes_from_elsewhere(now: SimpleNamespace) -> None:
+    box, field, asked = refused(now)
+    field.show("31.00", WRONG)  # A jog.
+    assert box.value == "31.00"
+    assert asked == [DropProblem(field="joint.1")]
+
+
+def test_what_is_wrong_stands_while_it_has_not_changed_and_a_second_mistake_too(now: SimpleNamespace) -> None:
+    box, field, asked = refused(now)
+    box.type("x")
+    now.time += 0.8
+    field.show("30.00", WRONG)
+    for _ in range(20):
+        now.time += 0.5
+        field.show("30.00", message("number.not_a_number", typed="x"))
+    assert box.value == "x"
+    assert [type(request) for request in asked] == [TypeField]
+
+
+def test_a_field_built_anew_beside_a_problem_shows_the_number(now: SimpleNamespace) -> None:
+    box, field, asked = make()
+    field.show("30.00", WRONG)  # The page in another language.
+    assert box.value == "30.00"
+    assert asked == [DropProblem(field="joint.1")]
+
+
+def test_what_is_wrong_with_a_number_that_was_not_typed_stands_too(now: SimpleNamespace) -> None:
+    box, field, asked = make()
+    field.show("30.00", None)
+    for _ in range(3):
+        field.show("31.00", WRONG)  # What was typed in another field does not go with it.
+    assert box.value == "31.00"
+    assert asked == []
+
+
+def test_a_field_that_was_exchanged_meanwhile_shows_the_number(now: SimpleNamespace) -> None:
+    box, field, asked = refused(now)
+    field.field = "joint.2"
+    field.show("55.00", None)
+    field.field = "joint.1"
+    field.show("30.00", WRONG)
+    assert box.value == "30.00"
+    assert asked == [DropProblem(field="joint.1")]
 
 
 def test_a_field_that_becomes_another_ones_shows_that_one_at_once(now: SimpleNamespace) -> None:
