@@ -77,7 +77,7 @@ class Camera:
 
     def __init__(self, bench: Workbench, tab: Page) -> None:
         self.bench, self.tab = bench, tab
-        self.ask = bench.conductor.ask
+        self.ask = bench.dispatcher.ask
         self.frames: list[Image.Image] = []
         self.times: list[int] = []
         self.hand = (690.0, 700.0)

@@ -50,7 +50,7 @@ def looks_of(state: UiState) -> dict[Look, str]:
     return {name: value for name, value in looks.items() if value != _AT_FIRST[name]}
 
 
-def keepsake_file(port: int) -> Path:
+def autosave_file(port: int) -> Path:
     """Returns where the workbench at a port keeps it: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
     home = os.environ.get("XDG_STATE_HOME", "")
     folder = Path(home) if os.path.isabs(home) else Path.home() / ".local" / "state"
@@ -60,7 +60,7 @@ def keepsake_file(port: int) -> Path:
 class Autosave:
     """Writes down how the page looks, and goal, program and configuration of every arm, when they have changed.
 
-    Owned by the conductor's thread.
+    Owned by the dispatcher's thread.
 
     This file was not asked for, so where it cannot be written or read it is left out silently.
 

@@ -1,4 +1,4 @@
-"""Pages that come, go, fall silent and ask for the controls. Owned by the conductor's thread."""
+"""Pages that come, go, fall silent and ask for the controls. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 

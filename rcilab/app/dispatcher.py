@@ -50,7 +50,7 @@ class Dispatcher:
         store: The state.
         session: The robot side.
         deliver: Sends a file to a page.
-        keepsake: Where goal and program are written down for the case of a crash; None: nowhere.
+        autosave: Where goal and program are written down for the case of a crash; None: nowhere.
         presence: When pages were last heard of.
     """
 
@@ -59,11 +59,11 @@ class Dispatcher:
         store: Store,
         session: RobotConnection,
         deliver: Deliver = lambda page, name, stream, is_unwanted: True,
-        keepsake: Autosave | None = None,
+        autosave: Autosave | None = None,
         presence: ClientHeartbeat | None = None,
     ) -> None:
         self._store, self._session = store, session
-        self._keepsake = keepsake or Autosave(None)
+        self._autosave = autosave or Autosave(None)
         self._goal = GoalActions(store, session)
         self.robot = RunActions(store, session)
         self._mode = ModeActions(store, session)
@@ -109,20 +109,20 @@ class Dispatcher:
         Args:
             language: The one that was asked for this time; None is the one that was chosen last.
         """
-        kept = self._keepsake.recall(self._store.state.model)
-        for name, value in self._keepsake.recall_looks().items():
+        kept = self._autosave.recall(self._store.state.model)
+        for name, value in self._autosave.recall_looks().items():
             if name != "language" or language is None:
                 self._view.set_view(SetView(page=None, name=name, value=value))
         if kept is not None:
             self._guard(lambda: self._resume(kept))
-        for name, setup in self._keepsake.recall_setups(self._store.state.model).items():
+        for name, setup in self._autosave.recall_setups(self._store.state.model).items():
             self.robot.remember_setup(name, setup)
-        for program in self._keepsake.recall_programs(self._store.state.model):
+        for program in self._autosave.recall_programs(self._store.state.model):
             self._program.lay_aside(program)
 
     def start(self) -> None:
         """Starts the thread."""
-        thread = threading.Thread(target=self._run, name="conductor", daemon=True)
+        thread = threading.Thread(target=self._run, name="dispatcher", daemon=True)
         thread.start()
         self._thread = thread
 
@@ -140,7 +140,7 @@ class Dispatcher:
         self._scene.close()
         self.robot.close()
         self._export.close()
-        self._keepsake.close(self._store.state)
+        self._autosave.close(self._store.state)
 
     def act(self, request: Request) -> None:
         """Carries out one request; what goes wrong becomes a sentence on the page."""
@@ -179,7 +179,7 @@ class Dispatcher:
         self._check.tick()
         self._learn.tick()
         self._scene.tick()
-        self._keepsake.keep(self._store.state)
+        self._autosave.keep(self._store.state)
 
     def _resume(self, kept: SavedState) -> None:
         back: list[str] = [] if kept.program is None else ["program"]

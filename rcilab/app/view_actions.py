@@ -1,4 +1,4 @@
-"""What only changes how the page looks. Owned by the conductor's thread."""
+"""What only changes how the page looks. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 

@@ -30,26 +30,26 @@ class ConfigurationSync:
         self._waiting: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
         self._refusal: RcilabError | None = None
 
-    def follow(self, ticket: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
+    def follow(self, request: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
         """Takes note of a request that carries a configuration.
 
         Args:
-            ticket: The request.
+            request: The request.
             setup: What it carries.
             is_new_connection: Whether it begins a connection: what the controller had before is then not known.
         """
         self.wanted = self.wanted.updated(setup)
-        self._waiting.append((ticket, setup, is_new_connection))
+        self._waiting.append((request, setup, is_new_connection))
         self._refusal = None
 
     def look(self) -> None:
         """Takes note of the answers, as far as there are any."""
         while self._waiting and self._waiting[0][0].done:
-            ticket, setup, is_new_connection = self._waiting.pop(0)
+            request, setup, is_new_connection = self._waiting.pop(0)
             if is_new_connection:
                 self.acknowledged = RobotConfiguration()
-            if ticket.error is not None:
-                self._refusal = ticket.error
+            if request.error is not None:
+                self._refusal = request.error
                 # It may have taken some of it: which of these parts it has now is unknown.
                 self.acknowledged = self.acknowledged.without(setup.parts)
                 continue

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING
 from urllib.parse import quote
 
-from rcilab.app.autosave import Autosave, keepsake_file
+from rcilab.app.autosave import Autosave, autosave_file
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, Refuse, TakeControls
@@ -100,9 +100,9 @@ class Workbench:
         self.store = Store(replace(state, runs=config.runs))
         self.session = RobotConnection(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
         is_own = config.port and replay is None  # A free port is not reused, and a replay only shows a run.
-        keepsake = Autosave(keepsake_file(self.port) if is_own else None)
+        autosave = Autosave(autosave_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()
-        self.conductor = Dispatcher(self.store, self.session, self._deliver, keepsake, self._presence)
+        self.dispatcher = Dispatcher(self.store, self.session, self._deliver, autosave, self._presence)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
@@ -117,7 +117,7 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
-        ask = self.conductor.ask
+        ask = self.dispatcher.ask
         self.live = live.LiveChannel(self.session.stop, self._receive, lambda: self._door.guard.count_malformed())
         gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
         self._door = GuardedServer(
@@ -132,12 +132,12 @@ class Workbench:
         self._opened = True
         self._follow_pages()
         if self._config.replay is None:
-            self.conductor.resume(language=self._config.language)
-        self.presenter = Renderer(self.server, self.store, self.session, self.live, ask)
-        self.presenter.start()
-        self.conductor.start()
+            self.dispatcher.resume(language=self._config.language)
+        self.renderer = Renderer(self.server, self.store, self.session, self.live, ask)
+        self.renderer.start()
+        self.dispatcher.start()
         if self._config.replay is None:
-            self.conductor.robot.open(self._config.model, self._config.target)
+            self.dispatcher.robot.open(self._config.model, self._config.target)
         threading.Thread(target=self._beat, name="operator", daemon=True).start()
 
     def close(self) -> None:
@@ -148,9 +148,9 @@ class Workbench:
         if not self._opened:
             self._bound.close()
             return
-        self.conductor.close()
+        self.dispatcher.close()
         self.session.close()
-        self.presenter.close()
+        self.renderer.close()
         self._door.close()
 
     def _deliver(self, page: int | None, name: str, stream: IO[bytes], is_unwanted: Callable[[], bool]) -> bool:
@@ -159,7 +159,7 @@ class Workbench:
         return client is not None and send_file(client, name, stream, is_unwanted)
 
     def _follow_pages(self) -> None:
-        ask = self.conductor.ask
+        ask = self.dispatcher.ask
 
         @self.server.on_client_connect
         async def _(client: viser.ClientHandle) -> None:
@@ -185,14 +185,14 @@ class Workbench:
         else:
             request = self._request_of(page, message)
             if not request.needs_control or self.store.state.lease.allows(page):
-                self.conductor.ask(request)
+                self.dispatcher.ask(request)
             elif not request.is_silent:
                 self._door.guard.refuse(page)
 
     def _request_of(self, page: int, message: live.PageMessage) -> Request:
         match message:
             case live.Seek(place):
-                return Seek(page=page, place=self.presenter.place_at(min(max(place, 0.0), 1.0)))
+                return Seek(page=page, place=self.renderer.place_at(min(max(place, 0.0), 1.0)))
             case live.Size(height):
                 return SetView(page=page, name="height", value=min(max(height, _LOWEST), _HIGHEST))
             case live.Tab(index):

@@ -128,7 +128,7 @@ class Renderer:
     def start(self) -> None:
         """Draws once, then goes on in a thread of its own."""
         self.show()
-        thread = threading.Thread(target=self._run, name="presenter", daemon=True)
+        thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         thread.start()
         self._thread = thread
 

@@ -162,14 +162,14 @@ def test_a_page_that_still_loads_is_waited_for(desk):
 
 def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     """However fast a page without the controls presses."""
-    conductor = Dispatcher(desk.store, desk.robot)
+    dispatcher = Dispatcher(desk.store, desk.robot)
     for page in (1, 2):
-        conductor.act(PageOpened(page=page))
+        dispatcher.act(PageOpened(page=page))
     for number in range(3):
         desk.store.say("bad", message("notice.taken", page=number), page=1)
         for _ in range(100):
-            conductor.act(Seek(page=2, place=0.5))
-            conductor.act(TakeControls(page=2))
+            dispatcher.act(Seek(page=2, place=0.5))
+            dispatcher.act(TakeControls(page=2))
     notices = desk.store.state.notices
     assert [notice.text.values["page"] for notice in notices if notice.page == 1] == [0, 1, 2]
     assert sum(notice.page == 2 for notice in notices) <= 4

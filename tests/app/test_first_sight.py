@@ -32,19 +32,19 @@ class Robot:
 
 def test_a_question_that_is_quicker_than_the_first_look_at_the_arm_stays():
     store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home), target="rci://192.0.2.1:1337"))
-    conductor = Dispatcher(store, Robot())
-    conductor.act(MoveJoint(joint=0, angle=0.1))
-    conductor.act(RobotCommand(what="execute"))
+    dispatcher = Dispatcher(store, Robot())
+    dispatcher.act(MoveJoint(joint=0, angle=0.1))
+    dispatcher.act(RobotCommand(what="execute"))
     asked = describe_move(store.state)
     assert asked is not None
-    conductor.tick(0.03)
+    dispatcher.tick(0.03)
     assert describe_move(store.state) == asked
-    assert conductor.errors == []
+    assert dispatcher.errors == []
 
 
 def test_the_arm_that_is_seen_has_a_goal_planned_that_was_posed_before():
     store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home)))
-    conductor = Dispatcher(store, Robot())
+    dispatcher = Dispatcher(store, Robot())
     store.update(goal=goal_at(MODEL, MODEL.home + 0.1))
-    conductor.tick(0.03)
+    dispatcher.tick(0.03)
     np.testing.assert_array_equal(store.state.plan.motion.goal, MODEL.home + 0.1)

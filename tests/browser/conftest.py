@@ -63,8 +63,8 @@ def bench() -> Iterator[object]:
 
     with Workbench(WorkbenchConfig(port=0, quality="light")) as workbench:
         yield workbench
-        assert workbench.conductor.errors == []
-        assert workbench.presenter.errors == []
+        assert workbench.dispatcher.errors == []
+        assert workbench.renderer.errors == []
 
 
 @pytest.fixture(scope="package")
@@ -98,5 +98,5 @@ def page(opened) -> Iterator[BenchPage]:
     opened.start_afresh()
     yield opened
     assert opened.problems == [], f"the page's own script failed: {opened.problems}"
-    assert opened.bench.conductor.errors == []
-    assert opened.bench.presenter.errors == []
+    assert opened.bench.dispatcher.errors == []
+    assert opened.bench.renderer.errors == []

@@ -63,7 +63,7 @@ class BenchPage:
 
     def start_afresh(self) -> None:
         """Puts robot and settings into the state a test starts from, past the page."""
-        ask = self.bench.conductor.ask
+        ask = self.bench.dispatcher.ask
         if self.status.phase == "fault":
             self.bench.session.recover().wait(10.0)
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)

@@ -64,13 +64,13 @@ def test_in_every_tab_controls_have_names_buttons_are_seen_stop_too_and_axe_find
     assert hinted > 20
     assert violations(page) == []
     tab.evaluate("document.querySelector('#root [role=slider]').dataset.kept = ''")
-    page.bench.conductor.ask(SetView(name="theme", value="dark"))
+    page.bench.dispatcher.ask(SetView(name="theme", value="dark"))
     page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "dark", "a dark page")
     assert tab.evaluate("!!document.querySelector('#root [data-kept]')"), "the panels are not made anew for it"
     page.wait(lambda: tab.evaluate(_UNNAMED) == [], "names in the dark panels")
     page.open_tab("Jog")
     assert violations(page) == []
-    page.bench.conductor.ask(SetView(name="theme", value="light"))
+    page.bench.dispatcher.ask(SetView(name="theme", value="light"))
     page.wait(lambda: tab.evaluate("document.documentElement.dataset.rlTheme") == "light", "a light page")
 
 

@@ -29,7 +29,7 @@ def heard(page):
 
 def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(heard):
     page = heard
-    page.bench.conductor.ask(SetSpeed(speed=0.02))
+    page.bench.dispatcher.ask(SetSpeed(speed=0.02))
     page.plan_to(1, -50.0 if page.status.q_c[0] > 0 else 50.0)
     page.open_tab("Run")
     page.unfold("Mode")
@@ -56,7 +56,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.button("Plug the cable in").click()
     page.wait(lambda: page.status.phase == "idle", "states again")
     page.tab.get_by_text("Network lab").first.click()
-    page.bench.conductor.ask(SetDrive(mode="joint_position"))
+    page.bench.dispatcher.ask(SetDrive(mode="joint_position"))
 
 
 def test_the_question_about_an_address_goes_when_another_one_is_typed(page):

@@ -52,9 +52,9 @@ def test_a_moving_arm_stops_when_the_page_that_holds_the_controls_is_gone(chromi
             page.wait_until_drawn()
             page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
             page.wait(lambda: page.state.lease.holder is not None, "a holder", 20.0)
-            bench.conductor.ask(SetSpeed(speed=0.01))
+            bench.dispatcher.ask(SetSpeed(speed=0.01))
             page.plan_to(1, 50.0)
-            bench.conductor.ask(RobotCommand(what="execute"))
+            bench.dispatcher.ask(RobotCommand(what="execute"))
             page.wait(lambda: page.status.code == "moving" and (page.status.motion_time or 0.0) > 0.1, "a moving arm")
             if way == "closed":
                 tab.close()

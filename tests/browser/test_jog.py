@@ -19,7 +19,7 @@ def jogging(page):
     page.wait(lambda: page.state.jog.robot, "the buttons to move the robot")
     yield page
     page.tab.mouse.up()
-    page.bench.conductor.ask(SetJog(robot=False, step=0.0))
+    page.bench.dispatcher.ask(SetJog(robot=False, step=0.0))
     page.wait(lambda: page.status.phase == "idle", "the arm to rest")
 
 

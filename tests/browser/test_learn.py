@@ -29,7 +29,7 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
     page.wait(lambda: page.button("Torque jumps").is_visible(), "the gallery")
     page.button("First move").click()
     page.wait(lambda: page.tab.locator(".rl-next").is_visible(), "the first step of a lesson")
-    page.bench.conductor.ask(MoveJoint(joint=0, angle=0.6))
+    page.bench.dispatcher.ask(MoveJoint(joint=0, angle=0.6))
     page.wait(lambda: page.tab.locator(".rl-done").count() == 1, "a step that ticks itself off")
     page.button("Leave the lesson").click()
     page.wait(lambda: page.state.learn.lesson is None, "the end of the lesson")
@@ -38,7 +38,7 @@ def test_a_fault_is_provoked_beside_the_robot_and_shown_at_its_moment(page):
 
 
 def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):
-    page.bench.conductor.ask(SetLaw(law="jerk_limited"))  # The law that leaves torque rates out.
+    page.bench.dispatcher.ask(SetLaw(law="jerk_limited"))  # The law that leaves torque rates out.
     page.plan_to(1, 40)
     page.open_tab("Check")
     page.wait(lambda: page.state.plan is not None and page.state.plan.complete, "a complete check")

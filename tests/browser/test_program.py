@@ -16,7 +16,7 @@ from rcilab.motion import Program, Waypoint
 @pytest.fixture
 def writing(page):
     """The Program tab with two waypoints, added by hand."""
-    page.bench.conductor.ask(EditProgram(what="clear"))
+    page.bench.dispatcher.ask(EditProgram(what="clear"))
     page.type_joint(1, "12")
     page.wait(lambda: page.state.plan is not None, "a target to add")
     page.open_tab("Program")
@@ -25,8 +25,8 @@ def writing(page):
     page.button("Add from arm").click()
     page.wait(lambda: page.tab.get_by_role("option").count() == 2, "two rows")
     yield page
-    page.bench.conductor.ask(EditProgram(what="clear"))
-    page.bench.conductor.ask(SetView(name="loop", value=False))
+    page.bench.dispatcher.ask(EditProgram(what="clear"))
+    page.bench.dispatcher.ask(SetView(name="loop", value=False))
 
 
 def field(page, name: str):
@@ -82,11 +82,11 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
 def test_a_waypoint_of_a_file_has_its_own_type_in_the_editor(writing):
     page, home = writing, writing.state.model.home
     program = Program(model=page.state.model.name, start=home, waypoints=(Waypoint.nullspace(0.3),))
-    page.bench.conductor.ask(LoadProgram(name="elbow.json", content=program.to_json().encode()))
+    page.bench.dispatcher.ask(LoadProgram(name="elbow.json", content=program.to_json().encode()))
     page.wait(lambda: len(page.state.program.draft.steps) == 1, "the program")
     page.wait(lambda: field(page, "Type").input_value() == "Elbow", "the type that the list shows")
     assert field(page, "Type").is_disabled()
-    page.bench.conductor.ask(EditProgram(what="add", source="here"))
+    page.bench.dispatcher.ask(EditProgram(what="add", source="here"))
     page.wait(lambda: len(page.state.program.draft.steps) == 2, "a new waypoint")
     assert page.state.program.draft.steps[1].waypoint.type == "line"  # It goes on as a path of the tool.
     page.wait(lambda: field(page, "Type").input_value() == "MoveL", "the type of the new waypoint")

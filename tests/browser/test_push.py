@@ -21,7 +21,7 @@ def physics(page):
     yield page
     page.bench.session.stop()
     page.wait(lambda: page.status.phase == "idle", "an idle arm")
-    page.bench.conductor.ask(ChooseRobot(plant="ideal"))
+    page.bench.dispatcher.ask(ChooseRobot(plant="ideal"))
     page.wait(lambda: page.state.plant == "ideal" and page.status.phase != "idle", "the ideal arm to come")
     page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
 
@@ -29,7 +29,7 @@ def physics(page):
 def has_followed(page, start: np.ndarray) -> bool:
     """Whether the arm has moved; guides anew where a busy machine kept the page silent for 2 s, which ends guiding."""
     if page.status.code == "idle.operator":
-        page.bench.conductor.ask(RobotCommand(what="guide"))
+        page.bench.dispatcher.ask(RobotCommand(what="guide"))
         page.wait(lambda: page.status.code != "idle.operator", "a free arm")
     return bool(np.abs(page.status.q - start).max() > 0.05)
 

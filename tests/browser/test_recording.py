@@ -29,7 +29,7 @@ def plot_numbers(page) -> list[list[str]]:
 
 
 def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
-    page.bench.conductor.ask(SetView(name="plot_joint", value=0))
+    page.bench.dispatcher.ask(SetView(name="plot_joint", value=0))
     page.plan_to(1, 12.0 if page.status.q_c[0] <= 0 else -12.0)
     page.open_tab("Run")
     page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")

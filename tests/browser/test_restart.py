@@ -68,7 +68,7 @@ def test_a_browser_without_a_graphics_card_draws_lightly_and_a_change_of_graphic
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             wait_for(lambda: look(tab, drawn) == "light", what="light graphics", timeout=60.0, tab=tab)
             for quality in ("full", "light"):
-                bench.conductor.ask(SetView(name="quality", value=quality))
+                bench.dispatcher.ask(SetView(name="quality", value=quality))
                 wait_for(
                     lambda wanted=quality: look(tab, drawn) == wanted, what=f"{quality} graphics", timeout=60.0, tab=tab
                 )

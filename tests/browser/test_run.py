@@ -58,7 +58,7 @@ def is_open(page, name: str) -> bool:
 
 def stop_in_mid_motion(page, press) -> None:
     start = np.array(page.status.q_c)
-    page.bench.conductor.ask(SetSpeed(speed=0.05))
+    page.bench.dispatcher.ask(SetSpeed(speed=0.05))
     page.plan_to(1, 60.0 if start[0] <= 0 else -60.0)
     goal = np.array(page.state.goal.q)
     page.open_tab("Run")

@@ -111,7 +111,7 @@ def test_a_blind_click_on_a_tab_right_after_a_change_counts_and_nothing_moves(pa
     page.tab.wait_for_timeout(500)
     assert is_chosen(page, "Target")
     assert page.tab.locator("canvas").first.bounding_box() == scene
-    page.bench.conductor.ask(SetView(name="theme", value="light"))
+    page.bench.dispatcher.ask(SetView(name="theme", value="light"))
 
 
 def is_chosen(page: BenchPage, name: str) -> bool:
@@ -134,7 +134,7 @@ def test_units_change_everywhere_and_a_typed_number_keeps_its_sign(page):
     page.wait(lambda: any("outside -2.09 rad to 2.09 rad" in said for said in page.alerts()), "why 9 is refused")
     field.fill("10 deg")
     page.wait(lambda: abs(page.state.goal.q[1] - np.radians(10.0)) < 1e-9, "a number with its own unit")
-    page.bench.conductor.ask(SetView(name="angle", value="deg"))
+    page.bench.dispatcher.ask(SetView(name="angle", value="deg"))
     page.tab.get_by_text("Joint angles [deg]").wait_for()
     assert page.state.units == USUAL
 

@@ -1,4 +1,4 @@
-"""Jobs beside the conductor's thread."""
+"""Jobs beside the dispatcher's thread."""
 
 from __future__ import annotations
 

@@ -165,8 +165,8 @@ def fuzz_page(count: int, seed: int) -> None:
         bar.close()
         assert sent > count // 2
         height = bench.store.state.height + 1.0
-        bench.conductor.ask(SetView(name="height", value=height))
-        wait(lambda: bench.store.state.height == height, "the conductor to go on")
+        bench.dispatcher.ask(SetView(name="height", value=height))
+        wait(lambda: bench.store.state.height == height, "the dispatcher to go on")
         assert bench.session.status().phase == "idle"
         with _enter(bench) as fresh:
             assert fresh.recv(timeout=30.0)

@@ -30,5 +30,5 @@ def opened() -> Iterator[Workbench]:
     with Workbench(WorkbenchConfig(port=0, quality="light")) as bench:
         wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "an idle arm")
         yield bench
-        assert bench.conductor.errors == []
-        assert bench.presenter.errors == []
+        assert bench.dispatcher.errors == []
+        assert bench.renderer.errors == []

@@ -31,12 +31,12 @@ def workbench(plant: str, runs: Path | None = None) -> Iterator[Workbench]:
         wait(lambda: is_ready(bench), "an idle arm")
         if plant == "mujoco":
             pid = bench.session.status().controller_pid
-            bench.conductor.ask(ChooseRobot(plant="mujoco"))
+            bench.dispatcher.ask(ChooseRobot(plant="mujoco"))
             wait(lambda: bench.session.status().controller_pid not in (None, pid), "another controller")
             wait(lambda: is_ready(bench), "a powered arm")
         yield bench
-        assert bench.conductor.errors == []
-        assert bench.presenter.errors == []
+        assert bench.dispatcher.errors == []
+        assert bench.renderer.errors == []
 
 
 def memory(pid: int | None) -> int:
@@ -68,7 +68,7 @@ def stream_with_a_page(plant: str, seconds: float, warm_up: float) -> None:
 
 def swing(bench: Workbench) -> None:
     """One motion of joint 1, there or back."""
-    ask, status = bench.conductor.ask, bench.session.status
+    ask, status = bench.dispatcher.ask, bench.session.status
     wait(lambda: is_ready(bench), "an idle arm")
     goal = -0.4 if status().q_c[0] > 0.0 else 0.4
     ask(SetSpeed(speed=0.5))
@@ -99,7 +99,7 @@ def stop_everything(plant: str, seconds: float) -> None:
         wait(lambda: bench.session.status().phase in ("idle", "fault", "lost"), "the arm to rest", 60.0)
         wait(lambda: told(bench) is not None, "to be told")
         if bench.session.status().phase == "lost":  # The controller slept for longer than it is waited for.
-            bench.conductor.ask(ChooseRobot(target="virtual"))  # "Start it again".
+            bench.dispatcher.ask(ChooseRobot(target="virtual"))  # "Start it again".
             wait(lambda: is_ready(bench), "another controller", 60.0)
             start = float(bench.session.status().q_c[0])
         assert abs(float(bench.session.status().q_c[0]) - start) < 0.79, "it did not go on as if nothing had been"
@@ -144,7 +144,7 @@ def fill_the_disk(plant: str, folder: Path) -> None:
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", str(folder)], check=True)
     try:
         with workbench(plant, folder) as bench:
-            bench.conductor.ask(SetRecording(on=True))
+            bench.dispatcher.ask(SetRecording(on=True))
             swing(bench)
             wait(lambda: bench.store.state.recording is not None, "the run")
             # That the arm has arrived is told right afterwards, and the page shows both.

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rcilab.app import dispatcher as conductor
+from rcilab.app import dispatcher
 from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, TakeControls
 from rcilab.app.goal.goal_actions import (
     ChooseBranch,
@@ -49,8 +49,8 @@ def ask(bench) -> Callable[[Request], None]:
 
     def act(request: Request) -> None:
         height = bench.store.state.height + 1.0
-        bench.conductor.ask(request)
-        bench.conductor.ask(SetView(name="height", value=height))
+        bench.dispatcher.ask(request)
+        bench.dispatcher.ask(SetView(name="height", value=height))
         wait(lambda: bench.store.state.height == height, f"an answer to {request}")
 
     act(PoseGoal(name="here"))
@@ -153,7 +153,7 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
 
 def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
     ask(SetPathType(kind="arc", via=True))
-    label = bench.presenter._stage._goal._via_label
+    label = bench.renderer._stage._goal._via_label
     try:
         for language in ("en", "zh", "en"):
             ask(SetView(name="language", value=language))
@@ -164,7 +164,7 @@ def test_labels_in_the_scene_follow_the_language_at_once(bench, ask):
 
 
 def test_a_safety_box_that_is_off_is_drawn_only_while_it_is_edited(bench, ask):
-    label = bench.presenter._stage._setup._label
+    label = bench.renderer._stage._setup._label
     assert not bench.store.state.setup.wanted.box.active
     ask(SetSetup(name="edited", value="box"))
     wait(lambda: label.visible, "the box that is edited")
@@ -280,7 +280,7 @@ def test_a_motion_that_was_seldom_looked_at_leaves_the_preview_where_it_ended(be
     ask(MoveJoint(joint=0, angle=start + (0.1 if start < 1.0 else -0.1)))
     if what == "stop":
         ask(SetSpeed(speed=0.05))
-    monkeypatch.setattr(conductor, "_TICK", 1.0)  # [s] A busy machine.
+    monkeypatch.setattr(dispatcher, "_TICK", 1.0)  # [s] A busy machine.
     ask(RobotCommand(what="execute"))
     if what == "stop":
         wait(lambda: (bench.session.status().motion_place or 0.0) > 0.3, "a part of the way")

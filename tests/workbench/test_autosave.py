@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.app.autosave import Autosave, keepsake_file
+from rcilab.app.autosave import Autosave, autosave_file
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.program.edit_actions import EditProgram
@@ -55,8 +55,8 @@ def state_with_all() -> UiState:
 
 def test_what_was_kept_is_recalled(tmp_path):
     Autosave(tmp_path / "deep" / "kept.json").keep(state_with_all())
-    keepsake = Autosave(tmp_path / "deep" / "kept.json")
-    kept = keepsake.recall(MODEL)
+    autosave = Autosave(tmp_path / "deep" / "kept.json")
+    kept = autosave.recall(MODEL)
     assert np.array_equal(kept.q, GOAL)
     assert [w.type for w in kept.program.waypoints] == ["joint", "joint"]
     assert kept.setup.tool.is_close(SETUP.tool, 1e-12)
@@ -64,16 +64,16 @@ def test_what_was_kept_is_recalled(tmp_path):
     assert np.array_equal(kept.setup.load.inertia, SETUP.load.inertia)
     assert kept.setup.force.type is ForceFrame.TOOL
     other = load_model("xMate3")
-    assert keepsake.recall(other) is None
-    keepsake.keep(UiState(model=other, goal=goal_at(other, other.home)))
+    assert autosave.recall(other) is None
+    autosave.keep(UiState(model=other, goal=goal_at(other, other.home)))
     assert np.array_equal(Autosave(tmp_path / "deep" / "kept.json").recall(MODEL).q, GOAL), "each arm has its own"
 
 
 def test_nothing_is_written_again_while_nothing_has_changed(tmp_path):
-    keepsake, state = Autosave(tmp_path / "kept.json"), state_with_all()
-    keepsake.keep(state)
+    autosave, state = Autosave(tmp_path / "kept.json"), state_with_all()
+    autosave.keep(state)
     (tmp_path / "kept.json").unlink()
-    keepsake.keep(replace(state, speed=0.1))
+    autosave.keep(replace(state, speed=0.1))
     assert not (tmp_path / "kept.json").exists()
 
 
@@ -88,23 +88,23 @@ def test_a_file_that_nobody_understands_is_as_good_as_none(tmp_path, text):
 
 def test_where_nothing_can_be_written_the_page_goes_on(tmp_path):
     (tmp_path / "file").write_text("")
-    keepsake = Autosave(tmp_path / "file" / "kept.json")
-    keepsake.keep(state_with_all())
-    assert keepsake.recall(MODEL) is None
-    keepsake.close(state_with_all())
+    autosave = Autosave(tmp_path / "file" / "kept.json")
+    autosave.keep(state_with_all())
+    assert autosave.recall(MODEL) is None
+    autosave.close(state_with_all())
 
 
 def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    file = keepsake_file(port)
+    file = autosave_file(port)
     with Workbench(WorkbenchConfig(port=port)) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         for joint, angle in enumerate(GOAL.tolist()):
-            bench.conductor.ask(MoveJoint(joint=joint, angle=angle))
-        bench.conductor.ask(TypeField(field="setup.tool.z", text="120"))
-        bench.conductor.ask(LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
+            bench.dispatcher.ask(MoveJoint(joint=joint, angle=angle))
+        bench.dispatcher.ask(TypeField(field="setup.tool.z", text="120"))
+        bench.dispatcher.ask(LoadProgram(name="mine.json", content=PROGRAM.to_json().encode()))
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
     with Workbench(WorkbenchConfig(port=port)) as bench:
@@ -113,7 +113,7 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
         assert bench.store.state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.12]
         wait_for(lambda: bench.session.status().setup.parts == ("tool",), what="our controller to be told the tool")
-        bench.conductor.ask(EditProgram(what="clear"))
+        bench.dispatcher.ask(EditProgram(what="clear"))
         wait_for(lambda: not bench.store.state.program.draft.steps, what="an empty program")
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert Text("en").say(bench.store.state.notice.text) == f"Back with the {MODEL.name}: tool."
@@ -146,7 +146,7 @@ def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_i
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    file, other = keepsake_file(port), load_model("xMate3")
+    file, other = autosave_file(port), load_model("xMate3")
     kept = Autosave(file)
     kept.keep(state_with_all())
     kept._next = 0.0
@@ -154,7 +154,7 @@ def test_an_arm_that_was_exchanged_before_a_crash_has_its_set_up_again_when_it_i
     with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         assert bench.store.state.model.name == "xMate3"
-        bench.conductor.ask(ChooseRobot(model=MODEL.name))
+        bench.dispatcher.ask(ChooseRobot(model=MODEL.name))
         wait_for(lambda: bench.store.state.model.name == MODEL.name, what="the other arm")
         assert bench.store.state.model.T_flange_tool.is_close(SETUP.tool, 1e-12)
         assert bench.store.state.setup.wanted.load.mass == SETUP.load.mass
@@ -172,17 +172,17 @@ def test_programs_of_other_arms_and_a_look_at_a_recording_lose_nothing():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    keepsake = Autosave(keepsake_file(port))
-    keepsake.close(state_with_all())
+    autosave = Autosave(autosave_file(port))
+    autosave.close(state_with_all())
     with Workbench(WorkbenchConfig(port=port, replay=some_run())):
         pass
     with Workbench(WorkbenchConfig(port=port, model="xMate3")) as bench:
         wait_for(lambda: bench.session.status().phase == "idle", what="an idle arm")
         assert not bench.store.state.program.draft.steps
-        bench.conductor.ask(ChooseRobot(model=MODEL.name))
+        bench.dispatcher.ask(ChooseRobot(model=MODEL.name))
         wait_for(lambda: len(bench.store.state.program.draft.steps) == 2, what="the program of the other arm")
-    assert len(Autosave(keepsake_file(port)).recall(MODEL).program.waypoints) == 2
-    keepsake_file(port).unlink()
+    assert len(Autosave(autosave_file(port)).recall(MODEL).program.waypoints) == 2
+    autosave_file(port).unlink()
 
 
 def test_how_the_page_looks_comes_back_and_a_language_that_is_asked_for_wins(monkeypatch, tmp_path):
@@ -192,7 +192,7 @@ def test_how_the_page_looks_comes_back_and_a_language_that_is_asked_for_wins(mon
         port = free.getsockname()[1]
     with Workbench(WorkbenchConfig(port=port)) as bench:
         for name, value in (("language", "zh"), ("theme", "dark"), ("angle", "rad"), ("length", "m")):
-            bench.conductor.ask(SetView(page=None, name=name, value=value))
+            bench.dispatcher.ask(SetView(page=None, name=name, value=value))
         wait_for(lambda: bench.store.state.units.length == "m", what="the settings")
     with Workbench(WorkbenchConfig(port=port)) as bench:
         state = bench.store.state
@@ -200,6 +200,6 @@ def test_how_the_page_looks_comes_back_and_a_language_that_is_asked_for_wins(mon
         assert state.notices == ()
     with Workbench(WorkbenchConfig(port=port, language="en")) as bench:
         assert (bench.store.state.language, bench.store.state.theme) == ("en", "dark")
-    keepsake_file(port).write_text('{"format": "rcilab workbench", "version": 1, "arms": {}, "looks": {"theme": 7}}')
+    autosave_file(port).write_text('{"format": "rcilab workbench", "version": 1, "arms": {}, "looks": {"theme": 7}}')
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert bench.store.state.theme == "light"

@@ -40,7 +40,7 @@ def bench() -> Iterator[Workbench]:
 
 @pytest.fixture
 def idle(bench):
-    bench.conductor.ask(SetDrive(mode="joint_position", speed_override=1.0))
+    bench.dispatcher.ask(SetDrive(mode="joint_position", speed_override=1.0))
     settle(bench)
     return bench
 
@@ -53,7 +53,7 @@ def settle(bench):
         nonlocal was_faulty
         status = bench.session.status()
         if status.phase == "fault" and not was_faulty:
-            bench.conductor.ask(RobotCommand(what="recover"))
+            bench.dispatcher.ask(RobotCommand(what="recover"))
         was_faulty = status.phase == "fault"
         return status.phase == "idle" and bool(status.powered)
 
@@ -62,7 +62,7 @@ def settle(bench):
 
 def plan(bench, speed=0.1, way=0.8):
     """Poses the goal, so that a motion of some seconds is planned and judged."""
-    ask, q = bench.conductor.ask, bench.session.status().q_c
+    ask, q = bench.dispatcher.ask, bench.session.status().q_c
     before = bench.store.state.plan
     ask(SetSpeed(speed=speed))
     ask(MoveJoint(joint=0, angle=float(q[0]) + (way if q[0] < 0.1 else -way)))
@@ -76,7 +76,7 @@ def plan(bench, speed=0.1, way=0.8):
 
 
 def execute(bench, place=0.3):
-    bench.conductor.ask(RobotCommand(what="execute"))
+    bench.dispatcher.ask(RobotCommand(what="execute"))
     wait(
         lambda: bench.session.status().code == "moving" and (bench.session.status().motion_time or 0.0) > place,
         "the arm on its way",
@@ -117,7 +117,7 @@ def test_fields_that_do_not_exist_are_none(name):
 
 
 def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
-    ask = idle.conductor.ask
+    ask = idle.dispatcher.ask
     ask(TypeField(field="control.joint_stiffness.2", text="1234 N·m/rad"))
     wait(
         lambda: (c := idle.session.status().setup.control) is not None and c["joint_stiffness"][2] == 1234.0,
@@ -132,34 +132,34 @@ def test_a_typed_parameter_is_told_acknowledged_and_read_back(idle):
 
 
 def test_the_plan_is_judged_by_the_conditions_of_the_mode(idle):
-    idle.conductor.ask(SetLaw(law="jerk_limited"))
+    idle.dispatcher.ask(SetLaw(law="jerk_limited"))
     plan(idle, speed=0.5)
     assert idle.store.state.plan.report.ok
-    idle.conductor.ask(SetDrive(mode="torque"))
+    idle.dispatcher.ask(SetDrive(mode="torque"))
     wait(lambda: idle.store.state.plan.mode == "torque", "another judgement")
     report = idle.store.state.plan.report
     assert {row.condition.id for row in report.rows} >= {"torque.rate", "torque.range"}
     assert not report.ok  # Half of the speed asks for more than the torque rate.
-    idle.conductor.ask(RobotCommand(what="execute"))
+    idle.dispatcher.ask(RobotCommand(what="execute"))
     wait(lambda: told(idle) == "ready.violations", "the refusal")
-    idle.conductor.ask(SetDrive(mode="sideways"))
-    idle.conductor.ask(SetDrive(mode="joint_position"))
+    idle.dispatcher.ask(SetDrive(mode="sideways"))
+    idle.dispatcher.ask(SetDrive(mode="joint_position"))
     wait(lambda: idle.store.state.plan.report.ok, "the first judgement again")
-    idle.conductor.ask(SetLaw(law="torque_rate_limited"))
+    idle.dispatcher.ask(SetLaw(law="torque_rate_limited"))
 
 
 def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
-    idle.conductor.ask(SetDrive(mode="joint_impedance"))
+    idle.dispatcher.ask(SetDrive(mode="joint_impedance"))
     wait(lambda: idle.store.state.drive.mode == "joint_impedance", "the mode")
     plan(idle)
     motion = idle.store.state.plan.motion
     execute(idle)
-    idle.conductor.ask(RobotCommand(what="pause"))
+    idle.dispatcher.ask(RobotCommand(what="pause"))
     wait(lambda: idle.session.status().code == "moving.held", "the pause")
-    idle.conductor.ask(SetDrive(mode="torque"))
+    idle.dispatcher.ask(SetDrive(mode="torque"))
     wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
-    idle.conductor.ask(SetDrive(speed_override=0.7))
-    idle.conductor.ask(RobotCommand(what="resume"))
+    idle.dispatcher.ask(SetDrive(speed_override=0.7))
+    idle.dispatcher.ask(RobotCommand(what="resume"))
     wait(lambda: idle.session.status().speed_override == pytest.approx(0.7), "the way on")
     wait(lambda: told(idle) == "notice.arrived", "the arrival")
     wait(lambda: idle.store.state.last_run is not None and idle.store.state.last_run.run is not None, "the run")
@@ -170,17 +170,17 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     assert np.degrees(np.nanmax(np.abs(run.tracking.joint))) < 2.0  # Against what was asked for, pauses and all.
     assert run.paced
     assert np.array_equal(played_path(idle.store.state)[1], run.plan.q)  # And so it is drawn.
-    assert idle.presenter.place_at(1.0) == 1.0
+    assert idle.renderer.place_at(1.0) == 1.0
 
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
-    idle.conductor.ask(RobotCommand(what="pause"))
+    idle.dispatcher.ask(RobotCommand(what="pause"))
     wait(lambda: told(idle) == "pace.nothing", "the answer")
-    idle.conductor.ask(SetDrive(speed_override=0.2))
+    idle.dispatcher.ask(SetDrive(speed_override=0.2))
     plan(idle)
     execute(idle)
     wait(lambda: idle.session.status().speed_override == pytest.approx(0.2), "the slow motion")
-    idle.conductor.ask(RobotCommand(what="stop"))
+    idle.dispatcher.ask(RobotCommand(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
 
 
@@ -193,10 +193,10 @@ def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, mo
         is_busy.set()
         may_go_on.wait(10.0)
 
-    monkeypatch.setitem(bench.conductor._handlers, ShowPlot, be_busy)
-    bench.conductor.ask(ShowPlot(name="q", on=True))
+    monkeypatch.setitem(bench.dispatcher._handlers, ShowPlot, be_busy)
+    bench.dispatcher.ask(ShowPlot(name="q", on=True))
     assert is_busy.wait(10.0)
-    bench.conductor.ask(RobotCommand(what="execute"))
+    bench.dispatcher.ask(RobotCommand(what="execute"))
     bench.session.stop()
     may_go_on.set()
     wait(lambda: "error.stopped_before" in str(bench.store.state.notice), "the word that it was stopped before")
@@ -210,21 +210,21 @@ def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, mo
 def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     plan(idle)
     execute(idle, 0.1)
-    idle.conductor.ask(SetNetwork(pulled=True))
+    idle.dispatcher.ask(SetNetwork(pulled=True))
     wait(lambda: idle.session.status().phase == "lost", "the loss to be noticed")
-    idle.conductor.ask(SetNetwork(pulled=False))
+    idle.dispatcher.ask(SetNetwork(pulled=False))
     wait(lambda: not idle.store.state.world.pulled, "the cable in")
-    idle.conductor.ask(SetNetwork(name="loss", value=9.0))
+    idle.dispatcher.ask(SetNetwork(name="loss", value=9.0))
     wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.loss == 0.3, "the bound of the slider")
-    idle.conductor.ask(SetNetwork(clear=True))
+    idle.dispatcher.ask(SetNetwork(clear=True))
     wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.spares_datagrams, "a good network")
-    idle.conductor.ask(RobotCommand(what="reconnect"))
+    idle.dispatcher.ask(RobotCommand(what="reconnect"))
     wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
     settle(idle)
 
 
 def test_the_emergency_stop_has_a_way_out(idle):
-    ask = idle.conductor.ask
+    ask = idle.dispatcher.ask
     ask(PressSafety(button="estop"))
     wait(lambda: idle.session.status().powered is False, "the motors off")
     wait(lambda: idle.store.state.world.status.button == "estop", "the button to show")
@@ -236,7 +236,7 @@ def test_the_emergency_stop_has_a_way_out(idle):
 
 
 def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
-    ask = idle.conductor.ask
+    ask = idle.dispatcher.ask
     ask(ChooseDestination(where="address", address=" rci://127.0.0.1:9 "))
     wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question")
     assert idle.store.state.target == "virtual"

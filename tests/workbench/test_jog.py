@@ -340,7 +340,7 @@ def test_a_step_of_the_robot_is_a_judged_motion_that_ends_where_it_shall(jog, ro
 def test_with_the_real_controller_the_goal_follows_the_arm_and_undo_brings_it_back(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     with opened() as bench:
-        ask, store, status = bench.conductor.ask, bench.store, bench.session.status
+        ask, store, status = bench.dispatcher.ask, bench.store, bench.session.status
         wait(lambda: store.state.plan is None and np.array_equal(store.state.goal.q, status().q_c), "the first look")
         start = np.array(store.state.goal.q)
         ask(SetJog(robot=True, speed=0.5))

@@ -38,7 +38,7 @@ def test_a_robot_side_that_finds_no_memory_is_told_and_can_be_started_again(plac
             assert bench.store.state.notice.text.values["text"].code == "error.starved"
             assert bench.session.status().phase == "closed", "it can be connected"
             patch.undo()
-            bench.conductor.ask(ChooseRobot(target="virtual"))
+            bench.dispatcher.ask(ChooseRobot(target="virtual"))
             wait(lambda: is_ready(bench), "an arm")
 
 
@@ -54,7 +54,7 @@ def test_a_thread_that_cannot_be_started_leaves_a_session_that_can_be_closed_and
     session.close()
 
 
-@pytest.mark.parametrize("name", ["presenter", "conductor", "session", "operator"])
+@pytest.mark.parametrize("name", ["renderer", "dispatcher", "session", "operator"])
 def test_a_page_that_cannot_start_one_of_its_threads_says_only_that(monkeypatch, name) -> None:
     start = threading.Thread.start
 
@@ -70,7 +70,7 @@ def test_a_page_that_cannot_start_one_of_its_threads_says_only_that(monkeypatch,
     ):
         pass
     left = {thread.name for thread in threading.enumerate()}
-    assert not left & {"presenter", "conductor", "session", "operator", "rcilab-supervisor"}
+    assert not left & {"renderer", "dispatcher", "session", "operator", "rcilab-supervisor"}
 
 
 def test_a_supervisor_without_a_thread_to_watch_leaves_no_process(monkeypatch) -> None:
@@ -109,5 +109,5 @@ def test_a_thread_for_the_world_port_is_started_once_there_is_memory(monkeypatch
             patch.undo()
             wait(lambda: any(thread.name == name for thread in threading.enumerate()), "the thread")
             wait(lambda: all(notice.trouble != "tick" for notice in bench.store.state.notices), "the notice to go")
-            assert bench.conductor.errors == []
+            assert bench.dispatcher.errors == []
     assert "Traceback" not in capfd.readouterr().err

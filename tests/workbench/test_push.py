@@ -219,7 +219,7 @@ def bench() -> Iterator[Workbench]:
 
 
 def test_another_plant_keeps_goal_and_plan_and_is_refused_in_mid_motion(bench):
-    ask = bench.conductor.ask
+    ask = bench.dispatcher.ask
     wait(lambda: bench.store.state.plan is None and bench.session.status().q_c is not None, "the first look")
     angle = float(bench.session.status().q_c[0]) + 0.4
     ask(MoveJoint(joint=0, angle=angle))
@@ -243,7 +243,7 @@ def test_another_plant_keeps_goal_and_plan_and_is_refused_in_mid_motion(bench):
 
 
 def test_a_guided_arm_follows_the_button(bench):
-    ask = bench.conductor.ask
+    ask = bench.dispatcher.ask
     wait(lambda: bench.session.status().phase == "idle" and bool(bench.session.status().powered), "a powered arm")
     ask(RobotCommand(what="guide"))
     wait(lambda: bench.session.status().code == "moving.guided", "a free arm")
@@ -261,7 +261,7 @@ def test_a_guided_arm_follows_the_button(bench):
 
 @pytest.mark.parametrize("mode", ["joint_impedance", "cartesian_impedance"])
 def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and_is_recorded(bench, mode):
-    ask, status = bench.conductor.ask, bench.session.status
+    ask, status = bench.dispatcher.ask, bench.session.status
     wait(lambda: status().phase == "idle" and bool(status().powered) and told(bench) != "notice.moving", "a rest")
     if bench.store.state.plant != "mujoco":
         pid = status().controller_pid

@@ -43,13 +43,13 @@ def bench(tmp_path_factory) -> Iterator[Workbench]:
     with Workbench(config) as found:
         wait(lambda: bool(found.session.status().powered), "an arm with power")
         yield found
-        assert found.conductor.errors == []
-        assert found.presenter.errors == []
+        assert found.dispatcher.errors == []
+        assert found.renderer.errors == []
 
 
 def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
-    bench.conductor.ask(SetSpeed(speed=speed))
-    bench.conductor.ask(MoveJoint(joint=0, angle=angle))
+    bench.dispatcher.ask(SetSpeed(speed=speed))
+    bench.dispatcher.ask(MoveJoint(joint=0, angle=angle))
     wait(
         lambda: (
             (plan := bench.store.state.plan) is not None
@@ -58,7 +58,7 @@ def execute(bench: Workbench, angle: float, speed: float = 0.5) -> None:
         ),
         "a plan that may be executed",
     )
-    bench.conductor.ask(RobotCommand(what="execute"))
+    bench.dispatcher.ask(RobotCommand(what="execute"))
 
 
 def finished(bench: Workbench):
@@ -74,7 +74,7 @@ def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(b
     assert run.t[-1] >= run.plan.duration
     assert run.stopped is None
     assert recording.tracking.joint_max.max() < 1e-6  # The ideal plant is where it is told to be.
-    shown, end = bench.presenter, bench.presenter._timeline.end
+    shown, end = bench.renderer, bench.renderer._timeline.end
     assert end > run.plan.duration
     assert shown.place_at(0.2) * run.plan.duration == pytest.approx(0.2 * end)  # A click goes where it was clicked.
     back = rcilab.load_run(recording.file)
@@ -103,10 +103,10 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     if bench.store.state.recording is None:
         execute(bench, 0.1)
     run = finished(bench).run
-    bench.conductor.ask(PageOpened(page=7))
+    bench.dispatcher.ask(PageOpened(page=7))
     wait(lambda: bench.store.state.lease.holder == 7, "the controls")
     sent = []
-    actions = bench.conductor._export
+    actions = bench.dispatcher._export
 
     def deliver(page, name, stream, is_unwanted):
         stream.seek(0)
@@ -114,9 +114,9 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
         return not is_unwanted()
 
     monkeypatch.setattr(actions, "_deliver", deliver)
-    bench.conductor.ask(ExportRun(page=8, ending=".csv"))  # A page that only watches gets none.
+    bench.dispatcher.ask(ExportRun(page=8, ending=".csv"))  # A page that only watches gets none.
     for ending in (".csv", ".html", ".rcirun"):
-        bench.conductor.ask(ExportRun(page=7, ending=ending))
+        bench.dispatcher.ask(ExportRun(page=7, ending=ending))
         wait(lambda ending=ending: bool(sent) and sent[-1][1].endswith(ending), f"the {ending}")
         wait(lambda: bench.store.state.export is None, "the end of the export")
     assert {page for page, _, _ in sent} == {7}
@@ -125,26 +125,26 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     import sys
 
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
-    bench.conductor.ask(ExportRun(page=7, ending=".mcap"))
+    bench.dispatcher.ask(ExportRun(page=7, ending=".mcap"))
     wait(lambda: told(bench) == "export.missing", "what is missing")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(
         actions, "_deliver", lambda page, name, stream, is_unwanted: bool(wait(is_unwanted, "a cancel"))
     )
-    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
+    bench.dispatcher.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: bench.store.state.export is not None, "an export")
-    bench.conductor.ask(CancelExport(page=7))
+    bench.dispatcher.ask(CancelExport(page=7))
     wait(lambda: told(bench) == "export.cancelled", "that it was cancelled")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(actions, "_deliver", deliver)
-    bench.conductor.ask(ExportRun(page=7, ending="../../etc/passwd"))
+    bench.dispatcher.ask(ExportRun(page=7, ending="../../etc/passwd"))
     bench.store.update(recording=None)
-    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
+    bench.dispatcher.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: len(sent) == 4, "the run, which no other plan takes away")
     assert sent[3][1].endswith(".csv")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     bench.store.update(last_run=None)
-    bench.conductor.ask(ExportRun(page=7, ending=".csv"))
+    bench.dispatcher.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: told(bench) == "export.nothing", "that there is nothing")
     assert len(sent) == 4
 
@@ -172,12 +172,12 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         assert bench.store.state.model is run.model
         assert bench.store.state.recording.run is run
-        bench.conductor.ask(Seek(place=0.5))
+        bench.dispatcher.ask(Seek(place=0.5))
         wait(lambda: bench.store.state.place == 0.5, "the middle of the run")
         middle = replayed_pose(bench.store.state)
         row = int(np.searchsorted(run.t, 0.5 * run.plan.duration + 1e-3))
         assert np.array_equal(middle, run.q[row])
-        bench.conductor.ask(MoveJoint(joint=0, angle=0.5))
+        bench.dispatcher.ask(MoveJoint(joint=0, angle=0.5))
         wait(lambda: abs(bench.store.state.goal.q[0] - 0.5) < 1e-9, "a goal that was posed")
         assert bench.store.state.recording.run is run, "posing a goal loses nothing of the run"
         assert bench.store.state.plan.motion is run.plan
@@ -194,10 +194,10 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         assert obstacle(bench.store.state, status).code == "ready.closed"
         opened = []
         monkeypatch.setattr(bench.session, "open", lambda *what: opened.append(what[:2]))
-        bench.conductor.ask(ChooseRobot(target="virtual"))
+        bench.dispatcher.ask(ChooseRobot(target="virtual"))
         wait(lambda: opened == [(run.model, "virtual")], "a virtual controller, once it is asked for")
-        assert bench.conductor.errors == []
-        assert bench.presenter.errors == []
+        assert bench.dispatcher.errors == []
+        assert bench.renderer.errors == []
 
 
 def test_a_fault_is_marked_and_told_at_the_moment_it_was_reported():

@@ -28,14 +28,14 @@ def bench() -> Iterator[Workbench]:
             robot.power_on()
         with Workbench(WorkbenchConfig(target=controller.address, port=0, quality="light")) as bench:
             yield bench
-            assert bench.conductor.errors == []
-            assert bench.presenter.errors == []
+            assert bench.dispatcher.errors == []
+            assert bench.renderer.errors == []
     finally:
         controller.end()
 
 
 def test_the_arm_is_led_back_inside_and_plans_start_there_again(bench):
-    ask, store, session = bench.conductor.ask, bench.store, bench.session
+    ask, store, session = bench.dispatcher.ask, bench.store, bench.session
     upper = store.state.model.limits.joint.upper[JOINT]
     wait(lambda: session.status().phase == "idle" and bool(session.status().powered), "an idle arm")
     assert may_lead_inside(store.state, session.status())

@@ -33,7 +33,7 @@ HOME = np.array(MODEL.home)
 
 
 class Bench:
-    """Goal and scene as the conductor has them, with an arm that stands at home."""
+    """Goal and scene as the dispatcher has them, with an arm that stands at home."""
 
     def __init__(self, q_c: np.ndarray | None = HOME, model=MODEL) -> None:
         self.store = Store(UiState(model=model, goal=goal_at(model, np.array(model.home))))

@@ -52,8 +52,8 @@ def ask(bench) -> Callable[[Request], None]:
 
     def act(request: Request) -> None:
         height = bench.store.state.height + 1.0
-        bench.conductor.ask(request)
-        bench.conductor.ask(SetView(name="height", value=height))
+        bench.dispatcher.ask(request)
+        bench.dispatcher.ask(SetView(name="height", value=height))
         wait(lambda: bench.store.state.height == height, f"an answer to {request}")
 
     while bench.store.state.setup.can_undo:
@@ -132,11 +132,11 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert "cartesian.position" in {violation.condition.id for violation in state.plan.report.violations}
     assert obstacle(state, bench.session.status()).code == "ready.violations"
     assert "on, 120 × 120 × 120 mm" == Text("en").say(describe_held(bench.session.status(), "box"))
-    target = next(panel for panel in bench.presenter._panels if isinstance(panel, TargetPanel))
+    target = next(panel for panel in bench.renderer._panels if isinstance(panel, TargetPanel))
     wait(lambda: "broken: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
-    wait(lambda: bench.presenter._stage._ribbon._beads > 0, "a bead where it is broken")
+    wait(lambda: bench.renderer._stage._ribbon._beads > 0, "a bead where it is broken")
     ask(SetSetup(name="active", value=False))
-    wait(lambda: bench.presenter._stage._ribbon._beads == 0, "the bead to go")
+    wait(lambda: bench.renderer._stage._ribbon._beads == 0, "the bead to go")
     gone = outdated(bench.store.state)
     assert gone is not None
     assert "safety box" in Text("en").say(gone)  # What broke the box is no verdict on an arm without one.
@@ -149,7 +149,7 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
 def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execute(bench, ask):
     ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     x = 1000.0 * bench.store.state.model.forward(bench.session.status().q_c).position[0]
-    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
+    panel = next(panel for panel in bench.renderer._panels if isinstance(panel, SetupPanel))
     ask(SetSetup(name="active", value=True))
     type_in(ask, box_xmax=f"{x + 0.5:.2f}")
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.stale"
@@ -331,7 +331,7 @@ def test_a_foreign_robot_is_told_nothing_before_a_second_yes(bench, ask):
 def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
     ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     type_in(ask, tool_z="100")
-    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, CheckPanel))
+    panel = next(panel for panel in bench.renderer._panels if isinstance(panel, CheckPanel))
     wait(lambda: "Out of date" in panel._verdict._shown, "the tab to say so")
     assert panel._again.visible
 
@@ -339,7 +339,7 @@ def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
 def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
     ask(MoveJoint(joint=0, angle=float(bench.session.status().q_c[0]) + 0.3))
     type_in(ask, tool_z="100")
-    panel = next(panel for panel in bench.presenter._panels if isinstance(panel, SetupPanel))
+    panel = next(panel for panel in bench.renderer._panels if isinstance(panel, SetupPanel))
     wait(lambda: "Out of date" in panel._planned._shown, "the tab to say so")
     ask(PressCheck(what="again"))
     wait(lambda: "Passed" in panel._planned._shown, "a verdict")

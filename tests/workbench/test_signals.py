@@ -22,7 +22,7 @@ def bench() -> Iterator[Workbench]:
 
 
 def test_an_output_is_set_and_the_input_it_is_wired_to_is_shown(bench: Workbench) -> None:
-    ask, status = bench.conductor.ask, bench.session.status
+    ask, status = bench.dispatcher.ask, bench.session.status
     assert status().inputs is None
     assert status().outputs == (None,) * 6
     ask(SetWiring(name="loop_back", on=True))
@@ -37,7 +37,7 @@ def test_an_output_is_set_and_the_input_it_is_wired_to_is_shown(bench: Workbench
 
 
 def test_a_restart_is_asked_about_and_ends_the_connection_until_connect(bench: Workbench) -> None:
-    ask, status, state = bench.conductor.ask, bench.session.status, lambda: bench.store.state
+    ask, status, state = bench.dispatcher.ask, bench.session.status, lambda: bench.store.state
     ask(PressSignals(what="confirm"))  # Nothing was asked: nothing happens.
     ask(PressSignals(what="reboot"))
     wait(lambda: state().reboot_asked, "the question")

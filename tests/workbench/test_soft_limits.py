@@ -22,7 +22,7 @@ def bench() -> Iterator[Workbench]:
 
 
 def test_a_typed_limit_reaches_controller_and_plans_and_undo_takes_it_back(bench: Workbench) -> None:
-    ask, state, status = bench.conductor.ask, lambda: bench.store.state, bench.session.status
+    ask, state, status = bench.dispatcher.ask, lambda: bench.store.state, bench.session.status
     own = state().model.limits.joint.upper[0]
     ask(TypeField(field="setup.joints.upper.0", text="30"))
     wait(lambda: status().setup.joints is not None and status().phase == "idle", "the controller's yes")
@@ -34,7 +34,7 @@ def test_a_typed_limit_reaches_controller_and_plans_and_undo_takes_it_back(bench
 
 
 def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_field(bench: Workbench) -> None:
-    ask, state = bench.conductor.ask, lambda: bench.store.state
+    ask, state = bench.dispatcher.ask, lambda: bench.store.state
     for field, text in (("setup.joints.upper.1", "400"), ("setup.joints.lower.2", "170")):
         before = state().setup.wanted.joints
         ask(TypeField(field="setup.joints.upper.2", text="160"))
@@ -46,7 +46,7 @@ def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_fie
 
 
 def test_auto_limit_goes_to_our_own_controller(bench: Workbench) -> None:
-    bench.conductor.ask(SetWiring(name="auto_limit", on=True))
+    bench.dispatcher.ask(SetWiring(name="auto_limit", on=True))
     wait(lambda: bench.store.state.world.auto_limit, "the switch")
 
 

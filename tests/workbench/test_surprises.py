@@ -35,11 +35,11 @@ def set_out(bench: Workbench) -> float:
     """Executes a slow motion of joint 1 and returns where it started, once it is under way."""
     wait(lambda: is_ready(bench), "an idle arm")
     start = float(bench.session.status().q_c[0])
-    bench.conductor.ask(SetSpeed(speed=0.05))
+    bench.dispatcher.ask(SetSpeed(speed=0.05))
     goal = start + (0.8 if start < 0.0 else -0.8)
-    bench.conductor.ask(MoveJoint(joint=0, angle=goal))
+    bench.dispatcher.ask(MoveJoint(joint=0, angle=goal))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[0] == goal, "a plan")
-    bench.conductor.ask(RobotCommand(what="execute"))
+    bench.dispatcher.ask(RobotCommand(what="execute"))
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     wait(lambda: abs(float(bench.session.status().q[0]) - start) > 0.01, "the arm to get somewhere")
     return start
@@ -53,14 +53,14 @@ def move_on(bench: Workbench) -> None:
     wait(lambda: is_ready(bench) or bench.session.status().phase == "fault", "an arm that can go on")
     if bench.session.status().phase == "fault":
         assert [fault.name for fault in bench.session.status().faults] == ["INSTABILITY_DETECTION"]
-        bench.conductor.ask(RobotCommand(what="recover"))
+        bench.dispatcher.ask(RobotCommand(what="recover"))
     wait(lambda: is_ready(bench), "an idle, powered arm")
-    bench.conductor.ask(SetSpeed(speed=1.0))
+    bench.dispatcher.ask(SetSpeed(speed=1.0))
     angle = float(bench.session.status().q_c[1]) - 0.1
-    bench.conductor.ask(MoveJoint(joint=1, angle=angle))
+    bench.dispatcher.ask(MoveJoint(joint=1, angle=angle))
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.motion.goal[1] == angle, "a plan")
-    bench.conductor.ask(PlanGoal())
-    bench.conductor.ask(RobotCommand(what="execute"))
+    bench.dispatcher.ask(PlanGoal())
+    bench.dispatcher.ask(RobotCommand(what="execute"))
     wait(lambda: abs(float(bench.session.status().q_c[1]) - angle) < 1e-9, "the arm to arrive")
 
 
@@ -68,8 +68,8 @@ def move_on(bench: Workbench) -> None:
 def bench() -> Iterator[Workbench]:
     with Workbench(WorkbenchConfig(port=0, quality="light")) as opened:
         yield opened
-        assert opened.conductor.errors == []
-        assert opened.presenter.errors == []
+        assert opened.dispatcher.errors == []
+        assert opened.renderer.errors == []
 
 
 @pytest.mark.parametrize(
@@ -113,7 +113,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
     with connect(f"ws://127.0.0.1:{bench.port}/rcilab/live", additional_headers=origin, close_timeout=0.1) as page:
         going = threading.Event()
         page.send(json.dumps({"kind": "hello", "page": 1, "key": bench.live.introduce(1)}))
-        bench.conductor.ask(PageOpened(page=1))
+        bench.dispatcher.ask(PageOpened(page=1))
         wait(lambda: bench.store.state.lease.holder == 1, "the page to hold the controls")
 
         def answer() -> None:
@@ -135,11 +135,11 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
 def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     wait(lambda: is_ready(bench), "an idle arm")
     for typed in ("7", "12"):
-        bench.conductor.ask(TypeField(field="joint.0", text=typed))
+        bench.dispatcher.ask(TypeField(field="joint.0", text=typed))
     wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(12.0)), "a goal")
     wait(lambda: bench.store.state.plan is not None and bench.store.state.plan.complete, "a plan")
     goal, plan = bench.store.state.goal, bench.store.state.plan
-    bench.conductor.ask(ChooseRobot(target="rci://127.0.0.9:9"))
+    bench.dispatcher.ask(ChooseRobot(target="rci://127.0.0.9:9"))
     wait(lambda: bench.session.status().phase == "lost", "no connection")
     status = bench.session.status()
     assert "127.0.0.9" in status.message
@@ -148,14 +148,14 @@ def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     assert obstacle(bench.store.state, status).code == "ready.lost"
     assert "无法连接" in Text("zh").say(tell_status(status))
     wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
-    bench.conductor.ask(RobotCommand(what="power_on"))
+    bench.dispatcher.ask(RobotCommand(what="power_on"))
     wait(lambda: told(bench) == "ready.lost", "to be told what to press")
-    bench.conductor.ask(PoseGoal(name="undo"))
+    bench.dispatcher.ask(PoseGoal(name="undo"))
     wait(lambda: math.isclose(bench.store.state.goal.q[0], math.radians(7.0)), "undo to reach behind the connection")
-    bench.conductor.ask(MoveJoint(joint=0, angle=0.3))
+    bench.dispatcher.ask(MoveJoint(joint=0, angle=0.3))
     wait(lambda: bench.store.state.goal.q[0] == 0.3, "the candidate to be posed all the same")
     assert bench.store.state.no_plan.code == "plan.no_arm"
-    bench.conductor.ask(ChooseRobot(target="virtual"))
+    bench.dispatcher.ask(ChooseRobot(target="virtual"))
     move_on(bench)
 
 
@@ -164,7 +164,7 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
     try:
         address = controller.address
         with Workbench(WorkbenchConfig(port=0, quality="light", target=address)) as bench:
-            ask = bench.conductor.ask
+            ask = bench.dispatcher.ask
             wait(lambda: bench.session.status().phase == "idle", "a connection")
             ask(RobotCommand(what="power_on"))
             wait(lambda: is_ready(bench), "motor power")
@@ -190,6 +190,6 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
             controller.kill()
             wait(lambda: bench.session.status().phase == "lost", "the loss")
             assert bench.session.status().robot_mode is None
-            assert bench.conductor.errors == []
+            assert bench.dispatcher.errors == []
     finally:
         controller.end()

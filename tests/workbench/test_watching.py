@@ -123,10 +123,10 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
 
 def test_no_row_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
-        bench.conductor.ask(EditProgram(page=operator.page, what="add"))
+        bench.dispatcher.ask(EditProgram(page=operator.page, what="add"))
         wait(lambda: bool(bench.store.state.program.draft.steps), "a waypoint")
         asked = []
-        take = bench.conductor.ask
+        take = bench.dispatcher.ask
 
         def ask(request: Request) -> None:
             asked.append(request)
@@ -139,7 +139,7 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
             *(("edit", {"what": what, "key": key, "place": 0}) for what in ("delete", "duplicate", "undo", "select")),
         ]  # fmt: skip
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(bench.conductor, "ask", ask)
+            patch.setattr(bench.dispatcher, "ask", ask)
             for kind, values in rows:
                 watcher.say(kind, **values)
             watcher.settle()
@@ -152,7 +152,7 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
 
 def test_what_a_page_typed_goes_with_its_controls(bench):
     with script(bench) as first, script(bench) as second:
-        bench.conductor.ask(ChooseDestination(page=first.page, where="address", address="rci://192.0.2.7:1337"))
+        bench.dispatcher.ask(ChooseDestination(page=first.page, where="address", address="rci://192.0.2.7:1337"))
         wait(lambda: bench.store.state.typed_address != "", "the question")
         address = next(handle for name, handle in controls(bench).items() if name.startswith("Address"))
         name = next(handle for label, handle in controls(bench).items() if label.startswith("Name"))

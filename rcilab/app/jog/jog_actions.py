@@ -1,6 +1,6 @@
 """Requests that jog: the goal or the robot moves while a button is held, or by one step a press.
 
-Owned by the conductor's thread; it never waits for the robot.
+Owned by the dispatcher's thread; it never waits for the robot.
 """
 
 from __future__ import annotations

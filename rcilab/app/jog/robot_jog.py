@@ -1,6 +1,6 @@
 """The robot under the jog buttons: held through the supervisor, or by one checked motion a step; the goal goes along.
 
-Owned by the conductor's thread; it never waits for the robot.
+Owned by the dispatcher's thread; it never waits for the robot.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class RobotJog:
 
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
         self._store, self._session, self._goal = store, session, goal
-        self._ticket: PendingRequest | None = None  # On its way, until the arm stands.
+        self._request: PendingRequest | None = None  # On its way, until the arm stands.
         self._followed: Goal | None = None  # The goal that was put where the arm was jogged to.
 
     def begin(self) -> bool:
@@ -62,8 +62,8 @@ class RobotJog:
         change_jog(self._store, said=reason)
         if reason is not None:
             return False
-        if self._ticket is None or self._ticket.done:
-            self._ticket = None
+        if self._request is None or self._request.done:
+            self._request = None
             self._store.remember()
         return True
 
@@ -74,10 +74,10 @@ class RobotJog:
             axis: Which way.
             stops: How many stops had been heard of when the button said so.
         """
-        state, status, ticket = self._store.state, self._session.status(), self._ticket
-        if (ticket is not None and ticket.error is not None) or status.q_c is None or status.phase == "stopping":
+        state, status, request = self._store.state, self._session.status(), self._request
+        if (request is not None and request.error is not None) or status.q_c is None or status.phase == "stopping":
             return False
-        if ticket is not None and ticket.done and is_moving(status):
+        if request is not None and request.done and is_moving(status):
             return True  # It ended in the moment of the press; the next word begins another one.
         kind, values = jog_velocity(state.model, status.q_c, state.jog, axis)
         share, links = safe_share(state.model, status.q_c, kind, values)
@@ -92,8 +92,10 @@ class RobotJog:
             change_jog(self._store, said=message("jog.near", first=first, second=second, distance=ADVISED_DISTANCE))
             return False
         try:
-            goes_on = None if ticket is None or ticket.done else ticket
-            self._ticket = self._session.supervisor().jog(kind, min(share, room) * values, goes_on=goes_on, stops=stops)
+            goes_on = None if request is None or request.done else request
+            self._request = self._session.supervisor().jog(
+                kind, min(share, room) * values, goes_on=goes_on, stops=stops
+            )
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))
             return False
@@ -134,12 +136,12 @@ class RobotJog:
             change_jog(self._store, said=message("jog.unsafe", condition=broken))
             return
         try:
-            ticket = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
+            request = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))
             return
         self._store.remember()
-        self._followed, self._ticket = None, ticket
+        self._followed, self._request = None, request
 
     def watch(self, axis: Axis | None) -> bool:
         """Has the goal follow the arm; returns False when the button that is held moves nothing any more.
@@ -147,8 +149,8 @@ class RobotJog:
         Args:
             axis: What is held; None: nothing.
         """
-        ticket = self._ticket
-        if ticket is None:
+        request = self._request
+        if request is None:
             return True
         status = self._session.status()
         if status.q_c is not None and status.dq is not None:
@@ -157,23 +159,23 @@ class RobotJog:
                 self._follow(status.q_c)
             if axis is not None and speed < STILL and self._store.state.jog.said is None:
                 change_jog(self._store, said=at_limit(self._store.state.model, status.q_c, axis))
-        if not ticket.done or is_moving(status):
+        if not request.done or is_moving(status):
             return True
-        self._end(ticket, status)
-        return ticket.error is None
+        self._end(request, status)
+        return request.error is None
 
     def forget(self) -> None:
         """Drops what was jogged: it was another arm, or somewhere else."""
-        self._ticket = self._followed = None
+        self._request = self._followed = None
 
     def _follow(self, q: JointVector) -> None:
         if self._followed in (None, self._store.state.goal):  # Not when the goal was posed meanwhile.
             self._followed = self._goal.follow(q)
 
-    def _end(self, ticket: PendingRequest, status: SupervisorStatus) -> None:
+    def _end(self, request: PendingRequest, status: SupervisorStatus) -> None:
         if status.q_c is not None and self._followed in (None, self._store.state.goal):
             self._goal.pose(status.q_c)
-        self._ticket = self._followed = None
-        if ticket.error is not None:
+        self._request = self._followed = None
+        if request.error is not None:
             is_stopped = status.phase == "idle"
-            change_jog(self._store, said=message("jog.stopped") if is_stopped else tell_error(ticket.error, status))
+            change_jog(self._store, said=message("jog.stopped") if is_stopped else tell_error(request.error, status))

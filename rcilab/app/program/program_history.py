@@ -23,7 +23,7 @@ class _Shelf:
 
 
 class ProgramHistory:
-    """Exchanges the program that the page shows. Owned by the conductor's thread.
+    """Exchanges the program that the page shows. Owned by the dispatcher's thread.
 
     Args:
         store: The state.

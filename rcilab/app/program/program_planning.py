@@ -1,4 +1,4 @@
-"""The planning of a program from beginning to end, as it is done beside the conductor's thread."""
+"""The planning of a program from beginning to end, as it is done beside the dispatcher's thread."""
 
 from __future__ import annotations
 

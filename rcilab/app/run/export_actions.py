@@ -57,7 +57,7 @@ class Export:
 
 
 class ExportActions:
-    """Exports are made one after the other; the conductor's thread starts them and never waits.
+    """Exports are made one after the other; the dispatcher's thread starts them and never waits.
 
     Args:
         store: Where the run and the progress are.

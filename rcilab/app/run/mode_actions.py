@@ -1,4 +1,4 @@
-"""Choosing a mode, its parameters or a speed override. Owned by the conductor's thread."""
+"""Choosing a mode, its parameters or a speed override. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -197,8 +197,8 @@ class ModeActions:
         running, before = is_running(status), self._was_running
         self._was_running = running
         if self._changing is not None and self._changing[1].done:
-            (speed_override, ticket), self._changing = self._changing, None
-            self._tell_override(ticket.error, speed_override)
+            (speed_override, request), self._changing = self._changing, None
+            self._tell_override(request.error, speed_override)
         elif running and not before:
             self._set_override_refusal(None)
         wish = self._wish.due(status, is_under_way=self._changing is not None)

@@ -1,4 +1,4 @@
-"""What the scene shows of goal and plan, kept up to date in ticks, and what is asked for in it. Owned by the conductor.
+"""What the scene shows of goal and plan, kept up to date in ticks, and its requests. Owned by the dispatcher.
 
 A tick looks at the newest goal and plan only: a drag that comes faster than ticks does not wait for any of this.
 """

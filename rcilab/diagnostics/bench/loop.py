@@ -99,8 +99,8 @@ def stream(bench: Workbench, supervisor: Supervisor, seconds: float) -> Streamed
         # The bench is at the controls: a page that is drawn in software can be silent for longer than an operator may
         # be. Only said from here on: on a busy machine it may take longer than that until the watch stands.
         supervisor.set_operator_present(True)
-        ticket = supervisor.execute(motion, certificate)
-        while not ticket.done:
+        request = supervisor.execute(motion, certificate)
+        while not request.done:
             supervisor.set_operator_present(True)
             status = supervisor.status()
             if status.motion_time:
@@ -108,7 +108,7 @@ def stream(bench: Workbench, supervisor: Supervisor, seconds: float) -> Streamed
             fewest_pages = min(fewest_pages, len(bench.server.get_clients()))
             rows.append(reader.drain())
             time.sleep(0.1)
-        ticket.wait(0.0)
+        request.wait(0.0)
         after = supervisor.status()
     rows.append(reader.drain())
     return Streamed(

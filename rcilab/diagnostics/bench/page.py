@@ -34,7 +34,7 @@ def bench_drag() -> Measurement:
             before = bench.store.state
             request = MoveTarget(position=tuple((centre.position + offset).tolist()), wxyz=tuple(centre.wxyz.tolist()))
             start = time.perf_counter()
-            bench.conductor.ask(request)
+            bench.dispatcher.ask(request)
             wait_for("the new pose", lambda before=before: bench.store.state.goal is not before.goal, look=_LOOK)
             poses.append(time.perf_counter() - start)
             wait_for("the new plan", lambda before=before: bench.store.state.plan is not before.plan, look=_LOOK)

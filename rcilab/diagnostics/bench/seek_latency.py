@@ -52,7 +52,7 @@ def bench_scrub() -> Measurement:
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         origin = {"Origin": f"http://127.0.0.1:{bench.port}"}
         with connect(f"ws://127.0.0.1:{bench.port}{LIVE_PATH}", additional_headers=origin, compression=None) as link:
-            bench.conductor.ask(PageOpened(page=_PAGE))
+            bench.dispatcher.ask(PageOpened(page=_PAGE))
             link.send(json.dumps({"kind": "hello", "page": _PAGE, "key": bench.live.introduce(_PAGE)}))
             wait_for("the controls", lambda: bench.store.state.lease.holder == _PAGE, 30.0)
             for place in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 class Panel(Protocol):
-    """What the presenter needs of a panel."""
+    """What the renderer needs of a panel."""
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the panel's controls to the container that is open in `gui`."""

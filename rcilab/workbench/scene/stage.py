@@ -1,4 +1,4 @@
-"""The 3D scene: the arms in their room, and everything that stands around them. Owned by the presenter."""
+"""The 3D scene: the arms in their room, and everything that stands around them. Owned by the renderer."""
 
 from __future__ import annotations
 

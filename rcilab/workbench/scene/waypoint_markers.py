@@ -1,4 +1,4 @@
-"""The waypoints of the program in the scene: a point each, a label for those close together. Owned by the presenter."""
+"""The waypoints of the program in the scene: a point each, a label for those close together. Owned by the renderer."""
 
 from __future__ import annotations
 
