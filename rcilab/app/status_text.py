@@ -82,8 +82,14 @@ def tell_status(status: SupervisorStatus) -> Message:
 
 
 def tell_success(status: SupervisorStatus) -> Message:
-    """Returns the share of commands in time; the controller keeps that of the last motion until the next one."""
-    code = "health.success_now" if status.phase in ("moving", "stopping") else "health.success_last"
+    """Returns the share of commands in time; the controller keeps that of the last motion until the next one.
+
+    Before the first one it is the controller's initial number, which says nothing.
+    """
+    is_moving = status.phase in ("moving", "stopping")
+    if not is_moving and status.motion_time is None:
+        return message("health.success_none")
+    code = "health.success_now" if is_moving else "health.success_last"
     return message(code, share=f"{100.0 * status.success_rate:.1f}")
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import MOST_ROWS
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ def read_file(file: Path, max_rows: int = MOST_ROWS) -> Motion | Program:
     """
     from rcilab.motion import Motion, Program
 
+    if file.suffix.lower() == ".rcirun" and file.is_file():
+        raise InvalidValueError("motion file", file.name, f"is a recorded run: look at it with `rcilab replay {file}`")
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file, max_rows=max_rows)
 
 

@@ -22,7 +22,9 @@ COLORS = {"ok": "#1a7f37", "advice": "#b26a00", "violated": "#c62828"}
 """Green, amber, red, each readable on white and on dark grey."""
 
 _LISTED = 8
-_CELL = 'style="text-align:left;white-space:nowrap;padding:2px 10px"'
+_WORDS = 'style="text-align:left;padding:2px 6px"'
+_CELL = 'style="text-align:left;white-space:nowrap;padding:2px 6px"'
+_WRAPPED = (1, 5, 7)  # Columns of words, which may take a second line: a notebook at 1280 px shows the whole table.
 _HEADINGS = ("condition", "worst", "bound", "used", "where", "time", "source")
 
 
@@ -72,4 +74,5 @@ def _row(row: ConditionResult, language: Language) -> str:
         f"{row.time:.3f}",
         escape(explain_source(row.condition, language)),
     )
-    return "<tr>" + "".join(f"<td {_CELL}>{cell}</td>" for cell in cells) + "</tr>"
+    styles = [_WORDS if column in _WRAPPED else _CELL for column in range(len(cells))]
+    return "<tr>" + "".join(f"<td {style}>{cell}</td>" for style, cell in zip(styles, cells, strict=True)) + "</tr>"

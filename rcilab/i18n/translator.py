@@ -112,6 +112,11 @@ class Message:
     """What the sentence is filled with."""
 
 
+def follow(lead: str, rest: str) -> tuple[str, str]:
+    """Returns a lead and what follows it, with a space between them where the lead's script has one."""
+    return lead, rest if lead[-1:] >= "\u3000" else f" {rest}"
+
+
 def message(code: str, **values: object) -> Message:
     """Returns a message by its key and the values that fill it."""
     return Message(code, MappingProxyType(values))

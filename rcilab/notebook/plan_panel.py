@@ -155,7 +155,7 @@ class PlanPanel(Part):
         self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
             said = "" if state.now.no_plan is None else verdict("warn", "▲", text.say(state.now.no_plan))
-            write(self._said, said or soft(text("check.nothing")))
+            write(self._said, said or soft(text("plan.none", button=text("target.plan"))))
             return
         report = plan.report
         tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")

@@ -39,7 +39,10 @@ class ReportView(Part):
         text, report = self.text, self.report
         if report is None:
             reason = self.state.now.no_plan
-            write(self._verdict, soft(text("check.nothing") if reason is None else text.say(reason)))
+            write(
+                self._verdict,
+                soft(text("plan.none", button=text("target.plan")) if reason is None else text.say(reason)),
+            )
             write(self._rows, "")
             return
         unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")

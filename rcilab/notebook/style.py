@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import ipywidgets
 
+from rcilab.i18n.translator import follow
 from rcilab.notebook.widget_sharing import is_shared, lean, once
 
 Tone = Literal["good", "warn", "bad", "none"]
@@ -49,7 +50,8 @@ def write(widget: Any, content: str) -> None:
 
 def verdict(tone: Tone, word: str, rest: str) -> str:
     """Returns a line with a coloured edge: a word that says it all, and the sentence."""
-    return f'<p class="rl-verdict rl-{tone}" role="status"><b>{esc(word)}</b> {esc(rest)}</p>'
+    lead, follows = follow(word, rest)
+    return f'<p class="rl-verdict rl-{tone}" role="status"><b>{esc(lead)}</b>{esc(follows)}</p>'
 
 
 def soft(text: str) -> str:

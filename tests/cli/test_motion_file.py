@@ -108,3 +108,10 @@ def test_a_waypoint_that_cannot_be_planned_is_named_with_its_file_and_line(tmp_p
     (tmp_path / "far.json").write_text(f'{text}"waypoints": [\n{rows}]}}\n')
     assert main(["check", str(tmp_path / "far.json")]) == 2
     assert "far.json, line 5, waypoint 2 (line)" in capsys.readouterr().err
+
+
+def test_a_recorded_run_is_refused_with_the_command_that_shows_it(tmp_path, capsys):
+    run = tmp_path / "mine.rcirun"
+    run.write_bytes(b"of a run")
+    assert main(["check", str(run), "--model", "xMatePro7"]) == 2
+    assert f"look at it with `rcilab replay {run}`" in capsys.readouterr().err

@@ -80,6 +80,8 @@ def test_the_table_is_green_amber_or_red():
     assert amber.warnings
     for report, color in ((check(GOOD, MODEL), "ok"), (amber, "advice"), (check(spoiled(), MODEL), "violated")):
         html = report._repr_html_()
+        cells = html.split("<tbody><tr>")[1].split("</tr>")[0].split("</td>")
+        assert ["nowrap" in cell for cell in cells[:-1]] == [True, False, True, True, True, False, True, False]
         assert html.startswith(f'<div><b style="color:{COLORS[color]}"')
         assert html.count("<tr>") == len(report.rows) + 1
     assert COLORS["violated"] not in amber._repr_html_()

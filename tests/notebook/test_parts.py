@@ -247,6 +247,13 @@ def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> 
     assert not plan.report.warnings
 
 
+def test_a_posed_goal_without_a_plan_says_which_button_is_missing() -> None:
+    with notebook.PlanPanel(PRO7, language="en") as plan, notebook.ReportView(plan) as report:
+        plan.state.pose(GOAL)
+        for said in (plan._said, report._verdict):
+            assert "pose the goal, then press Plan there" in text_of(said)
+
+
 def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.plan.click()

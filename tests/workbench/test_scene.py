@@ -146,6 +146,7 @@ def test_out_of_reach_the_ring_names_its_orange_and_the_pose_that_it_is_about(be
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_the_ring_laid_out_flat_tells_its_arcs_in_words_and_patterns(bench, language):
     html = ring_html(bench.state.scene.elbow, Text(language))
+    assert "−" not in html, "one minus on the page"
     assert "url(#rl-arc-limits)" in html
     assert Text(language)("elbow.kind.limits") in html
     assert "98°" in html

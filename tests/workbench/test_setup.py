@@ -334,6 +334,10 @@ def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
     panel = next(panel for panel in bench.renderer._panels if isinstance(panel, CheckPanel))
     wait(lambda: "Out of date" in panel._verdict._shown, "the tab to say so")
     assert panel._again.visible
+    ask(PressCheck(what="again"))
+    wait(lambda: "Passed" in panel._verdict._shown, "a verdict")
+    assert bench.store.state.plan.report.ok
+    assert panel._slow.disabled is (not bench.store.state.plan.report.warnings), "there is nothing to slow down for"
 
 
 def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):

@@ -12,7 +12,7 @@ from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import RunActions
-from rcilab.app.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status
+from rcilab.app.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status, tell_success
 from rcilab.app.store import Store
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
@@ -181,12 +181,14 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
 
 
 def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():
-    state, facts = initial_state(), {"success_rate": 0.62, "rate_hz": 1000.0}
+    state, facts = initial_state(), {"success_rate": 0.62, "rate_hz": 1000.0, "motion_time": 1.5}
     for phase, bar, table in (("moving", "62 %", "62.0 %<"), ("idle", "—", "62.0 % in the last motion<")):
         now = status(phase=phase, code=phase, **facts)
         chips = {chip["id"]: chip["value"] for chip in status_values(state, now, Text("en"), 1.0)["chips"]}
         assert chips["success"] == bar
         assert f"<td>{table}" in health_html(state, now, Text("en"))
+    rested = status(success_rate=1.0)
+    assert Text("en").say(tell_success(rested)) == "—", "no motion yet"
 
 
 def initial_state():

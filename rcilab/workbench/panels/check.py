@@ -9,6 +9,7 @@ from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Message, Text
+from rcilab.i18n.translator import follow
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
@@ -65,7 +66,8 @@ class CheckPanel:
         self._undo.disabled = check.slowed is None or busy
         changed = outdated(state)
         self._again.visible = changed is not None and not busy
-        self._slow.disabled = plan is None or busy or changed is not None or is_moving(status)
+        is_met = plan is not None and plan.report.ok and not plan.report.warnings  # There is nothing to slow down for.
+        self._slow.disabled = plan is None or is_met or busy or changed is not None or is_moving(status)
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):
             self._tools.visible = plan is not None
@@ -99,8 +101,9 @@ class CheckPanel:
         note = text("check.note") if plan.complete else text("check.incomplete")
         if aside is not None:
             tone, rest = "warn" if report.ok else tone, f"{rest} {text.say(aside)}"
+        lead, rest = follow(sign + text(word), rest)
         return (
-            f'<p class="rl-verdict rl-{tone} rl-big"><b>{sign}{esc(text(word))}</b> {esc(rest)}</p>'
+            f'<p class="rl-verdict rl-{tone} rl-big"><b>{esc(lead)}</b>{esc(rest)}</p>'
             f'<p class="rl-note">{esc(note)}</p>'
         )
 

@@ -140,7 +140,7 @@ def _range(start: float, end: float, text: Text) -> str:
     ends = (-math.pi, math.pi)
     if end - start < math.tau - 1e-9:
         ends = (math.remainder(start, math.tau), math.remainder(end, math.tau))
-    return " … ".join(text.units.angle_of(angle, 0) for angle in ends).replace("-", "−")
+    return " … ".join(text.units.angle_of(angle, 0) for angle in ends)
 
 
 def _title(kind: str, joints: tuple[int, ...], text: Text) -> str:

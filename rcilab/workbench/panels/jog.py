@@ -14,6 +14,7 @@ from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, STEPS, HoldJog
 from rcilab.app.request import Request
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
+from rcilab.i18n.translator import follow
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
@@ -166,10 +167,8 @@ def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> 
 def reach_html(state: UiState, text: Text) -> str:
     """Returns what the inverse says about the goal, with its tone as a word and as a sign."""
     reach = state.goal.reach
-    return (
-        f'<p class="rl-verdict rl-{reach.tone}"><b>{esc(text("reach.tone." + reach.tone))}</b> '
-        f"{esc(text.say(reach.reason))}</p>"
-    )
+    lead, reason = follow(text("reach.tone." + reach.tone), text.say(reach.reason))
+    return f'<p class="rl-verdict rl-{reach.tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'
 
 
 def _joint_request(joint: int, factor: float):  # type: ignore[no-untyped-def]

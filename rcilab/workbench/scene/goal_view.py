@@ -9,6 +9,7 @@ import numpy as np
 
 from rcilab.app.goal.goal_actions import MoveTarget
 from rcilab.app.text import Text
+from rcilab.i18n.translator import follow
 from rcilab.workbench.scene.configuration_view import hides_target
 from rcilab.workbench.widgets import HAND_AWAY, Ask
 
@@ -97,7 +98,7 @@ class GoalView:
             self._tone = goal.reach.tone
             self._mark.color = TONE_COLORS[self._tone]
         tone, reason = goal.reach.tone, text.say(goal.reach.reason)
-        said = text("reach.label") if tone == "good" else f"{text('reach.tone.' + tone)} {reason}"
+        said = text("reach.label") if tone == "good" else "".join(follow(text("reach.tone." + tone), reason))
         said = text("target.handles", verdict=said)
         if said != self._said:
             self._said = said
