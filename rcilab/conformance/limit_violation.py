@@ -56,11 +56,11 @@ class LimitViolation(NamedTuple):
         return Remark(self.text, "passes", condition=row.id, **amounts)
 
 
-def describe_breaches(breaches: Iterable[LimitViolation]) -> Remark:
+def describe_violations(violations: Iterable[LimitViolation]) -> Remark:
     """Returns all of them in one line."""
-    return Remark.all(breach.remark for breach in breaches)
+    return Remark.all(violation.remark for violation in violations)
 
 
-def faults_of(breaches: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:
+def faults_of(violations: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:
     """Returns the faults that they raise, by number and once each."""
-    return tuple(sorted({row.fault for row, *_ in breaches if row.fault is not None}))
+    return tuple(sorted({row.fault for row, *_ in violations if row.fault is not None}))

@@ -268,10 +268,14 @@ class Monitor:
         self._clearance.step(q)
         return self._clearance.broken()
 
-    def _own(self, breaches: list[LimitViolation]) -> list[LimitViolation]:
+    def _own(self, violations: list[LimitViolation]) -> list[LimitViolation]:
         """Returns violations of common rows as those of the arm's own table, without those that it has no row for."""
         own = self._own_rows
-        return [breach._replace(condition=own[row.id]) for breach in breaches if (row := breach.condition).id in own]
+        return [
+            violation._replace(condition=own[row.id])
+            for violation in violations
+            if (row := violation.condition).id in own
+        ]
 
     def _improper(self, nearness: float) -> LimitViolation:
         return LimitViolation(self._pose_rows["frame"], 0, nearness, 1.0)

@@ -42,7 +42,7 @@ def plan_start(motion: Motion, speed_override: float, model: RobotModel, mode: M
     paced = start_with_override(motion, require_speed_override(speed_override))
     if not paced.changed:
         return paced
-    broken = _breaches(paced, model, mode)
+    broken = _violations(paced, model, mode)
     if broken:
         raise PlanningError(
             f"at {100 * speed_override:.0f} % of its speed this motion would break a condition "
@@ -78,7 +78,7 @@ def plan_speed_override(
     for _, candidate in zip(
         range(_ATTEMPTS), change_speed_override(paced, cycle, speed_override, model.limits.joint), strict=False
     ):
-        if not _breaches(candidate, model, mode):
+        if not _violations(candidate, model, mode):
             return candidate
     raise PlanningError(
         f"at t = {paced.place_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan there is no way within the "
@@ -87,7 +87,7 @@ def plan_speed_override(
     ).coded("no_way_to_pace", speed_override=f"{100 * speed_override:.0f}")
 
 
-def _breaches(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:
+def _violations(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:
     """Returns what the rows from the change on would break."""
     first = candidate.changed - 1
     rows = candidate.q[first:]

@@ -215,13 +215,13 @@ class ControlLoop:
             sent = self._filtered(wanted, state)
             self._answer(state, sent)
         last = wanted if near else sent
-        breach = self._brake.find_motion()
-        if breach is not None:
+        violation = self._brake.find_motion()
+        if violation is not None:
             raise InvalidValueError(
                 f"last command at t = {self._t:.3f} s",
-                round(breach.value, 3),
-                f"{breach.condition.unit} is what standing still from there would take ({breach.text}), so the arm was "
-                "stopped within the limits, farther on; let the commands stop before finished=True",
+                round(violation.value, 3),
+                f"{violation.condition.unit} is what standing still from there would take ({violation.text}), so the "
+                "arm was stopped within the limits, farther on; let the commands stop before finished=True",
             )
         state = self._hold(last)
         if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):

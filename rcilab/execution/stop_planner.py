@@ -248,9 +248,9 @@ def _first_violation(
 ) -> LimitViolation | None:
     """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
     for _ in range(_HISTORY):
-        breaches = [breach for breach in repeat() if breach.condition.order > 0]
-        if breaches:  # Where a joint or the tool is, is no motion.
-            return breaches[0]
+        violations = [violation for violation in repeat() if violation.condition.order > 0]
+        if violations:  # Where a joint or the tool is, is no motion.
+            return violations[0]
     return None
 
 

@@ -84,8 +84,8 @@ class ModeFields:
             return problem(text("ready.control_refused", error=text.say(state.now.drive.refusal)))
         known = state.session is None and state.robot is not None and state.now.is_virtual
         rows = held_rows(self._groups, state.now.drive.mode, status.setup.control, text, is_known=known)
-        told = soft(text("control.held")) + table([], [list(row) for row in rows])
-        return told + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
+        held = soft(text("control.held")) + table([], [list(row) for row in rows])
+        return held + (f'<p class="rl-soft"><b>{esc(text("control.pending"))}</b></p>' if pending else "")
 
     def _on_mode(self, change: Any) -> None:
         self._state.follow(change["new"])

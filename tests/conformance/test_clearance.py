@@ -148,7 +148,7 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
     kept = True
     for row in [*q, *[q[-1]] * HOLD_SAMPLES]:
         kept = (joints.step(row.tolist()) == []) & monitor.step(row.tolist()) & kept
-        broken = {breach.condition.id for breach in monitor.broken()}
+        broken = {violation.condition.id for violation in monitor.broken()}
         for id_, flags in played.items():
             flags.append(id_ in broken)
     for row in report.rows:

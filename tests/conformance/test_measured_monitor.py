@@ -44,7 +44,7 @@ def test_an_angle_may_overshoot_its_range_by_a_degree(over, expected):
 def test_a_joint_may_be_a_tenth_faster_than_commanded(part, expected):
     judge = monitor()
     assert faults_of(judge.step(HOME, with_one(STILL, 4, -part * 2.61), CENTRE, None, None)) == expected
-    assert [(breach.axis, breach.bound) for breach in judge.broken()] == (
+    assert [(violation.axis, violation.bound) for violation in judge.broken()] == (
         [(5, pytest.approx(-2.871))] if expected else []
     )
 

@@ -79,12 +79,12 @@ def played(
     sent = commands(model, rows, mode, state)
     before = state.q
     for cycle in range(int(state.moving), len(sent)):
-        breaches = monitor.step(sent[cycle])
+        violations = monitor.step(sent[cycle])
         if mode == "torque":
-            breaches += monitor.observe(path[cycle], (path[cycle] - before) / CYCLE_TIME)
+            violations += monitor.observe(path[cycle], (path[cycle] - before) / CYCLE_TIME)
             before = path[cycle]
-        for breach in breaches:
-            found.setdefault(breach.condition.id, set()).add((cycle, breach.axis))
+        for violation in violations:
+            found.setdefault(violation.condition.id, set()).add((cycle, violation.axis))
     return found
 
 
@@ -194,7 +194,7 @@ def test_they_agree_where_a_joint_leaves_its_range_turns_the_elbow_or_meets_a_si
             break
         q = rows[min(cycle, len(rows) - 1)]
         side = model.elbow(q)[1] if name == "Panda" else None
-        found = {(breach.condition.id, breach.axis) for breach in monitor.step(command, side=side)}
+        found = {(violation.condition.id, violation.axis) for violation in monitor.step(command, side=side)}
         wanted = {(row, axis) for row, places in broken.items() for at, axis in places if at == cycle}
         close = {(row, axis) for row, places in near.items() for at, axis in places if at == cycle}
         assert found - close == wanted - close, cycle
@@ -408,7 +408,7 @@ def test_what_is_no_pose_or_out_of_reach_breaks_the_frame(name, spoil):
         T[:3, :3] *= 1.1
     else:
         T[0, 3] += 5.0
-    frames = [breach for breach in monitor.step(CartesianPosition(T)) if breach.condition.signal == "frame"]
+    frames = [violation for violation in monitor.step(CartesianPosition(T)) if violation.condition.signal == "frame"]
     assert len(frames) == 1
     assert "improper" in frames[0].text
 
@@ -416,12 +416,12 @@ def test_what_is_no_pose_or_out_of_reach_breaks_the_frame(name, spoil):
 def test_a_joint_monitor_of_a_panda_speaks_its_makers_names():
     monitor = Monitor(PANDA)
     found = monitor.step(JointPosition(PANDA.home + 1e-3))
-    assert {breach.condition.fault for breach in found if breach.condition.necessity == "necessary"} == {
+    assert {violation.condition.fault for violation in found if violation.condition.necessity == "necessary"} == {
         FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
         FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY,
         FrankaError.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY,
     }
-    assert {breach.condition.id for breach in found if breach.condition.fault is None} == {
+    assert {violation.condition.id for violation in found if violation.condition.fault is None} == {
         "joint.torque", "joint.torque_rate"}  # fmt: skip
     assert faults_of(found) == (
         FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
@@ -443,8 +443,8 @@ def test_a_monitor_raises_the_faults_of_the_table_that_it_is_given(name):
     assert {type(fault) for fault in faults_of(found)} == {model.description.faults}
     common = JointMonitor(model.limits.joint)
     common.reset(model.home.tolist())
-    assert [breach.condition.id for breach in common.step((model.home + 9.0).tolist())] == [
-        breach.condition.id for breach in found
+    assert [violation.condition.id for violation in common.step((model.home + 9.0).tolist())] == [
+        violation.condition.id for violation in found
     ]
     assert faults_of(common.broken()) == ()
 

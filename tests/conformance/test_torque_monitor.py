@@ -36,7 +36,7 @@ def test_the_limit_itself_is_outside_and_both_faults_come_in_wire_order():
     assert faults_of(monitor.step([85.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])) == (RANGE,)
     monitor.reset([0.0] * 7)
     assert faults_of(monitor.step([85.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])) == (RATE, RANGE)
-    assert [breach.text for breach in monitor.broken()] == [
+    assert [violation.text for violation in monitor.broken()] == [
         "joint 1: commanded torque rate 85000 N m/s passes 1500 N m/s",
         "joint 1: commanded torque 85 N m passes 85 N m",
     ]
@@ -46,7 +46,7 @@ def test_a_wrist_bears_less():
     monitor = TorqueMonitor(LIMITS, RCI_TORQUE_CONDITIONS)
     monitor.reset([37.0] * 7)
     assert faults_of(monitor.step([37.0] * 7)) == (RANGE,)
-    assert [breach.axis for breach in monitor.broken()] == [5, 6, 7]
+    assert [violation.axis for violation in monitor.broken()] == [5, 6, 7]
 
 
 def test_what_is_not_a_number_breaks_both_and_a_six_axis_arm_ignores_the_seventh():

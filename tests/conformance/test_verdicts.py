@@ -93,10 +93,10 @@ def played(rows: Array, direction: Array, axis: Array) -> dict[str, list[int]]:
         if cycle == 0:
             monitor.reset(pose, psi)
         faults = faults_of(monitor.step(pose, psi))
-        breaches = monitor.broken()
-        assert set(faults) == {breach.condition.fault for breach in breaches}
-        for breach in breaches:
-            found.setdefault(breach.condition.id, []).append(cycle)
+        violations = monitor.broken()
+        assert set(faults) == {violation.condition.fault for violation in violations}
+        for violation in violations:
+            found.setdefault(violation.condition.id, []).append(cycle)
     return found
 
 
@@ -136,17 +136,17 @@ def test_a_spoiled_tool_sample_is_blamed_in_exactly_its_differences(seed, row, n
     assert found[kinds[1]] == [row, row + 1, row + 2, row + 3]
 
 
-def torque_breaches(tau: Array) -> dict[str, set[tuple[int, int]]]:
+def torque_violations(tau: Array) -> dict[str, set[tuple[int, int]]]:
     """Cycles and joints that a monitor finds broken, by condition, when the first row has lasted for a while."""
     monitor = TorqueMonitor(LIMITS.joint, RCI_TORQUE_CONDITIONS)
     monitor.reset(tau[0].tolist())
     found: dict[str, set[tuple[int, int]]] = {row.id: set() for row in TORQUE_CONDITIONS}
     for cycle, row in enumerate(tau.tolist()):
         faults = faults_of(monitor.step(row))
-        breaches = monitor.broken()
-        assert set(faults) == {breach.condition.fault for breach in breaches}
-        for breach in breaches:
-            found[breach.condition.id].add((cycle, breach.axis))
+        violations = monitor.broken()
+        assert set(faults) == {violation.condition.fault for violation in violations}
+        for violation in violations:
+            found[violation.condition.id].add((cycle, violation.axis))
     return found
 
 
@@ -157,10 +157,10 @@ def test_a_spoiled_torque_is_blamed_in_its_joint_and_in_exactly_its_two_differen
     times = np.arange(ROWS)[:, np.newaxis] * CYCLE_TIME
     bounds = LIMITS.joint
     tau = 0.3 * bounds.torque * np.sin(rng.uniform(-3.0, 3.0, 7) + times * 0.5 * bounds.torque_rate / bounds.torque)
-    assert torque_breaches(tau) == {"torque.rate": set(), "torque.range": set()}
+    assert torque_violations(tau) == {"torque.rate": set(), "torque.range": set()}
     step = rng.uniform(1.3, 500.0) * bounds.torque_rate[joint] * CYCLE_TIME
     tau[row, joint] += sign * step
-    found = torque_breaches(tau)
+    found = torque_violations(tau)
     assert found["torque.rate"] == {(row, joint + 1), (row + 1, joint + 1)}
     outside = abs(tau[row, joint]) >= bounds.torque[joint]
     assert found["torque.range"] == ({(row, joint + 1)} if outside else set())
@@ -171,7 +171,7 @@ def test_a_spoiled_torque_is_blamed_in_its_joint_and_in_exactly_its_two_differen
 def test_both_rows_on_torques_are_judged_as_their_inequalities_say(seed, scale):
     rng = np.random.default_rng(seed)
     tau = np.cumsum(rng.normal(scale=10.0**scale, size=(ROWS, 7)), axis=0)
-    found = torque_breaches(tau)
+    found = torque_violations(tau)
     for row in TORQUE_CONDITIONS:
         values = differences(tau)[row.order]
         lower, upper = row.bounds(LIMITS.joint)

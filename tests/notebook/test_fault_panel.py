@@ -60,7 +60,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             assert "kCommandJointAccelerationDiscontinuity" in said
             assert f"{math.degrees(5000.0):.0f}°/s³" in said  # Five thousand rad/s^3, in the degrees of every widget.
             for part in (
-                panel.exhibit.told("explanation", "zh"),
+                panel.exhibit.describe("explanation", "zh"),
                 *panel.exhibit.tell_way_out("zh"),
                 panel.exhibit.script,
             ):

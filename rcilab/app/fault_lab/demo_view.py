@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.i18n.translator import Text
 
-_NEAR = 0.5  # Share of the lower bound from which on it is shown: a far one would press the curve flat. A choice.
+_NEAR = 0.5  # Share of the lower bound from which on it is shown: a far one would press the curve flat.
 
 
 def head_html(exhibit: FaultDemo, text: Text) -> str:
@@ -32,7 +32,7 @@ def head_html(exhibit: FaultDemo, text: Text) -> str:
         "learn.number", value=value, bound=with_unit(bound, row.unit, text),
         time=f"{exhibit.time:.3f}", sample=exhibit.sample,
     )  # fmt: skip
-    sent = exhibit.told("sent", text.language, text.units)
+    sent = exhibit.describe("sent", text.language, text.units)
     place = text("check.joint", joint=exhibit.signal.axis) + " · " if exhibit.signal.axis else ""
     return (
         f'<p class="rl-verdict rl-bad rl-big"><b>◆ {_breakable(exhibit.fault.manual_name)}</b> '
@@ -53,8 +53,8 @@ def body_html(exhibit: FaultDemo, text: Text) -> str:
     )
     source, manual = explain_source(row, language), f"manual.{exhibit.fault.maker}"
     rows = (
-        ("learn.cause", escape(exhibit.told("explanation", language, text.units))),
-        ("learn.remedy", escape(exhibit.told("prevention", language, text.units))),
+        ("learn.cause", escape(exhibit.describe("explanation", language, text.units))),
+        ("learn.remedy", escape(exhibit.describe("prevention", language, text.units))),
         (
             "learn.condition",
             f"{escape(explain_formula(row, language))}<br><span class='rl-dim'>{escape(source)}</span>",
@@ -71,7 +71,7 @@ def seen_lower(values: Array, lower: float) -> float:
     """Returns the bound below where the curve comes near it, else NaN: it is not drawn.
 
     Args:
-        values: What a condition judges, shape (N,).
+        values: What a condition bounds, shape (N,).
         lower: Its bound below.
     """
     least = float(np.nanmin(np.where(np.isfinite(values), values, np.nan)))

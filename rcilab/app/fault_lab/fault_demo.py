@@ -35,7 +35,7 @@ class FaultDemo:
     scenario: FaultScenario
     model: RobotModel
     limits: Limits
-    """What the arm was judged by, narrowed limits included."""
+    """What the arm was checked by, narrowed limits included."""
     reported: tuple[FaultCode, ...]
     """Every error bit that was set in that cycle, in wire order."""
     said: str
@@ -96,7 +96,7 @@ class FaultDemo:
 
     @property
     def commanded(self) -> Motion:
-        """The joint angles that the arm was told: those sent, the wrong one too; or what the controller made of poses.
+        """The joint angles that were commanded: those sent, the wrong one too; or what the controller made of poses.
 
         After the fault it is the controller's way to rest. While torques are commanded no angles are: the motion stands
         at the start.
@@ -128,7 +128,7 @@ class FaultDemo:
         after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))
 
-    def told(
+    def describe(
         self, what: Literal["sent", "explanation", "prevention"], language: Language = "en", units: Units = USUAL
     ) -> str:
         """Returns what was done, why the controller stops for it, or how to avoid it.
@@ -168,10 +168,10 @@ class FaultDemo:
         )  # fmt: skip
         return "\n".join(
             (
-                f"{self.fault.manual_name}: {self.told('explanation', language)}",
-                f"  {text('demo.head.sent')} {self.told('sent', language)}",
+                f"{self.fault.manual_name}: {self.describe('explanation', language)}",
+                f"  {text('demo.head.sent')} {self.describe('sent', language)}",
                 f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]",
-                f"  {text('demo.head.remedy')} {self.told('prevention', language)}",
+                f"  {text('demo.head.remedy')} {self.describe('prevention', language)}",
                 f"  {text('demo.head.way_out')} {' → '.join(self.tell_way_out(language))}",
             )
         )

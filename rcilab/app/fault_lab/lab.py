@@ -34,21 +34,21 @@ from rcilab.motion import plan_joint
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
-_CALM = 1.0  # [N, N m] A choice: far below any threshold that a scenario sets.
+_CALM = 1.0  # [N, N m] Far below any threshold that a scenario sets.
 _CALM_STATES = 500
-_GAP = 5  # [cycles] A choice: so many states may be missing between two that are shown, as on any network.
-_AFTER = 200  # [cycles] How long the controlled stop is watched; a choice: the arm stands still by then.
-_NUDGE = 0.02  # [rad] How far the arm moves to show that it does again; a choice.
+_GAP = 5  # [cycles] So many states may be missing between two that are shown, as on any network.
+_AFTER = 200  # [cycles] How long the controlled stop is watched: the arm stands still by then.
+_NUDGE = 0.02  # [rad] How far the arm moves to show that it does again.
 _THERE = 1e-6  # [rad] What counts as standing where a scenario begins.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
 """Parts of the work: the controller is up, the arm stands where it begins, the fault has come. About what was seen."""
 
 Tell = Callable[[float], None]
-"""Told how much is done, 0 to 1. What it raises ends the provocation: the arm is brought to rest, nothing is kept."""
+"""Called with the part done, 0 to 1. What it raises ends the provocation: the arm is stopped, nothing is kept."""
 
 
 class FaultLab(Closeable):
-    """Provokes faults on a private virtual arm that nobody else sees. Owned by one thread; opens when first used.
+    """Provokes faults on a private virtual arm. Owned by one thread; opens when first used.
 
     Args:
         model: The arm, without tool and load: what is shown is the bare arm's.
@@ -65,7 +65,7 @@ class FaultLab(Closeable):
 
         Args:
             fault: A fault, or its name as the manual prints it.
-            progress: Told how much is done.
+            progress: Called with the part done.
 
         Raises:
             InvalidValueError: There is no such fault.

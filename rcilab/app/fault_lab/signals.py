@@ -1,6 +1,6 @@
 """The signal that broke a condition, cycle by cycle, computed from the recorded cycles as the controller does it.
 
-A value stands in the row of the state that shows it: the command that answered one state is judged in the next cycle.
+A value stands in the row of the state that shows it: the command that answered one state is checked in the next cycle.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from rcilab.sim.plant import Measurement
 
 _BEFORE = 3  # Rows that a third difference looks back to.
 _SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
-_UNREACHABLE = 2.0  # What a pose counts as that no joint angles give: 1 is the bound. A choice, for the plot.
+_UNREACHABLE = 2.0  # What a pose counts as that no joint angles give: 1 is the bound. For the plot.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Signal:
-    """What a condition judges over the recorded cycles."""
+    """What a condition bounds over the recorded cycles."""
 
     condition: Condition
     axis: int
@@ -38,7 +38,7 @@ class Signal:
     values: Array
     """Shape (N,), in the condition's unit."""
     lower: float
-    """Bound below, -inf where there is none."""
+    """Bound below, -inf without one."""
     upper: float
 
     @property
@@ -71,7 +71,7 @@ class Signals:
     Args:
         rows: Recorded cycles, see `cycle_dtype`; the last one carries the fault.
         model: The arm.
-        limits: What it was judged by.
+        limits: What it was checked by.
         box: Where its tool was to stay.
         lost: Commands in a row that the controller counted as lost.
     """
@@ -184,7 +184,7 @@ class Signals:
         return self._closed_form.arm_angle_path(q)
 
     def _sent(self, name: str, before: Array | float) -> Array | None:
-        """Returns what was judged in each row, with `_BEFORE` rows of standing still in front; None: none was sent."""
+        """Returns what was checked in each row, with `_BEFORE` rows of standing still in front; None: none was sent."""
         sent = self._rows[name][:-1]
         if not len(sent) or not np.isfinite(sent.reshape(len(sent), -1)).all():
             return None

@@ -36,7 +36,7 @@ class Show:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LessonState:
-    """How far somebody is in a lesson."""
+    """Progress in a lesson."""
 
     name: str
     step: int = 0

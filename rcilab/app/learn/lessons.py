@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
 """Whether it is done, from the state when the step began, the state of now, and how the robot is."""
 
-_POSED = 0.15  # [rad] A choice: so far from the arm a goal was moved on purpose.
-_TURNED = 0.2  # [rad] of arm angle; a choice.
-_FAST = 0.95  # Share of the limits to plan with; a choice.
-_FELT = 3.0  # [N] A choice: more than an arm at rest feels.
+_POSED = 0.15  # [rad] So far from the arm a goal was moved on purpose.
+_TURNED = 0.2  # [rad] of arm angle.
+_FAST = 0.95  # Share of the limits to plan with.
+_FELT = 3.0  # [N] More than an arm at rest feels.
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,7 @@ class DriveState:
 
     mode: Mode = "joint_position"
     control: ControllerParameters | None = None
-    """Parameters as the operator wants them, all of them; None: nobody has touched them."""
+    """Parameters as the operator wants them, all of them; None: unchanged."""
     refusal: Message | None = None
     """Why the controller did not take them."""
     speed_override: float = 1.0

@@ -104,7 +104,7 @@ class ModeActions:
             self._wish.choose(speed_override, status)
 
     def pause(self) -> None:
-        """Holds the motion under way."""
+        """Holds the motion in progress."""
         if self._require_motion():
             self._wish.hold()
 

@@ -52,8 +52,8 @@ def control_obstacle(
     Args:
         wanted: What it is to have.
         held: What it has acknowledged.
-        refusal: Why it did not take them; None: it did, or was not told yet.
-        address: Of a controller that is not ours, which is told only when somebody says so; None: it is ours.
+        refusal: Why it refused them; None: it accepted them, or was not sent them yet.
+        address: Of a real controller, which is sent them only after a yes; None: a virtual one.
     """
     if not is_control_pending(wanted, held):
         return None
@@ -63,7 +63,7 @@ def control_obstacle(
 
 
 def ask_to_send(address: str) -> Message:
-    """Returns the question before a controller that is not ours is told other parameters."""
+    """Returns the question before a real controller is sent other parameters."""
     return message("control.sure", address=address, seconds=f"{CONFIRM_TIMEOUT:.0f}")
 
 

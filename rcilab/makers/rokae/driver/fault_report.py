@@ -143,11 +143,11 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
             stood = {"command": rows["q_c"][0], "command_pose": values[0], "command_tau": np.zeros_like(values[0])}
             values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
         first = len(values) - len(rows)
-        for place, breaches in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
-            is_broken = is_broken or bool(breaches)
-            for breach in breaches:
-                if breach.condition.fault in faults:
-                    return f"{breach.text} in the command at t = {rows['t'][place - first]:.3f} s", True
+        for place, violations in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
+            is_broken = is_broken or bool(violations)
+            for violation in violations:
+                if violation.condition.fault in faults:
+                    return f"{violation.text} in the command at t = {rows['t'][place - first]:.3f} s", True
         return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_broken
     return "", is_broken
 

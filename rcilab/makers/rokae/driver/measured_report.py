@@ -33,7 +33,7 @@ YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPED
 class _Measured(NamedTuple):
     """The last cycles, checked as our virtual controller does; a real one may allow less."""
 
-    breaches: list[LimitViolation]
+    violations: list[LimitViolation]
     ddq: Array
     """Low-passed joint accelerations, shape (N, n), [rad/s^2]."""
 
@@ -60,7 +60,7 @@ def describe_measured(
     if not len(record):
         return
     measured = _judge(record, model, limits, mode)
-    said = {breach.condition.fault: breach.text for breach in measured.breaches}
+    said = {violation.condition.fault: violation.text for violation in measured.violations}
     joint = limits.joint
     for fault, values, bounds, unit in (
         (Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, record["dq"], joint.velocity, "rad/s"),
@@ -105,15 +105,15 @@ def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: Co
         yielding_limits(limits) if mode in YIELDING_MODES else limits, rows=RCI_MEASURED_CONDITIONS
     )
     monitor.reset(record["q"][0].tolist())
-    ddq, breaches = np.zeros((len(record), model.n)), []
+    ddq, violations = np.zeros((len(record), model.n)), []
     for place, (q, dq) in enumerate(zip(record["q"], record["dq"], strict=True)):
         twist, psi = None, None
         if mode in _CARTESIAN:
             twist, psi = (model.jacobian(q) @ dq).tolist(), _arm_angle(model, q)
         if monitor.step(q.tolist(), dq.tolist(), (0.0, 0.0, 0.0), twist, psi):
-            breaches += monitor.broken()
+            violations += monitor.broken()
         ddq[place] = monitor.acceleration
-    return _Measured(breaches, ddq)
+    return _Measured(violations, ddq)
 
 
 def _arm_angle(model: RobotModel, q: Array) -> float | None:

@@ -23,12 +23,12 @@ from rcilab.makers.scenario import Callback, FaultScenario, Scene
 LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
 """Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
 
-_PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began; a choice.
-_SOFT_LIMIT = 0.05  # [rad] from where the joint stands; a choice.
+_PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began.
+_SOFT_LIMIT = 0.05  # [rad] from where the joint stands.
 _HELD_LINK = 2
-_HOLD = 0.8  # Part of the collision threshold that something holds against at most; a choice.
-_TOLD = 4  # [cycles] How often that is told to the world; a choice.
-_HALF_BOX = 0.03  # [m] A choice.
+_HOLD = 0.8  # Part of the collision threshold that something holds against at most.
+_SENT_EVERY = 4  # [cycles] How often that is sent to the simulation.
+_HALF_BOX = 0.03  # [m]
 _PAST = 1.006  # Times the bound: past it by more than rounding.
 
 
@@ -169,7 +169,7 @@ def _torque_range(scene: Scene) -> Callback:
 
     def callback(state: RobotState, t: float) -> Command:
         cycle = round(t / CYCLE_TIME)
-        if cycle % _TOLD == 0 and tau[cycle] <= strongest:
+        if cycle % _SENT_EVERY == 0 and tau[cycle] <= strongest:
             robot.simulation.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
         return stream(state, t)
 

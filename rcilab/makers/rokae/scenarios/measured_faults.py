@@ -14,11 +14,11 @@ from rcilab.makers.rokae.scenarios.command_faults import LIVELY_ELBOW, box_aroun
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.sim.api import NetworkFaults
 
-_PAUSE = 20  # [cycles] of standing still before; a choice.
-_LONGEST = 3000  # [cycles] in which a fault has to come; a choice.
-_STEP = 5  # [cycles] How often a growing push is told to the world; a choice.
+_PAUSE = 20  # [cycles] of standing still before.
+_LONGEST = 3000  # [cycles] in which a fault has to come.
+_STEP = 5  # [cycles] How often a growing push is sent to the simulation.
 _ELBOW_LINK = 4
-_CUT = 40  # [cycles] after which the network goes; a choice.
+_CUT = 40  # [cycles] after which the network goes.
 
 Push = Callable[[int], tuple[float, ...]]
 """Wrench on the tool by the cycle since the push began: force and moment, base axes, [N, N m]."""
