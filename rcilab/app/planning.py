@@ -75,7 +75,7 @@ class Plan:
         return replace(self, report=report, mode=mode, complete=True)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
-        """Returns what has changed since the plan was checked, as certificates name it: tool, load, safety box.
+        """Returns what has changed since the plan was checked, as certificates name it: tool, load, joint limits, box.
 
         Args:
             model: The arm as it is now.
@@ -90,6 +90,8 @@ class Plan:
             is_changed = checked is None or not _is_same_box(bound, checked)
         if is_changed:
             changed.append("box")
+        if then["limits"] != now["limits"]:
+            changed.append("joints")
         return tuple(changed)
 
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from rcilab.app.check.freshness import outdated
+from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.request import TypeField
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.setup_actions import PressSetup
+from rcilab.app.text import Text
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, wait
@@ -31,6 +35,20 @@ def test_a_typed_limit_reaches_controller_and_plans_and_undo_takes_it_back(bench
     ask(PressSetup(what="undo"))
     wait(lambda: status().setup.joints.upper[0] == own, "the whole range at the controller")
     assert state().model.limits.joint.upper[0] == own
+
+
+def test_a_plan_that_was_checked_inside_other_limits_is_out_of_date(bench: Workbench) -> None:
+    ask, state = bench.dispatcher.ask, lambda: bench.store.state
+    here = bench.session.status().q_c
+    assert here is not None
+    ask(MoveJoint(joint=0, angle=float(here[0]) - 0.9))
+    wait(lambda: state().plan is not None and outdated(state()) is None, "a plan")
+    limits = state().model.limits.joint
+    lower = limits.lower.copy()
+    lower[0] = here[0] - 0.8
+    changed = outdated(replace(state(), model=state().model.with_joint_limits(lower, limits.upper)))
+    assert changed is not None
+    assert "soft joint limits" in Text("en").say(changed)
 
 
 def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_field(bench: Workbench) -> None:

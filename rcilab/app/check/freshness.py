@@ -21,7 +21,7 @@ def beside_program(state: UiState) -> Message | None:
 
 
 def outdated(state: UiState) -> Message | None:
-    """Returns why the plan no longer holds, or None: its program, tool, load or safety box has changed."""
+    """Returns why the plan no longer holds, or None: its program, tool, load, joint limits or safety box changed."""
     plan, program = state.plan, state.program
     if plan is None:
         return None

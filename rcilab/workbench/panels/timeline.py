@@ -113,7 +113,7 @@ class TimelinePanel:
         paced = paced_of(state)
         if paced is not None:  # On the time axis of the plots: that of the run.
             t, duration = played_at(state, t), paced.duration
-        return f'<p class="rl-clock"><b>{t:.3f}</b> / {duration:.3f} s<span>{esc(kinds)}</span></p>'
+        return f'<p class="rl-clock"><b>{t:.3f}</b> /&nbsp;{duration:.3f}&nbsp;s<span>{esc(kinds)}</span></p>'
 
 
 def _choice(name: str):  # type: ignore[no-untyped-def]
