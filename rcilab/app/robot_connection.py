@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from rcilab.app.arm_features import tell_lack_to_run
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.core.errors import RcilabError, UsageError
@@ -41,9 +42,15 @@ class RobotConnection:
     ) -> None:
         """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once.
 
+        For an arm that cannot be run there, nothing is started: see `tell_lack_to_run`.
+
         Raises:
             UsageError: Memory is short.
         """
+        if tell_lack_to_run(model, is_virtual=target == "virtual") is not None:
+            self.disconnect()
+            self.name = target
+            return
         with self._lock:
             self._generation += 1
             generation, previous = self._generation, self._worker

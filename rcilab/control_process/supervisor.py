@@ -52,7 +52,7 @@ from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration, require_setup
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
-from rcilab.makers.maker import maker_of, require_driver
+from rcilab.makers.maker import maker_of, require_driver, require_feature
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 
@@ -421,10 +421,12 @@ class Supervisor(Closeable):
 
         Raises:
             InvalidValueError: There is no such space or kind.
+            ModelError: The arm has no hand guiding.
             UsageError: The arm is moving, no controller is connected, no operator is present, or a stop has come
                 meanwhile.
         """
         require_guidable(space, kind)
+        require_feature(self.model, "guiding")
         with self._lock:
             self._require_unstopped(stops)
             require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())

@@ -31,7 +31,7 @@ from rcilab.execution.start_pose_check import describe_start_mismatch, require_m
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
-from rcilab.makers.maker import require_driver
+from rcilab.makers.maker import require_driver, require_feature
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
@@ -366,7 +366,7 @@ class RobotSession(Closeable):
             ConnectionLostError: The connection to the controller is lost.
         """
         require_motion(motion, certificate)
-        require_mode(mode)
+        require_feature(self.model, require_mode(mode))
         require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):
             state = self.receive_state()
@@ -469,7 +469,7 @@ class RobotSession(Closeable):
             InvalidValueError: A command was not valid; the arm was stopped.
             Exception: An exception of the callback; the arm was stopped.
         """
-        require_mode(mode)
+        require_feature(require_feature(self.model, "streaming"), require_mode(mode))
         filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
         if rate_limit is not None:
             filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit)))

@@ -9,8 +9,9 @@ from typing import Any
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.i18n.translator import Amount, Finished, Message, Remark, message
 
-_NAMES = frozenset({"status", "kind", "condition"})
-"""Facts that are names with words of their own: the answer to a command, the type of a waypoint, a condition."""
+_NAMES = frozenset({"status", "kind", "condition", "feature"})
+"""Facts that are names with words of their own: the answer to a command, the type of a waypoint, a condition, a feature
+that an arm lacks."""
 _REQUIREMENTS = frozenset(
     {
         "span", "least", "rounds", "missing", "missing_beside", "unknown", "axes", "turns", "no_unit", "beyond",

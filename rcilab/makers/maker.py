@@ -11,12 +11,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
+from rcilab.core.state import Mode
+from rcilab.makers.configuration import SetupPart
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots import ROBOTS_BY_MAKER
 
@@ -37,6 +39,16 @@ class Capabilities:
     """Whether there is a virtual controller."""
     drives: bool = False
     """Whether there is a driver for the real controller."""
+    streams: bool = False
+    """Whether the controller follows a command in every cycle, as a callback gives them."""
+    modes: tuple[Mode, ...] = ()
+    """How it can be commanded."""
+    guides: bool = False
+    """Whether it frees the arm for a hand to guide it."""
+    signals: int = 0
+    """Number of digital outputs, and as many inputs."""
+    setup: tuple[SetupPart, ...] = ()
+    """What it can be sent: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     longest_tool: float = 2.0
     """Farthest that tool, force-control frame and the load's centre of mass may be from the flange, [m]."""
 
@@ -56,6 +68,10 @@ class Timing:
     def command_cycles(self) -> int:
         """`command_period` in cycles of the grid that motions are planned on."""
         return max(1, round(self.command_period / CYCLE_TIME))
+
+
+Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals"]
+"""What an arm may lack; catalogues call it `feature.NAME`."""
 
 
 class Maker(Protocol):
@@ -153,6 +169,18 @@ class PlanningOnly:
         raise ModelError(f"{address} cannot be driven")
 
 
+_FEATURE_NAMES: dict[Feature, str] = {
+    "guiding": "hand guiding",
+    "signals": "digital signals",
+    "box": "safety box",
+    "force": "force-control frame",
+    "joints": "soft joint limits",
+    "control": "parameters of its modes",
+    "streaming": "commands in every cycle",
+    **{mode: f"{mode.replace('_', ' ')} mode" for mode in get_args(Mode)},
+}
+
+
 @cache
 def all_makers() -> tuple[Maker, ...]:
     """Returns every maker, by name of the folder."""
@@ -191,34 +219,62 @@ def driven_robots() -> tuple[str, ...]:
     return _robots_of(maker for maker in all_makers() if maker.capabilities.drives)
 
 
-def require_simulator(model: RobotModel) -> RobotModel:
-    """Returns `model` if its arm has a virtual controller.
+def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
+    """Returns what an arm lacks for a feature and why, as the error of a call that needs it; None: it has it."""
+    capabilities = capabilities_of(model)
+    simulates, drives = capabilities.simulates, capabilities.drives
+    if feature == "simulation" and simulates:
+        return None
+    if feature == "driving" and drives:
+        return None
+    if not (simulates or drives):
+        return _lack_of_everything(model)
+    if feature == "simulation":
+        sentence = f"{model.name} has no virtual controller in rcilab: connect to a real one"
+        return ModelError(sentence).coded("no_simulation", model=model.name)
+    if feature == "driving":
+        return ModelError(f"{model.name} has no driver in rcilab: simulate it").coded("no_driver", model=model.name)
+    has = {"streaming": capabilities.streams, "guiding": capabilities.guides, "signals": capabilities.signals > 0}
+    if has.get(feature, feature in (*capabilities.modes, *capabilities.setup)):
+        return None
+    sentence = f"the controller of {model.name} has no {_FEATURE_NAMES.get(feature, feature.replace('_', ' '))}"
+    return ModelError(sentence).coded("no_feature", model=model.name, feature=feature)
+
+
+def _lack_of_everything(model: RobotModel) -> ModelError:
+    maker, possible = maker_of(model), ", ".join(simulated_robots())
+    name = "its maker" if maker is None else maker.title
+    return ModelError(
+        f"{model.name} is driven by {name}'s own interface, which rcilab does not implement: plan for it, check and "
+        f"draw its motions, but simulate and drive one of {possible}"
+    ).coded("only_planned", model=model.name, maker=name, robots=possible)
+
+
+def require_feature(model: RobotModel, feature: Feature) -> RobotModel:
+    """Returns `model` if its arm has a feature.
 
     Raises:
-        ModelError: It has no virtual controller; the message says what can be done with it.
+        ModelError: It lacks it; the message says why, and what can be done with it.
     """
-    return _require(model, simulated_robots())
+    lack = find_lack(model, feature)
+    if lack is not None:
+        raise lack
+    return model
+
+
+def require_simulator(model: RobotModel) -> RobotModel:
+    """Returns `model` if its arm has a virtual controller; see `require_feature`."""
+    return require_feature(model, "simulation")
 
 
 def require_driver(model: RobotModel) -> RobotModel:
-    """Returns `model` if its arm can be driven.
+    """Returns `model` if its arm can be driven, a virtual one or a real one.
 
     Raises:
         ModelError: It cannot; the message says what can be done with it.
     """
-    return _require(model, driven_robots())
+    return model if find_lack(model, "simulation") is None else require_feature(model, "driving")
 
 
 def _robots_of(makers: Iterable[Maker]) -> tuple[str, ...]:
     return tuple(name for maker in makers for name in maker.robots)
-
-
-def _require(model: RobotModel, possible: tuple[str, ...]) -> RobotModel:
-    if model.name in possible:
-        return model
-    maker = maker_of(model)
-    reason = "no maker's interface" if maker is None else f"{maker.interface}, which rcilab does not implement"
-    raise ModelError(
-        f"{model.name} is driven by {reason}: plan for it, check and draw its motions, but simulate and drive one of "
-        f"{', '.join(possible)}"
-    )

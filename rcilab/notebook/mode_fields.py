@@ -7,6 +7,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.arm_features import is_only_planned, tell_lack
 from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
 from rcilab.app.run.mode_parameters import held_rows, is_control_pending, name_group, shown_numbers
 from rcilab.control_process import SupervisorStatus
@@ -61,8 +62,10 @@ class ModeFields:
         """Follows mode, parameters and what the controller has of them."""
         state, text = self._state, self._text
         self.mode.value = state.now.drive.mode
-        self.mode.disabled = status is not None and status.phase in ("moving", "stopping")
-        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note")))
+        is_moving = status is not None and status.phase in ("moving", "stopping")
+        self.mode.disabled = is_moving or is_only_planned(state.model)
+        lack = tell_lack(state.model, state.now.drive.mode)
+        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if lack is None else text.say(lack)))
         for group in self._groups:
             folder, shown = self.folders[group.name], None if state.now.drive.mode in group.modes else "none"
             if folder.layout.display != shown:

@@ -8,6 +8,7 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.arm_features import is_only_planned, tell_lack
 from rcilab.app.connection import Robot
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import parameter_obstacle
@@ -314,6 +315,7 @@ class RunPanel(Part):
         is_own = isinstance(state.robot, RobotConnection)
         self.disconnect.layout.display = None if is_own else "none"
         reason = _obstacle(state)
+        self.connect.disabled = self.target.disabled = is_only_planned(state.model)
         self.execute.disabled = reason is not None
         powered = None if status is None else status.powered
         is_pressed = status is not None and status.is_pressed
@@ -384,6 +386,9 @@ class RunPanel(Part):
 def _obstacle(state: LabState) -> Message | None:
     """Returns what stands in the way of Execute, or None when it may be pressed."""
     status = state.status
+    lack = tell_lack(state.model, "simulation" if is_only_planned(state.model) else state.now.drive.mode)
+    if lack is not None:
+        return lack
     if status is None:
         return message("ready.closed")
     if status.phase == "closed" and state.session is not None:

@@ -73,7 +73,7 @@ class Workbench:
         config: How to start.
 
     Raises:
-        ModelError: No robot has this name, or it does not speak the RCI.
+        ModelError: No robot has this name, or it cannot be driven at an address.
         UsageError: The port is in use, or the address needs a token.
     """
 

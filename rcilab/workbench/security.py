@@ -11,7 +11,7 @@ import socket
 
 from rcilab.core.errors import UsageError
 from rcilab.makers.driver import parse_address
-from rcilab.makers.maker import require_simulator
+from rcilab.makers.maker import require_feature
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.workbench.access import is_local, require_token
 
@@ -40,14 +40,16 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
         model: Name of the arm.
 
     Raises:
-        ModelError: No robot has this name, or it does not speak the RCI.
+        ModelError: No robot has this name, or it cannot be driven at an address.
         UsageError: The address needs a token, or the controller's is not valid.
     """
     check_host(host, token)
     _require_files()
-    if target != "virtual":
-        parse_address(target)
-    return require_simulator(load_model(model))
+    opened = load_model(model)
+    if target == "virtual":
+        return opened  # Without a virtual controller it opens in preview.
+    parse_address(target)
+    return require_feature(opened, "driving")
 
 
 def _require_files() -> None:

@@ -5,26 +5,34 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import rcilab
+from rcilab.app.arm_features import tell_lack
+from rcilab.app.text import Text
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
 from rcilab.makers.maker import (
+    Feature,
     Maker,
     all_makers,
     driven_robots,
+    find_lack,
     find_scheme,
     maker_of,
     require_driver,
+    require_feature,
     require_simulator,
     simulated_robots,
 )
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES, describe_robot
 
+FEATURES = [name for part in get_args(Feature) for name in (get_args(part) or (part,))]
 MAKERS = pytest.mark.parametrize("maker", all_makers(), ids=lambda maker: maker.name)
 
 
@@ -53,18 +61,73 @@ def test_every_row_of_a_maker_raises_one_of_its_own_faults_or_none(maker: Maker)
 
 
 def test_an_address_leads_to_the_maker_of_its_scheme():
-    assert [find_scheme(scheme).name for scheme in ("rci", "RCI", "fci")] == ["rokae", "rokae", "franka"]
+    for maker in all_makers():
+        assert find_scheme(maker.scheme) is find_scheme(maker.scheme.upper()) is maker
     assert find_scheme("http") is None
 
 
-def test_what_cannot_be_simulated_or_driven_is_refused_by_the_capabilities():
-    arms = ("xMatePro3", "xMatePro7", "xMate3", "xMate7")
-    assert (simulated_robots(), driven_robots()) == (arms, arms)
-    model = load_model("xmate3")
-    assert require_driver(require_simulator(model)) is model
+@MAKERS
+def test_what_cannot_be_simulated_or_driven_is_refused_by_the_capabilities(maker: Maker):
+    has = maker.capabilities
+    for name in maker.robots:
+        model = load_model(name)
+        assert (name in simulated_robots(), name in driven_robots()) == (has.simulates, has.drives)
+        for require, possible in ((require_simulator, has.simulates), (require_driver, has.simulates or has.drives)):
+            if possible:
+                assert require(model) is model
+            else:
+                with pytest.raises(ModelError, match=name):
+                    require(model)
+
+
+@MAKERS
+def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: Maker):
+    has = maker.capabilities
+    there = {*has.modes, *has.setup}
+    there |= {"simulation"} if has.simulates else set()
+    there |= {"driving"} if has.drives else set()
+    there |= {"streaming"} if has.streams else set()
+    there |= {"guiding"} if has.guides else set()
+    there |= {"signals"} if has.signals else set()
+    model = load_model(next(iter(maker.robots)))
+    assert {feature for feature in FEATURES if find_lack(model, feature) is None} == there
+    for feature in set(FEATURES) - there:
+        said = tell_lack(model, feature)
+        assert said is not None
+        assert model.name in Text("zh").say(said)
+        assert Text("en").say(said) != Text("zh").say(said)
+
+
+def test_an_arm_that_is_only_planned_says_what_can_be_done_with_it():
     for refuse in (require_driver, require_simulator):
-        with pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*drive one of xMatePro3"):
+        with pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*drive one of .*xMatePro3"):
             refuse(load_model("Panda"))
+
+
+def test_a_controller_without_a_feature_is_named_with_it(monkeypatch: pytest.MonkeyPatch):
+    maker = maker_of(load_model("xMate3"))
+    assert maker is not None
+    lacking = replace(maker.capabilities, guides=False, modes=("joint_position",), signals=0, streams=False)
+    monkeypatch.setattr(type(maker), "capabilities", lacking)
+    model = load_model("xMate3")
+    names: dict[Feature, str] = {
+        "guiding": "hand guiding",
+        "torque": "torque mode",
+        "signals": "digital signals",
+        "streaming": "commands in every cycle",
+    }
+    for feature, name in names.items():
+        with pytest.raises(ModelError, match=f"the controller of xMate3 has no {name}"):
+            require_feature(model, feature)
+        said = tell_lack(model, feature)
+        assert said is not None
+        assert name in Text("en").say(said)
+    assert require_feature(model, "joint_position") is model
+    for has, error in (({"drives": False}, "no driver"), ({"simulates": False}, "no virtual controller")):
+        monkeypatch.setattr(type(maker), "capabilities", replace(lacking, **has))
+        with pytest.raises(ModelError, match=error):
+            require_feature(model, "driving" if "drives" in has else "simulation")
+        assert require_driver(model) is model
 
 
 @pytest.mark.parametrize("folder", ["conformance", "robots"])

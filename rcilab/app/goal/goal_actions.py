@@ -11,6 +11,7 @@ from typing import Literal, Protocol, TypeAlias
 import numpy as np
 
 from rcilab.app.app_state import AppState
+from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.elbow import nearest_free
 from rcilab.app.goal.goal import Goal, goal_at, goal_toward
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
@@ -329,7 +330,8 @@ class GoalActions:
             self._stale = True
             return
         self._stale = False
-        if status.q_c is None:
+        start = start_of_plans(state.model, status)
+        if start is None:
             if request is not None:  # Nothing has changed: what was planned is not lost.
                 self._store.say("warn", message("plan.no_arm"))
             elif state.recording is None:  # A run that is looked at stays, whatever is posed.
@@ -339,7 +341,7 @@ class GoalActions:
             self._due = time.monotonic() + SETTLED
             self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
             return
-        self._make(state, readonly_copy(status.q_c), is_asked=request is not None)
+        self._make(state, readonly_copy(start), is_asked=request is not None)
 
     def _make(self, state: AppState, start: JointVector, *, is_asked: bool) -> None:
         made = self.prepare_plan(start)()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rcilab.app.arm_features import tell_lack_to_run
 from rcilab.app.request import Moving
 from rcilab.app.setup.configuration_state import setup_obstacle
 from rcilab.app.status_text import tell_status
@@ -221,6 +222,9 @@ def _rates(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> A
 
 def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns why the buttons cannot move the robot now, or None when they can."""
+    lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
+    if lack is not None:
+        return lack
     if status.code == "moving.guided":
         return message("ready.guided")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):

@@ -7,6 +7,7 @@ from functools import partial, reduce
 
 import numpy as np
 
+from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
 from rcilab.app.program.edit_actions import LONGEST_NAME, EditActions
@@ -73,22 +74,23 @@ class ProgramActions:
         """Plans the program, or the part of it up to the selected step, from where the arm stands."""
         self._shelves.open()
         state, status = self._store.state, self._session.status()
+        start = start_of_plans(state.model, status)
         upto = self._shelves.state.selected if request.upto else None
         program = self._shelves.draft.program(state.model, upto)
         reason = (
-            "notice.moving" if is_moving(status) else "plan.no_arm" if status.q_c is None
+            "notice.moving" if is_moving(status) else "plan.no_arm" if start is None
             else "program.empty" if program is None else "program.select" if request.upto and upto is None else None
         )  # fmt: skip
         if reason is not None:
             self._store.say("warn", message(reason))
             return
         assert program is not None
-        assert status.q_c is not None
+        assert start is not None
         job = Job(
             model=self._shelves.draft.arm(state.model),
             draft=self._shelves.draft,
             program=program,
-            here=readonly_copy(status.q_c),
+            here=readonly_copy(start),
             rounds=self._shelves.state.rounds,
             box=state.setup.wanted.box,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.app.arm_features import tell_lack, tell_lack_to_run
 from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import find_outside
 from rcilab.app.run.drive_state import parameter_obstacle
@@ -23,6 +24,10 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what stands in the way of Execute, or None when it may be pressed."""
     if state.busy is not None:
         return message("ready.busy")
+    lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
+    lack = tell_lack(state.model, state.drive.mode) if lack is None else lack
+    if lack is not None:
+        return lack
     if status.code == "moving.guided":
         return message("ready.guided")
     if status.code == "moving.held":

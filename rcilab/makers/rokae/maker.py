@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
+from rcilab.core.state import MODES
 from rcilab.makers.maker import Capabilities, Timing
 from rcilab.makers.rokae.bounds import LONGEST_TOOL
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
@@ -31,7 +32,16 @@ class Rokae:
     interface = "the RCI"
     scheme = "rci"
     robots = ROBOTS
-    capabilities = Capabilities(simulates=True, drives=True, longest_tool=LONGEST_TOOL)
+    capabilities = Capabilities(
+        simulates=True,
+        drives=True,
+        streams=True,
+        modes=MODES,
+        guides=True,
+        signals=6,
+        setup=("box", "tool", "load", "force", "joints", "control"),
+        longest_tool=LONGEST_TOOL,
+    )
     timing = Timing()
 
     def conditions(self) -> ConditionTable:

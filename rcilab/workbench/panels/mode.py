@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.arm_features import is_only_planned, tell_lack
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
@@ -70,8 +71,10 @@ class ModePanel:
         """Follows mode and parameters."""
         text, drive = self._text, state.drive
         self._mode.show(self._names[drive.mode])
-        self._mode.handle.disabled = is_moving(status)
-        self._note.show(f'<p class="rl-note">{esc(text(f"mode.{drive.mode}_note"))}</p>')
+        self._mode.handle.disabled = is_moving(status) or is_only_planned(state.model)
+        lack = tell_lack(state.model, drive.mode)
+        said = text(f"mode.{drive.mode}_note") if lack is None else text.say(lack)
+        self._note.show(f'<p class="rl-note">{esc(said)}</p>')
         for group in self._groups:
             folder, visible = self._folders[group.name], drive.mode in group.modes
             if folder.visible != visible:

@@ -11,7 +11,7 @@ from rcilab.app.text import LANGUAGES, Text
 from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.units import ANGLES, LENGTHS
-from rcilab.makers.maker import simulated_robots
+from rcilab.robots import ROBOT_NAMES
 from rcilab.views.viser_ext.message_guard import for_anyone
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -38,7 +38,7 @@ class SettingsPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         model = gui.add_dropdown(
-            text("settings.model"), simulated_robots(), initial_value=state.model.name, hint=text("settings.model_hint")
+            text("settings.model"), ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
         )
         self._model = BoundControl(model, ask, lambda v, p: ChooseRobot(page=p, model=v))
         codes = {label: code for code, label in LANGUAGES.items()}

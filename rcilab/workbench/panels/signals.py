@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.arm_features import tell_lack
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
 from rcilab.makers.driver import SIGNALS
+from rcilab.makers.maker import capabilities_of
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
@@ -28,8 +30,10 @@ class SignalsPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         with gui.add_folder(text("signals.title"), expand_by_default=False):
-            names = [f"DO{name}" for name in _NAMES]
-            output = gui.add_dropdown(text("signals.output"), tuple(names), hint=text("signals.output_hint"))
+            names = [f"DO{name}" for name in _NAMES[: capabilities_of(state.model).signals] or _NAMES]
+            self._output = output = gui.add_dropdown(
+                text("signals.output"), tuple(names), hint=text("signals.output_hint")
+            )
             gui.add_html('<i class="rl-buttons"></i>')
             self._buttons: list[Any] = []
             for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
@@ -43,7 +47,7 @@ class SignalsPanel:
             read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
             on_press(read, ask, lambda page: PressSignals(page=page, what="read"))
             self._buttons.append(read)
-            self._levels = Html(gui)
+            self._levels, self._lack = Html(gui), Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
             self._wired = BoundControl(wired, ask, lambda v, p: SetWiring(page=p, name="loop_back", on=bool(v)))
@@ -62,8 +66,11 @@ class SignalsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the controller."""
         text, is_ready = self._text, status.phase in ("idle", "fault")
+        lack = tell_lack(state.model, "signals")
+        self._lack.show("" if lack is None else f'<p class="rl-note rl-why">{esc(text.say(lack))}</p>')
+        self._output.disabled = lack is not None
         for button in self._buttons:
-            button.disabled = not is_ready
+            button.disabled = not is_ready or lack is not None
         self._levels.show(levels_html(status, text))
         self._wired.show(state.world.loop_back)
         self._wired.handle.disabled = not is_ours(status)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.arm_features import tell_lack
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.configuration_state import own_limits, soft_limits
@@ -39,6 +40,7 @@ class SoftLimitsPanel:
                     self._fields.append((end, joint, NumberField(box, ask, field, text.unit("deg"))))
                     self._named.append((field, label))
             self._problems = Html(gui)
+            self._lack = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
@@ -53,6 +55,8 @@ class SoftLimitsPanel:
             number = shown(math.degrees(getattr(limits, end)[joint]))
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
+        lack = tell_lack(state.model, "joints")
+        self._lack.show("" if lack is None else f'<p class="rl-note rl-why">{esc(self._text.say(lack))}</p>')
         self._whole.disabled = limits == own_limits(state)
         self._auto.show(state.world.auto_limit)
         self._auto.handle.disabled = not is_ours(status)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.arm_features import is_only_planned, tell_lack_to_run
 from rcilab.app.request import Request
 from rcilab.app.run.drive_state import DESTINATIONS, destination
 from rcilab.app.run.plan_readiness import is_moving
@@ -73,7 +74,8 @@ class TargetRobotPanel:
         if where != "preview" or self._picked != "address":
             self._picked = self._picked if self._picked == "address" else None
         self._choice.show(self._names[self._picked or where])
-        self._choice.handle.disabled = self._connect.disabled = moving
+        is_planned = is_only_planned(state.model)
+        self._choice.handle.disabled = self._connect.disabled = moving or is_planned
         is_address = (self._picked or where) == "address"
         if self._address.show(state.lease, _address_of(state)) and state.typed_address:
             self._ask(_choose(None, "address", answer="no"))  # Who asked has the controls no more.
@@ -88,9 +90,12 @@ class TargetRobotPanel:
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
-        note = (
-            text.say(tell_status(status)) if tone == "bad" else text("destination.note") if where == "preview" else ""
-        )
+        lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
+        note = "" if lack is None else text.say(lack)
+        if tone == "bad":
+            note = text.say(tell_status(status))
+        elif where == "preview" and lack is None:
+            note = text("destination.note")
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'
             + (f'<p class="rl-note">{esc(note)}</p>' if note else "")

@@ -1,0 +1,38 @@
+"""An arm that is neither simulated nor driven opens in preview: plan and check; Execute says why it cannot run."""
+
+from __future__ import annotations
+
+import pytest
+
+from rcilab.app.arm_features import tell_lack_to_run
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import PlanGoal
+from rcilab.app.run.readiness import obstacle
+from rcilab.core.errors import ModelError
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.security import require_openable
+from tests.waiting import wait_for
+
+
+def test_it_is_planned_and_checked_in_preview_and_not_executed():
+    with Workbench(WorkbenchConfig(model="Panda", port=0)) as bench:
+        model = bench.store.state.model
+        bench.store.update(goal=goal_at(model, model.home + 0.1))
+        bench.conductor.ask(PlanGoal(page=None))
+        wait_for(lambda: bench.store.state.plan is not None, what="a plan")
+        plan = bench.store.state.plan
+        assert plan is not None
+        assert plan.report.ok
+        assert plan.starts_at == pytest.approx(model.home)
+        status = bench.session.status()
+        assert (status.phase, bench.session.is_ready) == ("closed", False)
+        reason = obstacle(bench.store.state, status)
+        assert reason == tell_lack_to_run(model, is_virtual=True)
+        assert reason is not None
+        assert reason.code == "error.only_planned"
+        assert bench.conductor.errors == bench.presenter.errors == []
+
+
+def test_it_is_not_opened_at_an_address():
+    with pytest.raises(ModelError, match="Panda is driven by Franka's own interface"):
+        require_openable("127.0.0.1", None, "rci://127.0.0.1:1337", "Panda")
