@@ -9,7 +9,7 @@ from rcilab.i18n.translator import Message
 from rcilab.makers.maker import Feature, capabilities_of, find_lack
 
 if TYPE_CHECKING:
-    from rcilab.control_process import SupervisorStatus
+    from rcilab.app.run.plan_readiness import ArmStatus
     from rcilab.core.arrays import JointVector
     from rcilab.model.robot_model import RobotModel
 
@@ -35,7 +35,7 @@ def is_only_planned(model: RobotModel) -> bool:
     return not (capabilities.simulates or capabilities.drives)
 
 
-def start_of_plans(model: RobotModel, status: SupervisorStatus) -> JointVector | None:
+def start_of_plans(model: RobotModel, status: ArmStatus) -> JointVector | None:
     """Returns where a plan begins, [rad], shape (n,): where the arm is commanded to be; None: that is not known.
 
     The plans of an arm that is only planned for begin at its home.

@@ -18,7 +18,7 @@ def test_it_is_planned_and_checked_in_preview_and_not_executed():
     with Workbench(WorkbenchConfig(model="Panda", port=0)) as bench:
         model = bench.store.state.model
         bench.store.update(goal=goal_at(model, model.home + 0.1))
-        bench.conductor.ask(PlanGoal(page=None))
+        bench.dispatcher.ask(PlanGoal(page=None))
         wait_for(lambda: bench.store.state.plan is not None, what="a plan")
         plan = bench.store.state.plan
         assert plan is not None
@@ -30,7 +30,7 @@ def test_it_is_planned_and_checked_in_preview_and_not_executed():
         assert reason == tell_lack_to_run(model, is_virtual=True)
         assert reason is not None
         assert reason.code == "error.only_planned"
-        assert bench.conductor.errors == bench.presenter.errors == []
+        assert bench.dispatcher.errors == bench.renderer.errors == []
 
 
 def test_it_is_not_opened_at_an_address():
