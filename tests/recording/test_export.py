@@ -109,8 +109,8 @@ def test_the_page_is_drawn_in_the_units_of_the_workbench_and_never_finer_than_it
     usual = content_of(export_run(some_ideal_run(), ".html"))
     assert [chart["unit"] for chart in usual["charts"]] == ["°", "°/s", "N·m", "°", "mm"]
     assert usual["charts"][3]["least"] == pytest.approx(0.02)
-    assert usual["path"]["worst_told"] == "0.02 mm"  # Not 1.0e-9 mm.
-    assert content_of(export_run(RUN, ".html"))["path"]["worst_told"] == "0.63 mm"
+    assert usual["path"]["worst_text"] == "0.02 mm"  # Not 1.0e-9 mm.
+    assert content_of(export_run(RUN, ".html"))["path"]["worst_text"] == "0.63 mm"
 
 
 def test_the_page_asks_for_nothing_from_elsewhere_and_speaks_both_languages():
