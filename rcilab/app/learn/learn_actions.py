@@ -1,4 +1,4 @@
-"""What happens when somebody presses a fault or goes through a lesson. Owned by the dispatcher's thread."""
+"""Requests of the Learn tab: faults and lessons. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
