@@ -245,7 +245,15 @@ class RciController:
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
 
     def _refuse(self, request: rci.Request, status: rci.Status) -> Reply:
-        why = describe_refusal(request, status, self.phase, self.settings, self.arm)
+        why = describe_refusal(
+            request,
+            status,
+            self.phase,
+            self.settings,
+            self.arm,
+            safety_stop=self.safety_stop,
+            faults=self.faults,
+        )
         return Reply(rci.StatusResponse(status), refusal=why)
 
     def conclude(self, reply: Reply) -> rci.Response:

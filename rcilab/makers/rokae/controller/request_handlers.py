@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from rcilab.conformance.common_conditions import ANGLE_ALLOWANCE, BOX_ALLOWANCE
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.fault import name_faults
 from rcilab.core.safety_box import active_box
 from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae import wire as rci
@@ -20,6 +23,7 @@ from rcilab.makers.rokae.controller.state_machine import (
     When,
     transition,
 )
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.measured_state import MeasuredStateMonitor
@@ -110,34 +114,62 @@ def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.Rec
         settings: With soft limits, box and thresholds.
         sensors: Where the arm is, and what presses on it.
     """
-    for q, lower, upper in zip(sensors.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True):
-        if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
-            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
-    box = active_box(settings.safety_box)
-    if box is not None and settings.guiding_box is None:
-        if box.excess(sensors.tool.position) > BOX_ALLOWANCE:
-            return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+    if _find_outside(settings, sensors) is not None:
+        return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     return None if sensors.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
 
 
+def _find_outside(settings: Settings, sensors: MeasuredStateMonitor) -> str | None:
+    """Returns which joint is too far beyond its range, or how far the tool is outside its box; None for neither."""
+    bounds = zip(sensors.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True)
+    for number, (q, lower, upper) in enumerate(bounds, 1):
+        if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
+            span = f"{math.degrees(lower):.2f} to {math.degrees(upper):.2f} deg"
+            return f"joint {number} is at {math.degrees(q):.2f} deg, beyond {span}"
+    box = active_box(settings.safety_box)
+    excess = 0.0 if box is None or settings.guiding_box is not None else box.excess(sensors.tool.position)
+    return f"the tool is {1e3 * excess:.0f} mm outside the safety box" if excess > BOX_ALLOWANCE else None
+
+
 def describe_refusal(
-    request: rci.Request, status: rci.Status, phase: Phase, settings: Settings, arm: VirtualArm
+    request: rci.Request,
+    status: rci.Status,
+    phase: Phase,
+    settings: Settings,
+    arm: VirtualArm,
+    *,
+    safety_stop: rci.SafetyStop,
+    faults: Iterable[Fault],
 ) -> str:
     """Returns why a request was refused, for the log of the controller."""
-    name, mode = type(request).__name__, phase.name.lower().replace("_", " ")
-    why: object = f"the robot is {mode}"
+    why: object = _describe_phase(phase, safety_stop, faults)
     if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
-        why = f"there is no {pair}" if arm.commanded.is_at_rest else "the arm still moves"
+        why = f"there is no {pair}" if arm.commanded.is_at_rest else _MOVES
+    elif request.code in GROUNDED and Action.APPLY in transition(phase, request.code).actions:
+        why = _MOVES
     elif status is rci.StartStatus.SINGULAR_START_POSE:
         why = arm.model.solver.singularity(arm.commanded.q)
     elif status is rci.RecoveryStatus.REFLEX:
         why = arm.measured_state.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
-        why = "the arm is beyond a joint's range or the safety box: power off and on, then lead it back"
-    elif status.name == "INVALID_ARGUMENT":
+        why = f"{_find_outside(settings, arm.measured_state)}: power off and on, then lead it back"
+    if status.name == "INVALID_ARGUMENT":
         why = _describe_argument(request, settings, arm)
-    return f"refused {name} ({status.name.lower().replace('_', ' ')}): {why}"
+    return f"refused {type(request).__name__} ({status.name.lower().replace('_', ' ')}): {why}"
+
+
+def _describe_phase(phase: Phase, safety_stop: rci.SafetyStop, faults: Iterable[Fault]) -> str:
+    """Returns what the robot is doing and, where it was stopped, by what."""
+    match phase:
+        case Phase.USER_STOPPED:
+            return _PRESSED[safety_stop]
+        case Phase.REFLEX:
+            return f"the arm was stopped by {name_faults(faults)}"
+        case Phase.CUT_OFF:
+            return f"the motors were switched off by {name_faults(faults)}"
+        case _:
+            return _DOING[phase]
 
 
 def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm) -> str:
@@ -157,6 +189,18 @@ def conclude(reply: Reply, phase: Phase) -> rci.Response:
     return reply.response
 
 
+_PRESSED = {
+    rci.SafetyStop.ESTOP: "an emergency stop is pressed",
+    rci.SafetyStop.GSTOP: "the safety gate is open",
+}
+_MOVES = "the arm still moves"
+_DOING = {
+    Phase.OFF: "the motors are off",
+    Phase.IDLE: "the robot is idle",
+    **dict.fromkeys((Phase.STARTING, Phase.MOVING, Phase.STOPPING), "a motion is in progress"),
+    Phase.GUIDING: "the arm is guided by hand",
+    Phase.RECOVERING: "an error recovery is in progress",
+}
 _OVERTAKEN = {
     Phase.IDLE: rci.RecoveryStatus.SUCCESS,
     Phase.OFF: rci.RecoveryStatus.SUCCESS,

@@ -476,7 +476,7 @@ def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
         assert peer.ask(rci.StartMove(0, 0)) is rci.StartStatus.NOT_POSSIBLE
     assert lockstep.lines[3] == "refused StartMove (not possible): there is no controller mode 0 with motion mode 0"
     assert lockstep.lines[:3] == [
-        "refused StartMove (not possible): the robot is off",
+        "refused StartMove (not possible): the motors are off",
         "refused SetCollisionBehavior (invalid argument): threshold of joint 1: nan N m is outside 0 to 75 N m",
         "refused StartMove (singular start pose): the arm is stretched or folded: joint 4 is at 0.00 deg",
     ]
