@@ -13,7 +13,7 @@
         VersionMismatchError     .found, .expected
       ConnectionLostError
       CommandRejectedError       .command, .status: the controller refused a command
-      ControlError               .faults, .record: the controller stopped the motion
+      ControlError               .faults, .run: the controller stopped the motion
       DeadlineError              also a TimeoutError
       UsageError                 also a RuntimeError: wrong call order
         InvalidValueError        also a ValueError: .name, .value

@@ -362,7 +362,7 @@ class RobotSession(Closeable):
             ConformanceError: The motion violates a condition; nothing moved.
             CertificateError: The certificate does not match; nothing moved.
             UsageError: The motion does not start at the arm's position; nothing moved.
-            ControlError: The controller stopped it; see `.faults` and `.record`, and call `recover()`.
+            ControlError: The controller stopped it; see `.faults` and `.run`, and call `recover()`.
             ConnectionLostError: The connection to the controller is lost.
         """
         require_motion(motion, certificate)
@@ -464,7 +464,7 @@ class RobotSession(Closeable):
                 need not be enough for the joints. None leaves all of it to the callback.
 
         Raises:
-            ControlError: The controller stopped the motion; see `.faults` and `.record`, and call `recover()`.
+            ControlError: The controller stopped the motion; see `.faults` and `.run`, and call `recover()`.
             ConnectionLostError: The connection to the controller is lost.
             InvalidValueError: A command was not valid; the arm was stopped.
             Exception: An exception of the callback; the arm was stopped.

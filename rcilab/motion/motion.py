@@ -107,9 +107,13 @@ class Motion:
         Raises:
             InvalidValueError: Not finite, no times or too many, or the times do not increase.
         """
-        if (dt is None) == (times is None):
-            problem = "needs either dt= (seconds between samples) or times=; rows of 1 ms go into Motion.from_cycles"
-            raise InvalidValueError("dt and times", (dt, times), problem)
+        if dt is None and times is None:
+            problem = (
+                "is missing: pass the seconds between two samples, or times=; rows of 1 ms go into Motion.from_cycles"
+            )
+            raise InvalidValueError("dt", None, problem)
+        if dt is not None and times is not None:
+            raise InvalidValueError("dt", dt, "is not needed: the samples have times; leave one of the two out")
         rows = as_path(q, None, "q", "rad")
         if dt is not None:
             if not 0.0 < (dt := as_number(dt, "dt", "s")) < math.inf:

@@ -117,6 +117,7 @@ def test_a_jump_is_told_with_numbers_and_record_and_the_same_session_goes_on(rob
         robot.control(swing(mode, 0.25, jump_at=0.12), mode)
     error = caught.value
     assert fault in error.faults
+    assert str(error).endswith("recover() clears the fault; error.run holds the motion")
     error.save(tmp_path / "flight.npz")
     with np.load(tmp_path / "flight.npz") as flight:
         assert len(flight["t"]) == len(error.record) > 30

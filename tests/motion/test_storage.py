@@ -197,8 +197,9 @@ def test_samples_say_their_rate():
     assert Motion.from_samples(rows, times=0.02 * np.arange(len(rows))).duration == pytest.approx(
         0.02 * (len(rows) - 1)
     )
-    for wrong in ({}, {"dt": 0.01, "times": [0.0]}):
-        with pytest.raises(InvalidValueError, match="from_cycles"):
-            Motion.from_samples(rows, **wrong)
+    with pytest.raises(InvalidValueError, match=r"^dt is missing: pass the seconds .* go into Motion\.from_cycles$"):
+        Motion.from_samples(rows)
+    with pytest.raises(InvalidValueError, match=r"^dt: 0\.01 is not needed"):
+        Motion.from_samples(rows, dt=0.01, times=[0.0])
     with pytest.raises(InvalidValueError, match="above 0"):
         Motion.from_samples(rows, dt=0.0)

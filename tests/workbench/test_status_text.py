@@ -25,7 +25,7 @@ from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.status import status_values
 
-CALLS = ("()", "load_model", ".record", "restart", "reconnect", "recover leads", "COMMAND_")
+CALLS = ("()", "load_model", "error.run", "restart", "reconnect", "recover leads", "COMMAND_")
 
 
 def status(**facts) -> SupervisorStatus:
@@ -43,7 +43,7 @@ def address_error() -> RcilabError:
 @pytest.mark.parametrize(
     "error",
     [
-        ControlError("recover() clears the fault; .record holds the last cycles", [Fault.COLLISION]),
+        ControlError("recover() clears the fault; error.run holds the motion", [Fault.COLLISION]),
         ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop"),
         CertificateError("plan again from robot.state.q_c with plan_joint()"),
         ConnectionLostError("rci://127.0.0.1:9 went silent; look whether the cable is in"),

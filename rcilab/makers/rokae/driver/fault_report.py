@@ -69,9 +69,7 @@ def describe_faults(
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
     if pressed:
         bits = name_faults(faults)
-        return (
-            f"the controller stopped the motion {when}: {pressed} (reported as {bits}); .record holds the last cycles"
-        )
+        return f"the controller stopped the motion {when}: {pressed} (reported as {bits}); error.run holds the motion"
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
     commanded, is_broken = _describe_commanded(faults, record, limits)
@@ -82,7 +80,7 @@ def describe_faults(
     if faults:
         parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
     clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
-    parts.append(f"{clears}.record holds the last cycles")
+    parts.append(f"{clears}error.run holds the motion")
     return "; ".join(parts)
 
 
