@@ -81,21 +81,6 @@ def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
         back, ahead = closer * back, closer * ahead
 
 
-def turn_angle(model: RobotModel, before: Segment, after: Segment) -> float:
-    """Returns the change of direction where two segments meet, [rad]: 0 is straight, pi is a reversal.
-
-    It is that of the tool's path or, next to a joint move, of the joints'; 0 if nothing moves on one of them.
-    """
-    if before.path is not None and after.path is not None:
-        near = np.array([0.0, _NUDGE])
-        into = np.diff(before.positions(model, 1.0 - near[::-1]), axis=0)[0]
-        out = np.diff(after.positions(model, near), axis=0)[0]
-    else:
-        into, out = before.state(model, 1.0)[1], after.state(model, 0.0)[1]
-    size = float(np.linalg.norm(into) * np.linalg.norm(out))
-    return math.acos(min(max(float(into @ out) / size, -1.0), 1.0)) if size > (_NUDGE * _STANDS) ** 2 else 0.0
-
-
 def rotations(vectors: Array) -> Array:
     """Returns the rotations of rotation vectors, shape (N, 3) to (N, 3, 3): Rodrigues' formula."""
     square = (vectors * vectors).sum(axis=1)

@@ -17,7 +17,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import MOST_ROWS, require_max_rows
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel, require_model
-from rcilab.motion.blend import Blend, build_blend, turn_angle
+from rcilab.motion.blend import Blend, build_blend
 from rcilab.motion.cartesian import plan_path
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw, plan_joint
 from rcilab.motion.motion import Motion
@@ -32,8 +32,6 @@ from rcilab.motion.waypoint import MOST_WAYPOINTS, label
 
 _SHORTENED = 1e-6
 """How much shorter than asked a radius must be to be mentioned, [m]."""
-_SHARP = math.radians(150.0)
-"""Change of direction at a waypoint from which stopping is compared with blending: close to a cusp, blends are slow."""
 _BLENDS = 0.3
 """Share of the work on a blended run that finding the blends takes, as measured."""
 _GEOMETRY = 0.3
@@ -59,9 +57,8 @@ def plan_program(
     the other, each starting at a whole cycle.
 
     `motion.segment` is the segment of each row, counted from 0: a segment ends in the middle of its blend, or, if the
-    tool stops, with its dwell. A blend takes at most half of a neighbouring segment; a longer radius is shortened. At a
-    change of direction of 150 degrees or more the tool stops instead if that is faster than the blend. Both are noted
-    in `motion.notes`.
+    tool stops, with its dwell. A blend takes at most half of a neighbouring segment; a longer radius is shortened and
+    noted in `motion.notes`.
 
     Args:
         model: The arm; with its own tool, unless the program has one.
@@ -129,8 +126,7 @@ def plan_program(
     if approach is not None:
         track.add(_plan_move(model, approach, there, slow, "the way to the start", law))
     curves: list[_Curve] = []
-    stops_at = partial(_is_quicker_to_stop, model, scale=speed, law=law, notes=track.notes)
-    for run in _runs(segments, stops_at):
+    for run in _runs(segments):
         of_all = partial(_part_of_all, run[0].number, run[-1].number, count)
         curves.append(_plan_run(model, run, speed, track.notes, law, lambda part, of_all=of_all: report(of_all(part))))
         report(of_all(1.0))
@@ -177,42 +173,18 @@ def _require_stops(program: Program) -> None:
             ).coded("s_profile_blend", waypoint=number, blend=waypoint.blend)
 
 
-def _runs(segments: list[Segment], stops_at: Callable[[Segment, Segment], bool]) -> list[list[Segment]]:
-    """Returns the segments between full stops; `stops_at` decides where a blend could be omitted."""
+def _runs(segments: list[Segment]) -> list[list[Segment]]:
+    """Returns the segments between full stops."""
     runs: list[list[Segment]] = []
     goes_on = False
-    for number, segment in enumerate(segments):
-        if goes_on and not segment.stands and not stops_at(segments[number - 1], segment):
+    for segment in segments:
+        if goes_on and not segment.stands:
             runs[-1].append(segment)
         else:
             runs.append([segment])
         waypoint = segment.waypoint
         goes_on = waypoint.blend > 0.0 and waypoint.dwell == 0.0 and not segment.stands
     return runs
-
-
-def _is_quicker_to_stop(
-    model: RobotModel, before: Segment, after: Segment, scale: float, law: JointLaw, notes: list[str]
-) -> bool:
-    """Returns whether a sharp corner takes less time without its blend, and notes that.
-
-    This happens at reversals, where the blend is close to a cusp.
-    """
-    angle = turn_angle(model, before, after)
-    if angle < _SHARP:
-        return False
-
-    def duration(run: list[Segment]) -> float:
-        return float(_plan_run(model, run, scale, [], law, lambda part: None).breaks[-1])
-
-    try:
-        is_quicker = duration([before, after]) > duration([before]) + duration([after])
-    except PlanningError:  # Of the blend; an error of the segments is raised when they are planned.
-        is_quicker = True
-    if is_quicker:
-        said = f"{before.label}: no blend, as the way turns by {math.degrees(angle):.0f} deg there: to stop is quicker"
-        notes.append(Remark(said, "sharp", number=before.number, angle=angle))
-    return is_quicker
 
 
 def _plan_move(

