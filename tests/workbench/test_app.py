@@ -139,7 +139,7 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
     short = np.linalg.norm(np.array((2.0, 0.3, 0.6)) - reached)
     assert state.plan.short.values["distance"] == pytest.approx(short, abs=1e-3)
     for language in ("en", "zh"):
-        shown = planned_html(state, Text(language))
+        shown = planned_html(state, bench.session.status(), Text(language))
         assert Text(language)("check.passed") not in shown
         assert f"{1000.0 * short:.0f} mm" in shown
     ask(ChooseBranch(index=0))

@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -21,6 +22,8 @@ from rcilab.app.program.program_draft import Draft, number_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS
+from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.status import Phase
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.units import Units
@@ -29,6 +32,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench.panels.check import CheckPanel
 from rcilab.workbench.panels.check_rows import row_tone, rows_html
+from rcilab.workbench.panels.target import planned_html
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -236,8 +240,19 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     rest = next(card for card in cards.split('<div class="rl-card') if "Starts at the arm" in card)
     assert "0 / 0°" in rest
     assert "%" not in rest.partition("rl-meter")[0]
-    headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None)
+    headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None, is_current=True)
     assert f"Broken conditions: 1 (occurrences: {len(report.violations)})." in headline
+
+
+@pytest.mark.parametrize("phase", ["closed", "lost", "crashed"])
+def test_no_tab_says_passed_while_nothing_is_connected(bench: Bench, phase: Phase) -> None:
+    text, panel = Text("en"), CheckPanel(Text("en"), lambda request: None)
+    panel.build(MagicMock(), bench.state)
+    for status, is_said in ((SupervisorStatus(phase="idle", q=HOME), True), (SupervisorStatus(phase=phase), False)):
+        panel.show(bench.state, status)
+        assert (text("check.passed") in panel._verdict._shown) is is_said
+        assert (text("check.passed") in planned_html(bench.state, status, text)) is is_said
+    assert text("check.unconnected") in panel._verdict._shown
 
 
 def test_every_row_of_a_joint_or_the_tool_has_a_plot() -> None:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
 import pytest
 
 from rcilab.app.arm_features import tell_lack_to_run
 from rcilab.app.goal.goal import goal_at
-from rcilab.app.goal.goal_actions import PlanGoal
-from rcilab.app.run.readiness import obstacle
+from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
+from rcilab.app.run.readiness import connection_note, obstacle
+from rcilab.app.store import Store, UiState
+from rcilab.app.text import Text
+from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ModelError
+from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.security import require_openable
 from tests.waiting import wait_for
 
@@ -31,6 +39,19 @@ def test_it_is_planned_and_checked_in_preview_and_not_executed():
         assert reason is not None
         assert reason.code == "error.only_planned"
         assert bench.dispatcher.errors == bench.renderer.errors == []
+
+
+def test_why_it_cannot_run_stands_once_on_the_run_tab_and_its_verdict_needs_no_robot():
+    model = load_model("Panda")
+    store = Store(UiState(model=model, goal=goal_at(model, model.home + 0.1)))
+    status, text = SupervisorStatus(), Text("en")
+    GoalActions(store, SimpleNamespace(status=lambda: status)).plan(PlanGoal())
+    panel = RunPanel(text, lambda request: None)
+    panel.build(MagicMock(), store.state)
+    panel.show(store.state, status)
+    assert connection_note(store.state, status) == obstacle(store.state, status)  # Said beside the destination.
+    assert panel._reason._shown == ""
+    assert text("check.passed") in panel._planned._shown
 
 
 def test_it_is_not_opened_at_an_address():

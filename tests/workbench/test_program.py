@@ -23,6 +23,7 @@ from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
+from rcilab.control_process import SupervisorStatus
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
@@ -34,6 +35,7 @@ from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
+STANDING = SupervisorStatus(phase="idle", q=MODEL.home)
 PLACE = MODEL.forward(HOME)
 Edit = EditProgram
 
@@ -381,7 +383,7 @@ def test_a_program_that_was_changed_since_is_not_executed(square):
 def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
     square.plan()
     text = Text("en")
-    assert text("check.passed") in planned_html(square.state, text)
+    assert text("check.passed") in planned_html(square.state, STANDING, text)
     square.type("x", "2900")
     assert outdated(square.state).code == "ready.program"
     square.plan()
@@ -389,7 +391,7 @@ def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
     changed = outdated(square.state)
     assert changed.code == "ready.program_fails"
     assert text.say(square.program.answer) in text.say(changed)
-    assert text("check.passed") not in planned_html(square.state, text)
+    assert text("check.passed") not in planned_html(square.state, STANDING, text)
     status = SimpleNamespace(
         phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
     )

@@ -18,6 +18,7 @@ from rcilab.app.request import TypeField
 from rcilab.app.scene.scene_actions import DragElbow, HighlightBranch, SceneActions, ShowExtra, ShowViolation
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import LANGUAGES, Text
+from rcilab.control_process import SupervisorStatus
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
@@ -30,6 +31,7 @@ from rcilab.workbench.scene.path_strip_view import bead_words
 
 MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
+STANDING = SupervisorStatus(phase="idle", q=MODEL.home)
 
 
 class Bench:
@@ -213,7 +215,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
         assert "condition." not in bead_words(bead, Text(language))
     assert bead_words(bead, Text("en")).startswith("◆ broken: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
-    assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, Text("en"))
+    assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, STANDING, Text("en"))
     bench.scene.show_bead(ShowViolation(number=99))
     bench.goal.pose_goal(PoseGoal(name="home"))
     bench.scene.tick()
@@ -239,7 +241,7 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
     beside = np.linalg.norm(np.cross(plan.path - plan.path[0], way / np.linalg.norm(way)), axis=1)
     assert beside.max() < 1e-6
     assert Text("en")("target.planned.line", duration=f"{plan.motion.duration:.3f}") in planned_html(
-        bench.state, Text("en")
+        bench.state, STANDING, Text("en")
     )
 
 

@@ -106,7 +106,7 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert reason.code == "ready.stale"
     assert "tool, load" in Text("en").say(reason)
     for language in ("en", "zh"):
-        assert Text(language)("check.outdated") in planned_html(state, Text(language))
+        assert Text(language)("check.outdated") in planned_html(state, status, Text(language))
     ask(RobotCommand(what="execute"))
     assert told(bench) == "ready.stale"
     ask(PressSetup(what="undo"))
@@ -347,7 +347,7 @@ def test_after_check_again_the_setup_tab_has_a_verdict_on_the_plan(bench, ask):
     wait(lambda: "Out of date" in panel._planned._shown, "the tab to say so")
     ask(PressCheck(what="again"))
     wait(lambda: "Passed" in panel._planned._shown, "a verdict")
-    assert panel._planned._shown == planned_html(bench.store.state, Text("en"))
+    assert panel._planned._shown == planned_html(bench.store.state, bench.session.status(), Text("en"))
     assert panel._again.disabled
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.app.arm_features import tell_lack, tell_lack_to_run
+from rcilab.app.arm_features import is_only_planned, tell_lack, tell_lack_to_run
 from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import find_outside
-from rcilab.app.run.drive_state import parameter_obstacle
+from rcilab.app.run.drive_state import destination, parameter_obstacle
 from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, is_moving, plan_obstacle
 from rcilab.app.setup.configuration_state import setup_obstacle, tool_outside
 from rcilab.app.status_text import tell_status
@@ -92,3 +92,16 @@ def time_shown(state: UiState, status: SupervisorStatus) -> float:
 def is_connected(status: SupervisorStatus) -> bool:
     """Returns whether a robot reports where it is."""
     return status.q is not None and status.phase not in ("closed", "lost", "crashed")
+
+
+def is_plan_current(state: UiState, status: SupervisorStatus) -> bool:
+    """Returns whether a verdict on the plan holds now: an arm is connected, or this one is only ever planned for."""
+    return is_connected(status) or is_only_planned(state.model)
+
+
+def connection_note(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns what is said beside the destination, at the top of Run: why nothing can be run there; None: nothing."""
+    lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
+    if status.phase in ("fault", "lost", "crashed"):
+        return tell_status(status)
+    return message("destination.note") if lack is None and destination(state, status) == "preview" else lack

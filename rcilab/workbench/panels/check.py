@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Message, Text
 from rcilab.i18n.translator import follow
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
@@ -72,7 +73,8 @@ class CheckPanel:
         if self._tools.visible is (plan is None):
             self._tools.visible = plan is not None
         aside = beside_program(state)
-        wanted = (plan, changed, aside, check.answer, check.explained, check.row, state.no_plan)
+        is_current = is_plan_current(state, status)
+        wanted = (plan, changed, aside, is_current, check.answer, check.explained, check.row, state.no_plan)
         if wanted == self._drawn:
             return
         self._drawn = wanted
@@ -82,15 +84,17 @@ class CheckPanel:
             self._answer.show("")
             self._table.show("")
             return
-        self._verdict.show(self._headline(plan, changed, aside))
+        self._verdict.show(self._headline(plan, changed, aside, is_current=is_current))
         self._answer.show(self._answers(state, plan))
         self._table.show(rows_html(plan.report, plan.model, check.row, self._text))
 
-    def _headline(self, plan: Plan, changed: Message | None, aside: Message | None) -> str:
+    def _headline(self, plan: Plan, changed: Message | None, aside: Message | None, *, is_current: bool) -> str:
         text, report = self._text, plan.report
         unheeded = count_unheeded(report)
         if changed is not None:
             headline = ("warn", "▲ ", "check.outdated", text.say(changed))
+        elif report.ok and not is_current:
+            headline = ("warn", "▲ ", "check.unconnected", text("check.unconnected_long"))
         elif report.ok:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))

@@ -57,7 +57,7 @@ class PathTypePanel:
         self._field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.entered)
         self._problem.show(problems_html(state, text, [("speed", text("target.speed"))]))
         self._law.show(self._laws[state.law])
-        self._planned.show(planned_html(state, text))
+        self._planned.show(planned_html(state, status, text))
 
 
 def _note_html(state: UiState, text: Text) -> str:

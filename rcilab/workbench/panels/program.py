@@ -113,7 +113,7 @@ class ProgramPanel:
             said += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
         elif plan is not None:
             where = tell_place(plan, t)
-            said += planned_html(state, text)
+            said += planned_html(state, status, text)
             said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.say(where))}</p>'
         elif count and not planning and program.answer is None:
             said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'

@@ -9,9 +9,11 @@ from rcilab.app.goal.goal_actions import PlanGoal, PlanRecovery, PoseGoal
 from rcilab.app.program.program_actions import PlanProgram
 from rcilab.app.run.mode_actions import SetDrive
 from rcilab.app.run.readiness import (
+    connection_note,
     describe_move,
     is_connected,
     is_moving,
+    is_plan_current,
     may_go_back,
     may_lead_inside,
     may_plan_again,
@@ -108,14 +110,15 @@ class RunPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
         text, reason, moving = self._text, obstacle(state, status), is_moving(status)
-        self._planned.show("" if not is_connected(status) else planned_html(state, text))  # Nothing is ready to run it.
+        self._planned.show(planned_html(state, status, text) if is_plan_current(state, status) else "")
         self._execute.disabled = reason is not None
         question = None if reason is not None else describe_move(state)
         said = "" if question is None else esc(text.say(question))
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
-        unsaid = None if moving or reason == outdated(state) else reason  # The bar says that it moves.
+        is_said = moving or reason in (outdated(state), connection_note(state, status))  # That it moves: in the bar.
+        unsaid = None if is_said else reason
         self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
         is_program = state.plan is not None and state.plan.program is not None
         self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)

@@ -73,7 +73,7 @@ class SetupPanel:
         self._undo.disabled = not setup.can_undo
         self._edited.show(self._choices[setup.edited])
         self._again.disabled = outdated(state) is None
-        self._planned.show(planned_html(state, text))
+        self._planned.show(planned_html(state, status, text))
         self._table.show(self._table_html(state, status))
 
     def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.goal.goal_actions import POSE_FIELDS, QUATERNION
+from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import fixed
 from rcilab.workbench.panels.check_rows import count_unheeded
@@ -53,7 +54,7 @@ class TargetPanel:
         labels.append((wxyz.field, self._text("target.wxyz")))
         problems = problems_html(state, self._text, labels)
         is_broken = state.plan is not None and not state.plan.report.ok  # Said here, too: below it is out of sight.
-        said = reach_html(state, self._text) + (planned_html(state, self._text) if is_broken else "")
+        said = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_broken else "")
         self._reach.show(f'<div class="rl-slot">{problems or said}</div>')  # What is below stays where it is.
 
 
@@ -63,10 +64,15 @@ def quaternion_text(wxyz: np.ndarray) -> str:
     return " ".join(fixed(sign * float(number), 4) for number in wxyz)
 
 
-def planned_html(state: UiState, text: Text) -> str:
-    """Returns one line about the plan: how long it takes and whether it passed, or why none was found."""
+def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+    """Returns one line about the plan: how long it takes and whether it passed, or why none was found.
+
+    While nothing is connected a plan gets no verdict: the next arm may stand elsewhere.
+    """
     if state.plan is None:
         return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
+    if not is_plan_current(state, status):
+        return ""
     changed = outdated(state)
     if changed is not None:
         return f'<p class="rl-verdict rl-warn"><b>▲ {esc(text("check.outdated"))}</b> {esc(text.say(changed))}</p>'

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import is_only_planned, tell_lack_to_run
+from rcilab.app.arm_features import is_only_planned
 from rcilab.app.request import Request
 from rcilab.app.run.drive_state import DESTINATIONS, destination
 from rcilab.app.run.plan_readiness import is_moving
+from rcilab.app.run.readiness import connection_note
 from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.run.target_robot_actions import ChooseDestination
-from rcilab.app.status_text import phase_code, tell_status
+from rcilab.app.status_text import phase_code
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, BoundControl, Html, PageText, esc, on_press
 
@@ -90,15 +91,10 @@ class TargetRobotPanel:
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
-        lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
-        note = "" if lack is None else text.say(lack)
-        if tone == "bad":
-            note = text.say(tell_status(status))
-        elif where == "preview" and lack is None:
-            note = text("destination.note")
+        note = connection_note(state, status)
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'
-            + (f'<p class="rl-note">{esc(note)}</p>' if note else "")
+            + ("" if note is None else f'<p class="rl-note">{esc(text.say(note))}</p>')
         )
 
     def _pick(self, name: str, page: int | None) -> Request | None:
