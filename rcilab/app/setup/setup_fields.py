@@ -13,7 +13,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.model.dynamics.payload import Payload
+from rcilab.model.dynamics.payload import LARGEST_INERTIA, Payload
 
 POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 FACE_NAMES = ("xmin", "ymin", "zmin", "xmax", "ymax", "zmax")
@@ -29,7 +29,6 @@ JOINT_ENDS = ("lower", "upper")
 THINNEST = 0.02  # [m] A box that the mouse cannot make thinner.
 FARTHEST_FACE = 5.0  # [m] No arm of ours reaches a third of it, so what is farther is a slip of units.
 
-_LARGEST_INERTIA = 10.0  # [kg m^2] Ten times that of anything an xMate can carry.
 _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
@@ -56,7 +55,7 @@ def field_range(part: str, name: str, rated_payload: float, longest_tool: float)
     if name == "mass":
         return Range(0.0, rated_payload, "kg")
     if name in INERTIA_NAMES:
-        return Range(0.0 if name in INERTIA_NAMES[:3] else -_LARGEST_INERTIA, _LARGEST_INERTIA, "kg·m²")
+        return Range(0.0 if name in INERTIA_NAMES[:3] else -LARGEST_INERTIA, LARGEST_INERTIA, "kg·m²")
     farthest = 1000.0 * (FARTHEST_FACE if part == "box" else longest_tool)
     return Range(-farthest, farthest, "mm")
 

@@ -1,4 +1,4 @@
-"""What both ends take as arguments where neither the manual nor the arm's limits say: one table.
+"""What both ends take as arguments, and start with, where neither the manual nor the arm's limits say: one table.
 
 More than these lengths is a slip of units: no xMate reaches farther than 1 m from its shoulder.
 """
@@ -6,8 +6,10 @@ More than these lengths is a slip of units: no xMate reaches farther than 1 m fr
 from __future__ import annotations
 
 FILTER_OFF = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
+REPORT_FREQUENCY = 100.0  # [Hz] Cut-off frequency of the reported torques after the controller's start.
 LOWEST_FREQUENCY = 0.1  # [Hz] Smallest cut-off frequency: a motion arrives some 20 s late. At 0 Hz nothing would pass.
 LIMIT_TOLERANCE = 1e-9  # [rad] By which soft limits may pass the arm's own: they are often converted from degrees.
 LONGEST_TOOL = 2.0  # [m] From the flange to the tool, the force-control frame or the load's centre of mass.
 FARTHEST_BOX = 10.0  # [m] From the base to the centre of the safety box, along each axis.
 LARGEST_BOX = 100.0  # [m] Edge of the safety box.
+SIGNAL_COUNT = 6  # Digital outputs, and as many inputs: DO0_0 to DO0_3, DO1_0, DO1_1 (manual 3.1.13, 3.1.14).

@@ -11,9 +11,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import MODES
 from rcilab.i18n.translator import message
 from rcilab.makers.parameters import Parameter, ParameterGroup
-from rcilab.makers.rokae.bounds import FILTER_OFF, LOWEST_FREQUENCY
-
-REPORT_FREQUENCY = 100.0  # [Hz] Cut-off for reported torques after the controller's start.
+from rcilab.makers.rokae.bounds import FILTER_OFF, LOWEST_FREQUENCY, REPORT_FREQUENCY
 
 _AXES = ("x", "y", "z", "a", "b", "c")
 

@@ -11,7 +11,7 @@ from rcilab.core.errors import InvalidValueError
 
 _HEAVIEST = 100.0  # [kg] Tuning value: more than ten times what an xMate can carry. Grams are above it.
 _FARTHEST = 5.0  # [m] Tuning value: from the flange; millimetres are above it.
-_LARGEST = 100.0  # [kg m^2] Tuning value: a hundred times that of anything an xMate can carry.
+LARGEST_INERTIA = 100.0  # [kg m^2] Tuning value: a hundred times that of anything an xMate can carry.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,7 +64,7 @@ def _nearest_possible(inertia: Matrix) -> Matrix:
 
     Every body's principal moments are positive or zero, and none exceeds the sum of the other two.
     """
-    is_small = bool(np.abs(inertia).max() <= _LARGEST)
+    is_small = bool(np.abs(inertia).max() <= LARGEST_INERTIA)
     moments, axes = np.linalg.eigh(inertia) if is_small else (np.array((-1.0, 0.0, 0.0)), np.eye(3))
     smallest, middle, largest = moments.tolist()
     tolerance = 1e-9 * max(1.0, largest)
@@ -72,7 +72,7 @@ def _nearest_possible(inertia: Matrix) -> Matrix:
         raise InvalidValueError(
             "load inertia",
             inertia.tolist(),
-            f"is physically impossible: its principal moments must be from 0 to {_LARGEST:g} kg m^2, "
+            f"is physically impossible: its principal moments must be from 0 to {LARGEST_INERTIA:g} kg m^2, "
             "and none larger than the sum of the other two",
         )
     if smallest >= 0.0:

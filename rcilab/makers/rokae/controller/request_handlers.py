@@ -12,8 +12,9 @@ from rcilab.core.fault import name_faults
 from rcilab.core.safety_box import active_box
 from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.bounds import SIGNAL_COUNT
 from rcilab.makers.rokae.controller.modes import MODES
-from rcilab.makers.rokae.controller.settings import SIGNAL_COUNT, Settings, apply_request
+from rcilab.makers.rokae.controller.settings import Settings, apply_request
 from rcilab.makers.rokae.controller.state_machine import (
     GROUNDED,
     POWER_OFF,

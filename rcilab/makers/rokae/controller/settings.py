@@ -24,13 +24,14 @@ from rcilab.makers.rokae.bounds import (
     LIMIT_TOLERANCE,
     LONGEST_TOOL,
     LOWEST_FREQUENCY,
+    REPORT_FREQUENCY,
+    SIGNAL_COUNT,
 )
 from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
 from rcilab.sim.arm_parameters import ArmParameters, Floats, ForceAxesKind
 from rcilab.sim.hand_guiding import GuidedFreedom
 
-SIGNAL_COUNT = 6  # Digital inputs, and outputs: DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13 and 3.1.14).
 _FORCE_AXES = {
     rci.ForceFrame.WORLD: ForceAxesKind.WORLD,
     rci.ForceFrame.TOOL: ForceAxesKind.TOOL,
@@ -47,7 +48,7 @@ _FREEDOMS = {
 class Settings(ArmParameters):
     """All values that commands set: those of the arm, and those of the controller alone."""
 
-    torque_report_filter: float = 100.0
+    torque_report_filter: float = REPORT_FREQUENCY
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
@@ -187,8 +188,8 @@ def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str,
     upper, lower = request.upper[: arm.n], request.lower[: arm.n]
     bounds = zip(lower, upper, arm.limits.joint.lower.tolist(), arm.limits.joint.upper.tolist(), strict=True)
     for number, (low, high, lowest, highest) in enumerate(bounds, 1):
-        _require(f"lower limit of joint {number}", low, lowest - LIMIT_TOLERANCE, highest, "rad")
-        _require(f"upper limit of joint {number}", high, lowest, highest + LIMIT_TOLERANCE, "rad")
+        _require(f"lower limit of joint {number}", low, lowest - LIMIT_TOLERANCE, highest + LIMIT_TOLERANCE, "rad")
+        _require(f"upper limit of joint {number}", high, lowest - LIMIT_TOLERANCE, highest + LIMIT_TOLERANCE, "rad")
         if not low < high:
             raise InvalidValueError(
                 f"lower limit of joint {number}", _round(low), f"rad is not below the upper, {high:g} rad"

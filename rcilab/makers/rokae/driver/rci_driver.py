@@ -33,7 +33,6 @@ from rcilab.makers.rokae.driver.transport import SocketTransport
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.makers.rokae.wire import STATE_SIZE, Request, SafetyStop, StartMotionMode, build_command
-from rcilab.model.robot_model import load_model
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
@@ -90,8 +89,8 @@ class RciDriver:
         self.is_local = address.is_here
         self.simulation_address = None if address.world_port is None else (address.host, address.world_port)
         self.poll = connection.poll
-        self._limits = load_model(arm_name).limits
-        self._commands = RciCommands(connection, self._limits)
+        self._description = describe_robot(arm_name)
+        self._commands = RciCommands(connection, self._description)
         self._mode = ControllerMode.JOINT_POSITION
         self._shown = MotionGeneratorMode.IDLE
 
@@ -126,7 +125,7 @@ class RciDriver:
 
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> RciSessionCommands:
         """Returns the commands of the RCI for a session."""
-        return RciSessionCommands(self.connection, self._limits, arm, lock)
+        return RciSessionCommands(self.connection, self._description, arm, lock)
 
     def power(self, on: bool, *, alongside: bool = False) -> None:
         """Switches motor power."""

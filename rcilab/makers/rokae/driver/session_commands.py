@@ -7,7 +7,6 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector
-from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
@@ -19,6 +18,7 @@ from rcilab.makers.rokae.driver.settings import load_center
 from rcilab.makers.rokae.wire import Request, SetMotorPower
 from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
 from rcilab.model.dynamics.payload import Payload
+from rcilab.robots import RobotDescription
 
 
 class RciSessionCommands(RciCommands):
@@ -31,13 +31,15 @@ class RciSessionCommands(RciCommands):
 
     Args:
         connection: The connection.
-        limits: Bounds of the arm, to check arguments with: its own ones, whatever soft limits a model has.
+        description: The arm, to check arguments with: its own bounds, whatever soft limits a model has.
         arm: What the session has configured.
         lock: The session's lock.
     """
 
-    def __init__(self, connection: RciConnection, limits: Limits, arm: ConfiguredArm, lock: RequestLock) -> None:
-        super().__init__(connection, limits)
+    def __init__(
+        self, connection: RciConnection, description: RobotDescription, arm: ConfiguredArm, lock: RequestLock
+    ) -> None:
+        super().__init__(connection, description)
         self._arm = arm
         self._lock = lock
 

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, as_number, described
 from rcilab.core.errors import CommandRejectedError, InvalidValueError
-from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.rokae import wire as rci
@@ -30,6 +29,7 @@ from rcilab.makers.rokae.bounds import (
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
 from rcilab.model.dynamics.payload import Payload
+from rcilab.robots import RobotDescription
 
 _AXES = ("x", "y", "z", "about x", "about y", "about z")
 _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
@@ -69,12 +69,13 @@ class RciSettings:
 
     Args:
         link: The connection.
-        limits: Bounds of the arm, to check arguments with; None leaves that to the controller.
+        description: The arm, to check arguments with; None leaves that to the controller.
     """
 
-    def __init__(self, link: RciConnection, limits: Limits | None = None) -> None:
+    def __init__(self, link: RciConnection, description: RobotDescription | None = None) -> None:
         self._link = link
-        self._limits = limits
+        self._description = description
+        self._limits = None if description is None else description.limits
 
     @property
     def n(self) -> int:
@@ -146,7 +147,8 @@ class RciSettings:
             center_of_mass: In the flange frame, shape (3,), [m].
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
-        kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0)[0])
+        most = None if self._description is None else self._description.rated_payload
+        kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0, most)[0])
         center = load_center(center_of_mass)
         try:
             flat = np.asarray(inertia, dtype=np.float64).ravel()
