@@ -62,7 +62,7 @@ class Robot(Protocol):
         ...
 
     def set_output(self, signal: int, level: bool) -> PendingRequest:
-        """Sets a digital output, 0 to 5, and reads the inputs; the status has both."""
+        """Sets a digital output by its number, and reads the inputs; the status has both."""
         ...
 
     def read_inputs(self) -> PendingRequest:

@@ -15,7 +15,7 @@ from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import SIGNALS
+from rcilab.makers.maker import capabilities_of
 
 if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate
@@ -65,7 +65,9 @@ class SessionConnection:
         self._powered: bool | None = None
         self._held = RobotConfiguration()  # What was sent from here.
         self._inputs: tuple[bool, ...] | None = None
-        self._outputs: tuple[bool | None, ...] = (None,) * len(SIGNALS)  # What was set from here.
+        self._outputs: tuple[bool | None, ...] = (None,) * len(
+            capabilities_of(session.model).outputs
+        )  # What was set from here.
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
@@ -203,7 +205,7 @@ class SessionConnection:
         """Sets a digital output, and reads the inputs."""
 
         def send() -> None:
-            self._session.rci.set_do(signal, level)
+            self._session.set_output(signal, level)
             self._outputs = (*self._outputs[:signal], level, *self._outputs[signal + 1 :])
             self._read()
 
@@ -215,7 +217,7 @@ class SessionConnection:
 
     def reboot(self) -> PendingRequest:
         """Restarts the controller, which closes the session."""
-        return self._do("reboot", self._session.rci.reboot)
+        return self._do("reboot", self._session.reboot)
 
     def set_speed_override(self, speed_override: float) -> PendingRequest:
         """Sets the speed override of the motion in progress."""
@@ -243,7 +245,8 @@ class SessionConnection:
             worker.join()
 
     def _read(self) -> None:
-        self._inputs = tuple(self._session.rci.get_di(signal) for signal in SIGNALS)
+        count = len(capabilities_of(self._session.model).inputs)
+        self._inputs = tuple(self._session.read_input(signal) for signal in range(count))
 
     @property
     def _is_busy(self) -> bool:

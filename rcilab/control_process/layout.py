@@ -37,7 +37,7 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import UsageError, VersionMismatchError
 
 MAGIC = b"RCILABCP"
-VERSION = 9  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 10  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
 
 RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
 MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
-_RECORD = struct.Struct("<BbBBbBBxddd96s1024s")
+_RECORD = struct.Struct("<BbBBqIIddd96s1024s")
 _ATTEMPTS = 1000  # The writer needs about 3 us; failing this often means that the writer ended while writing.
 
 

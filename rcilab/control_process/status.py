@@ -141,9 +141,9 @@ class SupervisorStatus:
     powered: bool | None = None
     """Motor power; None while unknown."""
     inputs: tuple[bool, ...] | None = None
-    """Levels of the digital inputs 0 to 5 when they were read last; None: not read on this connection."""
-    outputs: tuple[bool | None, ...] = (None,) * 6
-    """Levels of the digital outputs 0 to 5 as set on this connection; None: not set (a controller cannot be asked)."""
+    """Levels of the digital inputs when they were read last; None: not read on this connection."""
+    outputs: tuple[bool | None, ...] = ()
+    """Levels of the digital outputs as set on this connection; None: not set (a controller cannot be asked)."""
     success_rate: float = 0.0
     """Share of commands that arrived in time, as the controller reports it, 0 to 1."""
     rate_hz: float = 0.0

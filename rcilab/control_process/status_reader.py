@@ -13,10 +13,9 @@ from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.fault import FaultCode
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, RobotMode
-from rcilab.makers.driver import SIGNALS
+from rcilab.makers.maker import Maker
 
 
 class StatusReader:
@@ -24,11 +23,13 @@ class StatusReader:
 
     Args:
         block: The shared block.
-        faults: The faults of the controller's maker; a cycle has one bit for each.
+        maker: Maker of the controller: a cycle has one bit for each of its faults, the snapshot one for each signal.
     """
 
-    def __init__(self, block: ControlBlock, faults: type[FaultCode]) -> None:
-        self._faults = tuple(faults)
+    def __init__(self, block: ControlBlock, maker: Maker) -> None:
+        self._faults = tuple(maker.faults())
+        self._inputs = range(len(maker.capabilities.inputs))
+        self._outputs = range(len(maker.capabilities.outputs))
         self._block = block
         self._ring = RingReader(block)
         self._tool: tuple[bytes, Pose | None] = b"", None
@@ -45,9 +46,9 @@ class StatusReader:
         """
         return {
             "powered": shown.powered,
-            "inputs": None if shown.inputs < 0 else tuple(bool(shown.inputs >> bit & 1) for bit in SIGNALS),
+            "inputs": None if shown.inputs < 0 else tuple(bool(shown.inputs >> bit & 1) for bit in self._inputs),
             "outputs": tuple(
-                bool(shown.outputs >> bit & 1) if shown.outputs_known >> bit & 1 else None for bit in SIGNALS
+                bool(shown.outputs >> bit & 1) if shown.outputs_known >> bit & 1 else None for bit in self._outputs
             ),
             "rate_hz": shown.rate_hz,
             "scheduling": "SCHED_FIFO" if shown.is_fifo else "normal",

@@ -51,8 +51,8 @@ from rcilab.execution.guiding import require_guidable
 from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration, require_setup
-from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, normalise_address, require_signal
-from rcilab.makers.maker import maker_of, require_driver, require_feature
+from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, parse_address, require_signal
+from rcilab.makers.maker import capabilities_of, maker_of, require_driver, require_feature
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 
@@ -102,7 +102,7 @@ class Supervisor(Closeable):
     ) -> None:
         self.model = require_driver(require_model(model))
         require_plant(plant)
-        self._target = VIRTUAL if target == VIRTUAL else normalise_address(target)
+        self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target, self.model))
         if setup is None:
             setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
         self.model = require_setup(setup).applied_to(self.model)
@@ -475,8 +475,14 @@ class Supervisor(Closeable):
             return pending
 
     def set_output(self, signal: int, level: bool) -> PendingRequest:
-        """Sets a digital output, 0 to 5, and reads the inputs again; the status shows both."""
-        return self._ask("set output", SetOutput(require_signal(signal), bool(level)))
+        """Sets a digital output and reads the inputs again; the status shows both.
+
+        Args:
+            signal: Its number, from 0.
+            level: Whether it is switched on.
+        """
+        outputs = capabilities_of(self.model).outputs
+        return self._ask("set output", SetOutput(require_signal(signal, outputs), bool(level)))
 
     def read_inputs(self) -> PendingRequest:
         """Reads the digital inputs; the status shows them."""
@@ -526,7 +532,7 @@ class Supervisor(Closeable):
                 block, self._lock, self._require_cycle, lambda request: self._ask("change of speed", request)
             )
             self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
-            self._reader, self._ring = StatusReader(block, maker.faults()), RingReader(block)
+            self._reader, self._ring = StatusReader(block, maker), RingReader(block)
         except BaseException:
             block.close()
             raise

@@ -48,7 +48,8 @@ from rcilab.core.state import RobotMode, RobotState
 from rcilab.execution.guiding import HandGuide
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import SIGNALS, StreamingDriver, open_driver
+from rcilab.makers.driver import StreamingDriver, open_driver
+from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.scheduling import PRIORITY, enter_realtime
@@ -277,8 +278,8 @@ class ControlProcess:
         self._read_inputs()  # What an output is wired to may have changed.
 
     def _read_inputs(self) -> None:
-        driver = self._require_driver()
-        self._publisher.update(inputs=sum(driver.read_input(signal) << signal for signal in SIGNALS))
+        driver, count = self._require_driver(), len(capabilities_of(self._model).inputs)
+        self._publisher.update(inputs=sum(driver.read_input(signal) << signal for signal in range(count)))
 
     def _reboot(self) -> None:
         self._require_driver().reboot()

@@ -325,6 +325,18 @@ class RobotSession(Closeable):
         """Sets the safety box that the origin of the tool must stay in, and whether it is active."""
         self.configure(RobotConfiguration(box=require_box(box)))
 
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output by its number, from 0."""
+        self._commands.set_output(signal, level)
+
+    def read_input(self, signal: int) -> bool:
+        """Returns the level of a digital input, by its number, from 0."""
+        return self._commands.read_input(signal)
+
+    def reboot(self) -> None:
+        """Restarts the controller. The session is closed then: connect again once the controller is up."""
+        self._commands.reboot()
+
     def configure(self, configuration: RobotConfiguration) -> None:
         """Sends a configuration, part by part; after a refusal the parts before it are in force.
 

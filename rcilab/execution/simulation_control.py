@@ -104,7 +104,7 @@ class SimulationControl(Closeable):
         self.ask(Press(button))
 
     def set_input(self, signal: int, level: bool) -> None:
-        """Sets a digital input: 0 to 3 are DI0_0 to DI0_3, 4 and 5 are DI1_0 and DI1_1."""
+        """Sets a digital input by its number, from 0; of an xMate, 4 and 5 are DI1_0 and DI1_1."""
         self.ask(SetInput(signal, level))
 
     def set_loop_back(self, on: bool = True) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeAlias
@@ -18,14 +18,11 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, RobotState
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.maker import Maker, find_scheme
+from rcilab.makers.maker import Maker, all_makers
 from rcilab.robots import DhRow
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
-
-SIGNALS = range(6)
-"""Digital outputs, and as many inputs. RCI manual 3.1.13: DO0_0 to DO0_3, DO1_0, DO1_1; 3.1.14 the same for inputs."""
 
 LimitTable: TypeAlias = Literal["manual", "sdk"]
 """Which published bounds of the tool: those of the maker's manual, or of its client library."""
@@ -33,8 +30,6 @@ GuideSpace: TypeAlias = Literal["joint", "cartesian"]
 """Where constraints of hand guiding hold; without effect in joint space."""
 GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
 """What stays free in Cartesian space."""
-
-_DEFAULT_SCHEME = "rci"  # Of an address without one; also says what is wrong with an address of an unknown scheme.
 
 
 class RobotAddress(Protocol):
@@ -61,6 +56,8 @@ class ExpectedArm:
     """The arm that motions will be planned for, to compare with the one that the controller moves."""
 
     name: str
+    maker: str
+    """Name of its maker's folder."""
     n: int
     lengths: tuple[tuple[float, float], ...]
     """Denavit-Hartenberg a and d, one pair a joint, [m]."""
@@ -69,7 +66,9 @@ class ExpectedArm:
     def of(cls, model: RobotModel) -> ExpectedArm:
         """Returns what identifies the arm of a model."""
         dh: tuple[DhRow, ...] = tuple(model.description.dh)
-        return cls(name=model.name, n=model.n, lengths=tuple((row.a, row.d) for row in dh))
+        return cls(
+            name=model.name, maker=model.description.maker, n=model.n, lengths=tuple((row.a, row.d) for row in dh)
+        )
 
 
 @dataclass(slots=True, kw_only=True)
@@ -118,6 +117,18 @@ class MakerCommands(Protocol):
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load at the flange."""
+        ...
+
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output."""
+        ...
+
+    def read_input(self, signal: int) -> bool:
+        """Returns the level of a digital input."""
+        ...
+
+    def reboot(self) -> None:
+        """Restarts the controller and closes the session."""
         ...
 
 
@@ -289,35 +300,35 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
         ModelError: It moves another arm, or one that is not known.
         InvalidValueError: The address is not valid.
     """
-    return _maker_at(address).open_driver(address, timeout, expected)
+    maker = _maker_at(address, None if expected is None else expected.maker)
+    return maker.open_driver(address, timeout, expected)
 
 
-def parse_address(address: str) -> RobotAddress:
-    """Returns the parts of an address of any maker's controller.
+def parse_address(address: str, model: RobotModel | None = None) -> RobotAddress:
+    """Returns the parts of the address of a controller; `str` gives it with scheme and port written out.
 
-    Raises:
-        InvalidValueError: It is not a valid address.
-    """
-    return _maker_at(address).parse_address(address)
-
-
-def normalise_address(address: str) -> str:
-    """Returns an address with scheme and port written out.
+    Args:
+        address: With the scheme of a maker; without one, it is an address of the model's maker.
+        model: The arm at the address; None where that is not known.
 
     Raises:
-        InvalidValueError: It is not a valid address.
+        InvalidValueError: It is not a valid address, or that of another maker's controller.
     """
-    return str(parse_address(address))
+    return _maker_at(address, None if model is None else model.description.maker).parse_address(address)
 
 
-def require_signal(signal: object) -> int:
-    """Returns the number of a digital signal, 0 to 5.
+def require_signal(signal: object, names: Sequence[str]) -> int:
+    """Returns the number of a digital signal.
+
+    Args:
+        signal: What was asked for.
+        names: The names of those that exist, see `Capabilities`.
 
     Raises:
         InvalidValueError: There is no such signal.
     """
-    if isinstance(signal, bool) or not isinstance(signal, int) or signal not in SIGNALS:
-        raise InvalidValueError("signal", described(signal), "does not exist; there are 0 to 5")
+    if isinstance(signal, bool) or not isinstance(signal, int) or not 0 <= signal < len(names):
+        raise InvalidValueError("signal", described(signal), f"does not exist; there are 0 to {len(names) - 1}")
     return signal
 
 
@@ -334,10 +345,14 @@ def require_timeout(timeout: object) -> None:
         raise InvalidValueError("timeout", timeout, "must be above 0 [s]")
 
 
-def _maker_at(address: object) -> Maker:
-    scheme = address.strip().partition("://")[0] if isinstance(address, str) and "://" in address else ""
-    maker = find_scheme(scheme)
-    if maker is None or not maker.capabilities.drives:
-        maker = find_scheme(_DEFAULT_SCHEME)
-    assert maker is not None
-    return maker
+def _maker_at(address: object, name: str | None) -> Maker:
+    """Returns the maker whose controller has an address; without a scheme, the one of this name, or the only one."""
+    drivable = [maker for maker in all_makers() if maker.capabilities.drives]
+    possible = [maker for maker in drivable if maker.name == name] or drivable
+    scheme, mark, _ = address.strip().partition("://") if isinstance(address, str) else ("", "", "")
+    found = [maker for maker in possible if not mark or maker.scheme == scheme.lower()]
+    if len(found) == 1:
+        return found[0]
+    schemes = " or ".join(f"{maker.scheme}://" for maker in possible)
+    problem = f"begins with {scheme}://" if mark else "has no scheme"
+    raise InvalidValueError("address", described(address), f"{problem}, needs {schemes}")

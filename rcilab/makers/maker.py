@@ -45,8 +45,10 @@ class Capabilities:
     """How it can be commanded."""
     guides: bool = False
     """Whether it frees the arm for a hand to guide it."""
-    signals: int = 0
-    """Number of digital outputs, and as many inputs."""
+    outputs: tuple[str, ...] = ()
+    """Names of its digital outputs, by number from 0."""
+    inputs: tuple[str, ...] = ()
+    """Names of its digital inputs, by number from 0."""
     setup: tuple[SetupPart, ...] = ()
     """What it can be sent: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     longest_tool: float = 2.0
@@ -204,11 +206,6 @@ def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
     return () if maker is None else maker.parameters(model)
 
 
-def find_scheme(scheme: str) -> Maker | None:
-    """Returns the maker whose controllers have addresses with a URL scheme; None for an unknown scheme."""
-    return next((maker for maker in all_makers() if maker.scheme == scheme.lower()), None)
-
-
 def simulated_robots() -> tuple[str, ...]:
     """Returns the names of the arms that have a virtual controller."""
     return _robots_of(maker for maker in all_makers() if maker.capabilities.simulates)
@@ -234,7 +231,7 @@ def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
         return ModelError(sentence).coded("no_simulation", model=model.name)
     if feature == "driving":
         return ModelError(f"{model.name} has no driver in rcilab: simulate it").coded("no_driver", model=model.name)
-    has = {"streaming": capabilities.streams, "guiding": capabilities.guides, "signals": capabilities.signals > 0}
+    has = {"streaming": capabilities.streams, "guiding": capabilities.guides, "signals": bool(capabilities.outputs)}
     if has.get(feature, feature in (*capabilities.modes, *capabilities.setup)):
         return None
     sentence = f"the controller of {model.name} has no {_FEATURE_NAMES.get(feature, feature.replace('_', ' '))}"

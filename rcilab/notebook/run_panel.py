@@ -22,7 +22,7 @@ from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import SAFETY_STOP, PlanningError, RcilabError
 from rcilab.i18n.translator import Message, message
-from rcilab.makers.driver import normalise_address
+from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import require_driver
 from rcilab.notebook.browser_heartbeat import kernel_heart
 from rcilab.notebook.browser_watchdog import LEFT_ALONE
@@ -127,7 +127,7 @@ class RunPanel(Part):
         self._mode_actions = ModeActions(self.state.store, connection, keeps_rest=self.state.session is not None)
         self.speed_override = SpeedFields(self.state, text, self._mode_actions)
         self.modes = ModeFields(self.state, text, self._mode_actions)
-        self.signals = SignalFields(text, self._send, self._button)
+        self.signals = SignalFields(self.model, text, self._send, self._button)
         self.limits = LimitFields(self.state, text, self._world, self._send, self._button)
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
@@ -189,7 +189,7 @@ class RunPanel(Part):
         self._release()
         require_driver(self.model)
         robot = RobotConnection(self._on_failure)
-        robot.open(self.model, target if target == VIRTUAL else normalise_address(target), plant)
+        robot.open(self.model, target if target == VIRTUAL else str(parse_address(target, self.model)), plant)
         self.state.store.update(plant=plant)
         self._take(robot)
         self.state.tell("robot")

@@ -9,13 +9,13 @@ from typing import Any
 import ipywidgets
 
 from rcilab.app.connection import Robot
+from rcilab.app.run.signal_actions import signal_rows
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.i18n.translator import Text
-from rcilab.makers.driver import SIGNALS
+from rcilab.makers.maker import capabilities_of
+from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import block, esc, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
-
-_NAMES = ("0_0", "0_1", "0_2", "0_3", "1_0", "1_1")  # Of the manual, 3.1.13 and 3.1.14, after DO or DI.
 
 SendRequest = Callable[[str, Callable[[Robot], PendingRequest]], None]
 """Sends a request to the robot, and reports how it ended by the name that is given."""
@@ -25,16 +25,17 @@ class SignalFields:
     """A folded group of `RunPanel`.
 
     Args:
+        model: The arm.
         text: Words.
         send: Sends a request to the robot that is connected, by its name.
         button: Makes a button of the panel.
     """
 
-    def __init__(self, text: Text, send: SendRequest, button: Callable[..., Any]) -> None:
-        self._text, self._send = text, send
+    def __init__(self, model: RobotModel, text: Text, send: SendRequest, button: Callable[..., Any]) -> None:
+        self._model, self._text, self._send = model, text, send
         self.output: Any = lean(
             ipywidgets.Dropdown, description=text("signals.output"),
-            options=[(f"DO{name}", signal) for signal, name in zip(SIGNALS, _NAMES, strict=True)],
+            options=[(name, signal) for signal, name in enumerate(capabilities_of(model).outputs)],
             tooltip=text("signals.output_hint"), layout={"width": "14em"},
         )  # fmt: skip
         self.on = button("signals.on", partial(self._set_output, True))
@@ -78,11 +79,10 @@ class SignalFields:
         self._send("reboot", lambda robot: robot.reboot())
 
     def _tell_levels(self, status: SupervisorStatus) -> str:
-        inputs = status.inputs or (None,) * len(SIGNALS)
         rows = "".join(
-            f"<tr><th>DO{name}</th><td>{esc(self._level(out))}</td>"
-            f"<th>DI{name}</th><td>{esc(self._level(level))}</td></tr>"
-            for name, out, level in zip(_NAMES, status.outputs, inputs, strict=True)
+            f"<tr><th>{esc(output)}</th><td>{esc(self._level(is_set))}</td>"
+            f"<th>{esc(name)}</th><td>{esc(self._level(is_high))}</td></tr>"
+            for output, is_set, name, is_high in signal_rows(self._model, status)
         )
         return f'<table class="rl-table">{rows}</table>'
 

@@ -48,7 +48,7 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
     opened = load_model(model)
     if target == "virtual":
         return opened  # Without a virtual controller it opens in preview.
-    parse_address(target)
+    parse_address(target, opened)
     return require_feature(opened, "driving")
 
 

@@ -161,8 +161,9 @@ def test_a_snapshot_is_never_seen_half_written(block):
 
 def test_a_snapshot_comes_back_as_it_went_in_and_a_long_message_is_cut_at_a_character(block):
     snapshot = Snapshot(
-        phase="moving", code="moving", message="臂" * 500, powered=True, is_fifo=True, memory_locked=True
-    )
+        phase="moving", code="moving", message="臂" * 500, powered=True, is_fifo=True, memory_locked=True,
+        inputs=2**32 - 1, outputs_known=2**32 - 1, outputs=2**31,
+    )  # fmt: skip
     write_snapshot(block.snapshot, block.counters, snapshot)
     seen = read_snapshot(block.snapshot, block.counters)
     assert (seen.phase, seen.code, seen.powered, seen.is_fifo, seen.memory_locked) == (
@@ -172,6 +173,7 @@ def test_a_snapshot_comes_back_as_it_went_in_and_a_long_message_is_cut_at_a_char
         True,
         True,
     )
+    assert (seen.inputs, seen.outputs_known, seen.outputs) == (2**32 - 1, 2**32 - 1, 2**31)
     assert seen.message == "臂" * 341
     assert seen.motion_time is None
 

@@ -72,7 +72,9 @@ def test_outputs_come_back_as_inputs_when_looped(robot):
     robot.world.set_loop_back(True)
     for level in (True, False):
         robot.rci.set_do(3, level)
-        assert robot.rci.get_di(3) is level
+        assert robot.rci.get_di(3) is robot.read_input(3) is level
+        robot.set_output(5, level)
+        assert robot.rci.get_di(5) is level
 
 
 def test_a_drag_shows_in_the_mode_and_refuses_settings_until_it_ends(robot):

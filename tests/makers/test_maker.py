@@ -14,15 +14,15 @@ import pytest
 import rcilab
 from rcilab.app.arm_features import tell_lack
 from rcilab.app.text import Text
-from rcilab.core.errors import ModelError
+from rcilab.core.errors import InvalidValueError, ModelError
 from rcilab.core.fault import FaultCode
+from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import (
     Feature,
     Maker,
     all_makers,
     driven_robots,
     find_lack,
-    find_scheme,
     maker_of,
     require_driver,
     require_feature,
@@ -60,10 +60,37 @@ def test_every_row_of_a_maker_raises_one_of_its_own_faults_or_none(maker: Maker)
     assert all(fault.manual_name and fault.cause for fault in maker.faults())
 
 
-def test_an_address_leads_to_the_maker_of_its_scheme():
+@pytest.mark.parametrize(
+    ("address", "model", "scheme"),
+    [
+        ("fci://robot", None, "fci"),
+        (" RCI://robot:1 ", None, "rci"),
+        ("robot", "Panda", "fci"),
+        ("robot", "xMate3", "rci"),
+    ],
+)
+def test_an_address_leads_to_the_maker_of_its_scheme_or_of_the_model(both_driven, address, model, scheme):
+    assert parse_address(address, None if model is None else load_model(model)) == f"{scheme} takes {address}"
+
+
+@pytest.mark.parametrize(
+    ("address", "model", "problem"),
+    [
+        ("http://robot", None, "begins with http://, needs fci:// or rci://"),
+        ("rci://robot", "Panda", "begins with rci://, needs fci://$"),
+        ("robot", None, "has no scheme, needs fci:// or rci://"),
+    ],
+)
+def test_an_address_of_no_maker_or_of_another_one_names_the_schemes(both_driven, address, model, problem):
+    with pytest.raises(InvalidValueError, match=problem):
+        parse_address(address, None if model is None else load_model(model))
+
+
+@pytest.fixture
+def both_driven(monkeypatch: pytest.MonkeyPatch) -> None:
     for maker in all_makers():
-        assert find_scheme(maker.scheme) is find_scheme(maker.scheme.upper()) is maker
-    assert find_scheme("http") is None
+        monkeypatch.setattr(type(maker), "capabilities", replace(maker.capabilities, drives=True))
+        monkeypatch.setattr(type(maker), "parse_address", lambda self, text: f"{self.scheme} takes {text}")
 
 
 @MAKERS
@@ -88,7 +115,7 @@ def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: 
     there |= {"driving"} if has.drives else set()
     there |= {"streaming"} if has.streams else set()
     there |= {"guiding"} if has.guides else set()
-    there |= {"signals"} if has.signals else set()
+    there |= {"signals"} if has.outputs else set()
     model = load_model(next(iter(maker.robots)))
     assert {feature for feature in FEATURES if find_lack(model, feature) is None} == there
     for feature in set(FEATURES) - there:
@@ -107,7 +134,7 @@ def test_an_arm_that_is_only_planned_says_what_can_be_done_with_it():
 def test_a_controller_without_a_feature_is_named_with_it(monkeypatch: pytest.MonkeyPatch):
     maker = maker_of(load_model("xMate3"))
     assert maker is not None
-    lacking = replace(maker.capabilities, guides=False, modes=("joint_position",), signals=0, streams=False)
+    lacking = replace(maker.capabilities, guides=False, modes=("joint_position",), outputs=(), inputs=(), streams=False)
     monkeypatch.setattr(type(maker), "capabilities", lacking)
     model = load_model("xMate3")
     names: dict[Feature, str] = {

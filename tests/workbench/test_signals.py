@@ -30,7 +30,7 @@ def test_an_output_is_set_and_the_input_it_is_wired_to_is_shown(bench: Workbench
     wait(lambda: status().outputs[2] is True, "the output")
     ask(PressSignals(what="read"))
     wait(lambda: status().inputs == (False, False, True, False, False, False), "the input")
-    shown = levels_html(status(), Text("zh"))
+    shown = levels_html(bench.store.state.model, status(), Text("zh"))
     assert "<th>DO0_2</th><td>开</td><th>DI0_2</th><td>开</td>" in shown
     ask(SetOutput(signal=2, level=False))
     wait(lambda: status().outputs[2] is False and status().inputs == (False,) * 6, "the output taken back")

@@ -156,7 +156,7 @@ class RunActions:
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
         if target != "virtual":
-            parse_address(target)
+            parse_address(target, model)
         if model.name == state.model.name and target == state.target and request.target is None:
             return
         self.open(model.name, target)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.robot_requests import RobotRequests
 from rcilab.app.store import Store
+from rcilab.makers.maker import capabilities_of
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetOutput(Request):
-    """A digital output, 0 to 5, on or off."""
+    """A digital output, by its number, on or off."""
 
     signal: int
     level: bool
@@ -27,6 +30,13 @@ class PressSignals(Request):
     """Reads the digital inputs; or restarts the controller, once that is confirmed."""
 
     what: Literal["read", "reboot", "confirm", "cancel"]
+
+
+def signal_rows(model: RobotModel, status: SupervisorStatus) -> list[tuple[str, bool | None, str, bool | None]]:
+    """Returns a row for each signal: an output's name and its level as set, an input's and its level as read last."""
+    has = capabilities_of(model)
+    columns = zip_longest(has.outputs, status.outputs, has.inputs, status.inputs or ())
+    return [(output or "", is_set, name or "", is_high) for output, is_set, name, is_high in columns]
 
 
 class SignalActions:

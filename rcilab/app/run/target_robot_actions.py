@@ -74,7 +74,7 @@ class TargetRobotActions:
             self._store.say("warn", message("run.address_needed"), trouble=_ADDRESS)
             return
         try:
-            parse_address(address)
+            parse_address(address, self._store.state.model)
         except RcilabError as error:
             self._store.say("bad", tell_error(error), trouble=_ADDRESS)
             return

@@ -12,4 +12,7 @@ LIMIT_TOLERANCE = 1e-9  # [rad] By which soft limits may pass the arm's own: the
 LONGEST_TOOL = 2.0  # [m] From the flange to the tool, the force-control frame or the load's centre of mass.
 FARTHEST_BOX = 10.0  # [m] From the base to the centre of the safety box, along each axis.
 LARGEST_BOX = 100.0  # [m] Edge of the safety box.
-SIGNAL_COUNT = 6  # Digital outputs, and as many inputs: DO0_0 to DO0_3, DO1_0, DO1_1 (manual 3.1.13, 3.1.14).
+
+SIGNAL_NAMES = ("0_0", "0_1", "0_2", "0_3", "1_0", "1_1")
+"""Of digital outputs, after DO, and of inputs, after DI (manual 3.1.13 and 3.1.14)."""
+SIGNAL_COUNT = len(SIGNAL_NAMES)

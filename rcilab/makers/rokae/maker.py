@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.core.condition import ConditionTable
 from rcilab.core.state import MODES
 from rcilab.makers.maker import Capabilities, Timing
-from rcilab.makers.rokae.bounds import LONGEST_TOOL, SIGNAL_COUNT
+from rcilab.makers.rokae.bounds import LONGEST_TOOL, SIGNAL_NAMES
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.robots import ROBOTS
@@ -38,7 +38,8 @@ class Rokae:
         streams=True,
         modes=MODES,
         guides=True,
-        signals=SIGNAL_COUNT,
+        outputs=tuple(f"DO{name}" for name in SIGNAL_NAMES),
+        inputs=tuple(f"DI{name}" for name in SIGNAL_NAMES),
         setup=("box", "tool", "load", "force", "joints", "control"),
         longest_tool=LONGEST_TOOL,
     )

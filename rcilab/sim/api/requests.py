@@ -17,7 +17,7 @@ _BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
 LIMIT_TABLES: tuple[LimitTable, ...] = get_args(LimitTable)
 _LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here withstands: it catches wrong units.
 _FARTHEST = 100.0  # [m] Likewise.
-_SIGNALS = 6  # DI0_0 to DI0_3, DI1_0, DI1_1 (manual 3.1.13).
+_LAST_SIGNAL = 31  # The status of the control process has 32 bits for them; a controller refuses what it lacks.
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +73,12 @@ class SetInput:
 
     name: ClassVar[str] = "set_input"
     signal: int
-    """0 to 3: DI0_0 to DI0_3; 4, 5: DI1_0, DI1_1."""
+    """Number of the input, from 0."""
     level: bool
 
     def __post_init__(self) -> None:
         """Checks both."""
-        _put(self, "signal", as_integer(self.signal, "signal", 0, _SIGNALS - 1))
+        _put(self, "signal", as_integer(self.signal, "signal", 0, _LAST_SIGNAL))
         _put(self, "level", as_flag(self.level, "level"))
 
 

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.arm_features import tell_lack
 from rcilab.app.run.drive_state import is_ours
-from rcilab.app.run.signal_actions import PressSignals, SetOutput
+from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
-from rcilab.makers.driver import SIGNALS
 from rcilab.makers.maker import capabilities_of
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
-
-_NAMES = ("0_0", "0_1", "0_2", "0_3", "1_0", "1_1")  # Of the manual, 3.1.13 and 3.1.14, after DO or DI.
+    from rcilab.model.robot_model import RobotModel
 
 
 class SignalsPanel:
@@ -30,9 +28,9 @@ class SignalsPanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         with gui.add_folder(text("signals.title"), expand_by_default=False):
-            names = [f"DO{name}" for name in _NAMES[: capabilities_of(state.model).signals] or _NAMES]
+            names = capabilities_of(state.model).outputs
             self._output = output = gui.add_dropdown(
-                text("signals.output"), tuple(names), hint=text("signals.output_hint")
+                text("signals.output"), names or ("—",), hint=text("signals.output_hint")
             )
             gui.add_html('<i class="rl-buttons"></i>')
             self._buttons: list[Any] = []
@@ -71,7 +69,7 @@ class SignalsPanel:
         self._output.disabled = lack is not None
         for button in self._buttons:
             button.disabled = not is_ready or lack is not None
-        self._levels.show(levels_html(status, text))
+        self._levels.show(levels_html(state.model, status, text))
         self._wired.show(state.world.loop_back)
         self._wired.handle.disabled = not is_ours(status)
         self._reboot.disabled = not is_ready
@@ -81,13 +79,12 @@ class SignalsPanel:
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
 
 
-def levels_html(status: SupervisorStatus, text: Text) -> str:
+def levels_html(model: RobotModel, status: SupervisorStatus, text: Text) -> str:
     """Returns the outputs as set and the inputs as read last."""
-    inputs = status.inputs or (None,) * len(SIGNALS)
     rows = "".join(
-        f"<tr><th>DO{name}</th><td>{esc(_level(out, text))}</td>"
-        f"<th>DI{name}</th><td>{esc(_level(level, text))}</td></tr>"
-        for name, out, level in zip(_NAMES, status.outputs, inputs, strict=True)
+        f"<tr><th>{esc(output)}</th><td>{esc(_level(is_set, text))}</td>"
+        f"<th>{esc(name)}</th><td>{esc(_level(is_high, text))}</td></tr>"
+        for output, is_set, name, is_high in signal_rows(model, status)
     )
     return f'<table class="rl-table rl-facts-table">{rows}</table>'
 

@@ -15,7 +15,6 @@ from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, field_rang
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.makers import driver
 from rcilab.makers.maker import capabilities_of, parameters_of
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.bounds import SIGNAL_COUNT
@@ -24,7 +23,6 @@ from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.model.dynamics.payload import NO_LOAD
 from rcilab.model.robot_model import load_model
 from rcilab.robots import RobotDescription, describe_robot
-from rcilab.sim.api.requests import SetInput
 
 ARMS = ("xMatePro3", "xMatePro7", "xMate3", "xMate7")
 BODY = (0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01)
@@ -223,7 +221,8 @@ def test_tool_load_and_force_frame_start_alike_at_all_ends() -> None:
 
 def test_there_are_as_many_signals_at_all_ends() -> None:
     arm = describe_robot("xMatePro7")
-    assert len(driver.SIGNALS) == SIGNAL_COUNT == capabilities_of(load_model("xMatePro7")).signals
+    has = capabilities_of(load_model("xMatePro7"))
+    assert len(has.outputs) == len(has.inputs) == SIGNAL_COUNT
     for signal in (0, SIGNAL_COUNT - 1, SIGNAL_COUNT):
         exists = signal < SIGNAL_COUNT
         assert controller_takes(arm, rci.SetDO(signal, True)) is exists
@@ -232,7 +231,7 @@ def test_there_are_as_many_signals_at_all_ends() -> None:
             is exists
         )
         if exists:
-            SetInput(signal, True)
+            Settings.of(arm).with_input(signal, True)
         else:
             with pytest.raises(InvalidValueError):
-                SetInput(signal, True)
+                Settings.of(arm).with_input(signal, True)

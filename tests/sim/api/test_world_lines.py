@@ -154,7 +154,7 @@ def test_any_bytes_are_a_value_or_a_decode_error(line: bytes) -> None:
         (b'{"request":"push","wrench":[0,0,1,0,0,0],"limb":4}', "push has no 'limb'; it has: wrench, link, point"),
         (b'{"request":"release","now":true}', "release has no 'now'; it has: nothing"),
         (b'{"request":"press","button":"red"}', "button: 'red' is unknown; known: none, estop, gstop"),
-        (b'{"request":"set_input","signal":6,"level":true}', "signal needs a whole number, 0 to 5.*, got 6"),
+        (b'{"request":"set_input","signal":32,"level":true}', "signal needs a whole number, 0 to 31.*, got 32"),
         (b'{"request":"set_input","signal":1,"level":1}', "level needs true or false.*, got 1"),
         (b'{"request":"network","faults":{"rain":1}}', "known: loss, delay, jitter"),
         (b'{"request":"network","faults":{"loss":2}}', "loss needs 0 to 1.*, got 2"),

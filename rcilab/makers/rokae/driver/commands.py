@@ -8,6 +8,7 @@ from rcilab.core.errors import CommandRejectedError
 from rcilab.core.state import ControllerMode
 from rcilab.makers.driver import require_signal
 from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.bounds import SIGNAL_NAMES
 from rcilab.makers.rokae.driver.settings import RciSettings, flag, member
 
 
@@ -60,11 +61,11 @@ class RciCommands(RciSettings):
 
     def set_do(self, signal: int, level: bool) -> None:
         """Sets a digital output, 0 to 5."""
-        self._ask(rci.SetDO(require_signal(signal), flag("level", level)))
+        self._ask(rci.SetDO(require_signal(signal, SIGNAL_NAMES), flag("level", level)))
 
     def get_di(self, signal: int) -> bool:
         """Returns the level of a digital input, 0 to 5."""
-        return bool(self._request(rci.GetDIState(require_signal(signal))).level)
+        return bool(self._request(rci.GetDIState(require_signal(signal, SIGNAL_NAMES))).level)
 
     def start_drag(
         self,

@@ -92,6 +92,14 @@ class RciSessionCommands(RciCommands):
             super().set_load(load.mass, load.center_of_mass, load.inertia)
             self._arm.model = model
 
+    def set_output(self, signal: int, level: bool) -> None:
+        """Sets a digital output (`set_do`)."""
+        self.set_do(signal, level)
+
+    def read_input(self, signal: int) -> bool:
+        """Returns the level of a digital input (`get_di`)."""
+        return self.get_di(signal)
+
     def reboot(self) -> None:
         """Restarts the controller. The session is closed then: connect again once it is up."""
         with self._lock.take("RebootRobot"):

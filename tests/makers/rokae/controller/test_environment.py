@@ -88,6 +88,7 @@ def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.handle(world.Limits("sdk")) == world.Done()
     assert place.handle(world.AutoLimit(True)) == world.Done()
     assert place.handle(world.SetInput(2, True)) == world.Done()
+    assert isinstance(place.handle(world.SetInput(6, True)), world.Refused)
     assert place.cycle.limit_table == "sdk"
     assert place.cycle.auto_limit
     assert place.status.auto_limit
