@@ -11,6 +11,7 @@ from rcilab.makers.maker import Feature, capabilities_of, find_lack
 if TYPE_CHECKING:
     from rcilab.app.run.plan_readiness import ArmStatus
     from rcilab.core.arrays import JointVector
+    from rcilab.makers.configuration import SetupPart
     from rcilab.model.robot_model import RobotModel
 
 
@@ -22,6 +23,14 @@ def tell_lack(model: RobotModel, feature: Feature) -> Message | None:
     said = tell(lack)
     assert isinstance(said, Message)  # Every lack has a code.
     return said
+
+
+def tell_lack_of_part(model: RobotModel, part: SetupPart) -> Message | None:
+    """Returns why a part of the configuration cannot be changed; None: it can.
+
+    An arm that is only planned for can be given all of them: its plans and checks go by them.
+    """
+    return None if is_only_planned(model) else tell_lack(model, part)
 
 
 def tell_lack_to_run(model: RobotModel, *, is_virtual: bool) -> Message | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.spatial import IDENTITY
 from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.maker import capabilities_of
 
 if TYPE_CHECKING:
     from rcilab.control_process.pending_request import PendingRequest
@@ -84,6 +85,5 @@ def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotConfiguration
     if not is_virtual:
         return RobotConfiguration()
     has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
-    return RobotConfiguration(
-        tool=model.T_flange_tool if has_tool else None, load=model.load if model.load.mass else None
-    )
+    tool, load = model.T_flange_tool if has_tool else None, model.load if model.load.mass else None
+    return RobotConfiguration(tool=tool, load=load).only(capabilities_of(model).setup)

@@ -50,9 +50,9 @@ from rcilab.core.state import Mode
 from rcilab.execution.guiding import require_guidable
 from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
-from rcilab.makers.configuration import RobotConfiguration, require_setup
+from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, parse_address, require_signal
-from rcilab.makers.maker import capabilities_of, maker_of, require_driver, require_feature
+from rcilab.makers.maker import capabilities_of, maker_of, require_driver, require_feature, require_parts
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 
@@ -105,7 +105,7 @@ class Supervisor(Closeable):
         self._target = VIRTUAL if target == VIRTUAL else str(parse_address(target, self.model))
         if setup is None:
             setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
-        self.model = require_setup(setup).applied_to(self.model)
+        self.model = require_parts(self.model, setup).applied_to(self.model)
         self._setup = ConfigurationSync(setup)
         self._plant = plant
         self._stop_without_operator = stop_without_operator
@@ -463,9 +463,10 @@ class Supervisor(Closeable):
 
         Raises:
             InvalidValueError: It is not a configuration, or the load is heavier than the arm is rated for.
+            ModelError: The arm lacks a part of it.
             UsageError: The arm is moving, or no controller is connected.
         """
-        model = require_setup(setup).applied_to(self.model)
+        model = require_parts(self.model, setup).applied_to(self.model)
         with self._lock:
             self._require_block()
             require_ready(self.status(), is_operator_overdue=False)

@@ -31,7 +31,7 @@ from rcilab.execution.start_pose_check import describe_start_mismatch, require_m
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
-from rcilab.makers.maker import require_driver, require_feature
+from rcilab.makers.maker import require_driver, require_feature, require_parts
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import plan_joint
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
@@ -319,6 +319,7 @@ class RobotSession(Closeable):
             center_of_mass: In the flange frame, shape (3,), [m].
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
+        require_feature(self.model, "load")
         self._commands.set_load(mass, center_of_mass, inertia)
 
     def set_safety_box(self, box: SafetyBox) -> None:
@@ -327,24 +328,28 @@ class RobotSession(Closeable):
 
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output by its number, from 0."""
+        require_feature(self.model, "signals")
         self._commands.set_output(signal, level)
 
     def read_input(self, signal: int) -> bool:
         """Returns the level of a digital input, by its number, from 0."""
+        require_feature(self.model, "signals")
         return self._commands.read_input(signal)
 
     def reboot(self) -> None:
         """Restarts the controller. The session is closed then: connect again once the controller is up."""
+        require_feature(self.model, "reboot")
         self._commands.reboot()
 
     def configure(self, configuration: RobotConfiguration) -> None:
         """Sends a configuration, part by part; after a refusal the parts before it are in force.
 
         Raises:
+            ModelError: The arm lacks a part.
             CommandRejectedError: The controller refused a part; the error names it.
             UsageError: A motion runs.
         """
-        self._commands.configure(configuration)
+        self._commands.configure(require_parts(self.model, configuration))
 
     def execute(
         self,

@@ -18,7 +18,7 @@ from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
 from rcilab.core.fault import FaultCode
 from rcilab.core.state import Mode
-from rcilab.makers.configuration import SetupPart
+from rcilab.makers.configuration import RobotConfiguration, SetupPart, require_setup
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots import ROBOTS_BY_MAKER
 
@@ -49,6 +49,8 @@ class Capabilities:
     """Names of its digital outputs, by number from 0."""
     inputs: tuple[str, ...] = ()
     """Names of its digital inputs, by number from 0."""
+    reboots: bool = False
+    """Whether it can be restarted over its interface."""
     setup: tuple[SetupPart, ...] = ()
     """What it can be sent: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     longest_tool: float = 2.0
@@ -72,7 +74,7 @@ class Timing:
         return max(1, round(self.command_period / CYCLE_TIME))
 
 
-Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals"]
+Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals", "reboot"]
 """What an arm may lack; catalogues call it `feature.NAME`."""
 
 
@@ -174,6 +176,7 @@ class PlanningOnly:
 _FEATURE_NAMES: dict[Feature, str] = {
     "guiding": "hand guiding",
     "signals": "digital signals",
+    "reboot": "restart on request",
     "box": "safety box",
     "force": "force-control frame",
     "joints": "soft joint limits",
@@ -231,7 +234,12 @@ def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
         return ModelError(sentence).coded("no_simulation", model=model.name)
     if feature == "driving":
         return ModelError(f"{model.name} has no driver in rcilab: simulate it").coded("no_driver", model=model.name)
-    has = {"streaming": capabilities.streams, "guiding": capabilities.guides, "signals": bool(capabilities.outputs)}
+    has = {
+        "streaming": capabilities.streams,
+        "guiding": capabilities.guides,
+        "signals": bool(capabilities.outputs or capabilities.inputs),
+        "reboot": capabilities.reboots,
+    }
     if has.get(feature, feature in (*capabilities.modes, *capabilities.setup)):
         return None
     sentence = f"the controller of {model.name} has no {_FEATURE_NAMES.get(feature, feature.replace('_', ' '))}"
@@ -257,6 +265,19 @@ def require_feature(model: RobotModel, feature: Feature) -> RobotModel:
     if lack is not None:
         raise lack
     return model
+
+
+def require_parts(model: RobotModel, configuration: object) -> RobotConfiguration:
+    """Returns a configuration if an arm has every part of it.
+
+    Raises:
+        InvalidValueError: It is not a configuration.
+        ModelError: The arm lacks a part of it.
+    """
+    setup = require_setup(configuration)
+    for part in setup.parts:
+        require_feature(model, part)
+    return setup
 
 
 def require_simulator(model: RobotModel) -> RobotModel:

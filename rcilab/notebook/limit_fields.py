@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import chain
 from typing import Any
 
 import ipywidgets
 import numpy as np
 
+from rcilab.app.arm_features import tell_lack
 from rcilab.app.run.world_actions import SetWiring, WorldActions
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import RcilabError
@@ -18,7 +20,7 @@ from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.signal_fields import SendRequest
 from rcilab.notebook.state import LabState
-from rcilab.notebook.style import block, problem, soft, verdict, write
+from rcilab.notebook.style import block, problem, soft, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 from rcilab.robots import describe_robot
 
@@ -56,10 +58,11 @@ class LimitFields:
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
         self._inside: Any = lean(ipywidgets.VBox, [])
-        self.said = block()
+        self.said, self._lack = block(), block()
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         rows = [
             block(soft(text("softlimits.hint"))),
+            self._lack,
             self._inside,
             lean(ipywidgets.HBox, [self.send, self.whole]),
             self.said,
@@ -74,7 +77,11 @@ class LimitFields:
 
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller and the limits of the arm."""
-        is_ready = status is not None and status.phase in ("idle", "fault")
+        lack = tell_lack(self._state.model, "joints")
+        write(self._lack, why_html(self._text, lack))
+        for field in chain.from_iterable(self.fields):
+            field.box.disabled = lack is not None
+        is_ready = status is not None and status.phase in ("idle", "fault") and lack is None
         self.send.disabled = not is_ready or not self.fields
         self.whole.disabled = not is_ready
         if not is_ready:

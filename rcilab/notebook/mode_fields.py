@@ -18,7 +18,7 @@ from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import ParameterGroup
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.state import LabState
-from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, write
+from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 
 _WIDTHS = ("8em", "3.4em", "4.2em")  # So that two fields stand in a row inside `Lab`.
@@ -41,7 +41,7 @@ class ModeFields:
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
             value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
-        self._note, self._held, self._said = block(), block(), block()
+        self._note, self._lack, self._held, self._said = block(), block(), block(), block()
         self.fields: dict[str, list[NumberField]] = {}
         """By group, of the groups that were opened."""
         self.folders: dict[str, Any] = {group.name: self._folder(group) for group in self._groups}
@@ -51,6 +51,7 @@ class ModeFields:
         self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
         self.parameters = lean(ipywidgets.VBox, [
             block(head(text("control.title"))),
+            self._lack,
             *self.folders.values(),
             lean(ipywidgets.HBox, [self.send, self.reset]),
             self._said,
@@ -76,6 +77,9 @@ class ModeFields:
             for group in self._groups:
                 if group.name in self.fields:
                     self._fill(group)
+        control_lack = tell_lack(state.model, "control")
+        write(self._lack, why_html(text, control_lack))
+        self.reset.disabled = control_lack is not None
         pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
         self.send.layout.display = "none" if state.robot is None or state.now.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"

@@ -8,13 +8,14 @@ from typing import Any
 
 import ipywidgets
 
+from rcilab.app.arm_features import tell_lack
 from rcilab.app.connection import Robot
 from rcilab.app.run.signal_actions import signal_rows
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.i18n.translator import Text
 from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import RobotModel
-from rcilab.notebook.style import block, esc, head, soft, verdict, write
+from rcilab.notebook.style import block, esc, head, soft, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 
 SendRequest = Callable[[str, Callable[[Robot], PendingRequest]], None]
@@ -44,14 +45,16 @@ class SignalFields:
         self.reboot = button("reboot.press", lambda: self._ask(True))
         self.yes = button("reboot.confirm", self._restart, style="danger")
         self.no = button("run.cancel", lambda: self._ask(False))
-        self._levels, self._question = block(), block()
+        self._lack, self._reboot_lack, self._levels, self._question = block(), block(), block(), block()
         self._address = ""
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         rows = [
+            self._lack,
             lean(ipywidgets.HBox, [self.output, self.on, self.off, self.read]),
             self._levels,
             block(soft(text("signals.note"))),
             block(head(text("reboot.title"))),
+            self._reboot_lack,
             self.reboot,
             self._question,
             self._answers,
@@ -63,8 +66,13 @@ class SignalFields:
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller."""
         is_ready = status is not None and status.phase in ("idle", "fault")
-        for button in (self.on, self.off, self.read, self.reboot):
-            button.disabled = not is_ready
+        lack, unable = tell_lack(self._model, "signals"), tell_lack(self._model, "reboot")
+        write(self._lack, why_html(self._text, lack))
+        write(self._reboot_lack, why_html(self._text, unable))
+        self.output.disabled = lack is not None
+        for button in (self.on, self.off, self.read):
+            button.disabled = not is_ready or lack is not None
+        self.reboot.disabled = not is_ready or unable is not None
         if not is_ready:
             self._ask(False)
         self._address = "" if status is None else status.address or status.target

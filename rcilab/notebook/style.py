@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import ipywidgets
 
-from rcilab.i18n.translator import follow
+from rcilab.i18n.translator import Message, Text, follow
 from rcilab.notebook.widget_sharing import is_shared, lean, once
 
 Tone = Literal["good", "warn", "bad", "none"]
@@ -57,6 +57,11 @@ def verdict(tone: Tone, word: str, rest: str) -> str:
 def soft(text: str) -> str:
     """Returns a quiet line."""
     return f'<p class="rl-soft">{esc(text)}</p>'
+
+
+def why_html(text: Text, why: Message | None) -> str:
+    """Returns why something is off, beside it; empty for None."""
+    return "" if why is None else soft(text.say(why))
 
 
 def problem(text: str) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.request import Request, TypeField
-from rcilab.app.text import Message
+from rcilab.app.text import Message, Text
 from rcilab.app.view_actions import DropProblem
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import fixed
@@ -38,6 +38,11 @@ def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> No
     @button.on_click
     async def _(event: Any) -> None:
         ask(make(event.client_id))
+
+
+def why_html(text: Text, why: Message | None) -> str:
+    """Returns why something is off, beside it; empty for None."""
+    return "" if why is None else f'<p class="rl-note rl-why">{esc(text.say(why))}</p>'
 
 
 class BoundControl:
@@ -99,6 +104,10 @@ class NumberField:
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._typed = (time.monotonic(), event.target.value, event.client_id, self.field)
+
+    def disable(self, is_off: bool) -> None:
+        """Greys it, or makes it usable again."""
+        self._handle.disabled = is_off
 
     def show(self, text: str, problem: Message | None, entered: Mapping[int | None, float] = _NOBODY) -> None:
         """Commits what was typed, or writes the state's number; called at the display's rate.

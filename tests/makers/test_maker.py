@@ -116,6 +116,7 @@ def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: 
     there |= {"streaming"} if has.streams else set()
     there |= {"guiding"} if has.guides else set()
     there |= {"signals"} if has.outputs else set()
+    there |= {"reboot"} if has.reboots else set()
     model = load_model(next(iter(maker.robots)))
     assert {feature for feature in FEATURES if find_lack(model, feature) is None} == there
     for feature in set(FEATURES) - there:

@@ -33,6 +33,7 @@ from rcilab.core.errors import (
     UsageError,
 )
 from rcilab.makers.driver import parse_address
+from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import load_model
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ class RunActions:
             self._untouched = goal_at(model, model.home)
             changes |= {"model": model, "goal": self._untouched, "setup": setup}
             changes |= {"drive": replace(state.drive, control=None, refusal=None)}
-            state = replace(state, setup=setup, drive=replace(state.drive, control=None))
+            state = replace(state, model=model, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
         self._session.open(model, target, state.plant, _own_setup(state, target))
         self._store.update(place=0.0, playing=False, **changes)
@@ -361,7 +362,8 @@ def _own_setup(state: UiState, target: str) -> RobotConfiguration | None:
     """Returns what a virtual controller is sent at once; a real one is sent nothing before a yes."""
     if target != "virtual":
         return None
-    return replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)
+    setup = replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)
+    return setup.only(capabilities_of(state.model).setup)
 
 
 def _stopped(state: UiState) -> str:

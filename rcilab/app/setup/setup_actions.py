@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 import numpy as np
 
+from rcilab.app.arm_features import tell_lack_of_part
 from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
 from rcilab.app.planning import Plan, tool_path
@@ -142,12 +143,16 @@ class SetupActions:
         """Takes a typed number, or says beside the field what is wrong with it."""
         _, _, place = request.field.partition(".")
         part, _, name = place.partition(".")
+        state = self._store.state
+        lack = tell_lack_of_part(state.model, cast("SetupPart", part)) if part in LISTED else None
+        if lack is not None:
+            self._store.complain(request.field, lack)
+            return
         if part == "joints":
             self._type_joint_limit(request, name)
             return
         if name not in FIELD_NAMES.get(part, ()):
             return
-        state = self._store.state
         longest = capabilities_of(state.model).longest_tool
         bounds = field_range(part, name, state.model.description.rated_payload, longest)
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
@@ -246,12 +251,14 @@ class SetupActions:
         box, force = setup.wanted.box, setup.wanted.force
         assert box is not None
         assert force is not None
+        model = self._store.state.model
         if request.name == "edited" and value in ("", *SETUP_PARTS):
-            seen = setup.seen | ({value} if value else set())
-            self._store.update(setup=replace(setup, edited=value, seen=frozenset(seen)))
+            shown = {part for part in SETUP_PARTS if part == value and tell_lack_of_part(model, part) is None}
+            self._store.update(setup=replace(setup, edited=value, seen=setup.seen | shown))
         elif request.name in SETUP_PARTS and isinstance(value, bool):
             seen = setup.seen | {request.name} if value else setup.seen - {request.name}
-            self._store.update(setup=replace(setup, seen=frozenset(seen)))
+            if tell_lack_of_part(model, request.name) is None:
+                self._store.update(setup=replace(setup, seen=seen))
         elif request.name == "active" and isinstance(value, bool):
             switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
             self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(box=switched))), "box")
@@ -287,10 +294,11 @@ class SetupActions:
     def restore(self, setup: RobotConfiguration) -> None:
         """Restores a configuration edited before; it is sent to a real robot only after a question."""
         now = self._store.state.setup
-        parts: set[SetupPart] = set(setup.parts)
+        model = self._store.state.model
+        parts: set[SetupPart] = {part for part in setup.parts if tell_lack_of_part(model, part) is None}
         if parts:
             self._is_back = True
-            self._take(replace(now, wanted=now.wanted.updated(setup), touched=now.touched | parts), parts)
+            self._take(replace(now, wanted=now.wanted.updated(setup.only(parts)), touched=now.touched | parts), parts)
 
     def tick(self, status: SupervisorStatus) -> None:
         """Follows a configuration that was sent, and sends what is new to a virtual controller."""
@@ -328,7 +336,11 @@ class SetupActions:
             self._drag = None
 
     def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
-        """Takes over an edit; a drag is one step to undo."""
+        """Takes over an edit, unless the arm lacks the part; a drag is one step to undo."""
+        lack = tell_lack_of_part(self._store.state.model, part)
+        if lack is not None:
+            self._store.say("warn", lack)
+            return
         if drag is None or drag != self._drag:
             now = self._store.state.setup
             self._past = [*self._past[-_UNDO_DEPTH:], (now.wanted, now.touched)]

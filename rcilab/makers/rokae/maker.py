@@ -38,6 +38,7 @@ class Rokae:
         streams=True,
         modes=MODES,
         guides=True,
+        reboots=True,
         outputs=tuple(f"DO{name}" for name in SIGNAL_NAMES),
         inputs=tuple(f"DI{name}" for name in SIGNAL_NAMES),
         setup=("box", "tool", "load", "force", "joints", "control"),

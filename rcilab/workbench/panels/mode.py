@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import is_only_planned, tell_lack
+from rcilab.app.arm_features import is_only_planned, tell_lack, tell_lack_of_part
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
@@ -14,7 +14,7 @@ from rcilab.core.state import MODES, Mode
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import ParameterGroup
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -40,7 +40,7 @@ class ModePanel:
             self._note = Html(gui)
             self._build_parts(gui, state)
             with gui.add_folder(text("control.title"), expand_by_default=False):
-                self._held = Html(gui)
+                self._lack, self._held = Html(gui), Html(gui)
                 send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
                 on_press(send, ask, lambda page: PressControl(page=page, what="send"))
                 self._send = send
@@ -48,6 +48,7 @@ class ModePanel:
                     text("control.reset"), icon="restore", color="gray", hint=text("control.reset_hint")
                 )
                 on_press(reset, ask, lambda page: PressControl(page=page, what="reset"))
+                self._reset = reset
 
     def _build_parts(self, gui: Any, state: UiState) -> None:
         text = self._text
@@ -84,6 +85,9 @@ class ModePanel:
             self._problems[group.name].show(problems_html(state, text, self._labels[group.name]))
         self._send.visible = state.target != "virtual"
         self._send.disabled = not is_pending(state, status) or status.phase != "idle"
+        lack = tell_lack_of_part(state.model, "control")
+        self._reset.disabled = lack is not None
+        self._lack.show(why_html(text, lack))
         self._held.show(held_html(state, status, text))
 
     def _build_field(self, gui: Any, group: ParameterGroup, index: int, label: str) -> NumberField:

@@ -21,7 +21,7 @@ from rcilab.app.run.push_actions import HoldPush, SetPush
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import fixed
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -92,7 +92,7 @@ class PushPanel:
         unsimulated = tell_lack(state.model, "simulation") if state.target == "virtual" else None
         guided, reason = is_guided(status), unsimulated or no_push(status)
         lack = tell_lack(state.model, "guiding")
-        self._lack.show("" if lack is None else f'<p class="rl-note rl-why">{esc(text.say(lack))}</p>')
+        self._lack.show(why_html(text, lack))
         self._way.handle.disabled = lack is not None
         is_ready = status.phase == "idle" and bool(status.powered)
         self._guide.disabled = is_moving(status) or not is_ready or lack is not None

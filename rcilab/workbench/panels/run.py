@@ -28,7 +28,7 @@ from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html, way_html
 from rcilab.workbench.panels.target import planned_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -119,7 +119,7 @@ class RunPanel:
         self._agree.visible = self._cancel.visible = question is not None
         is_said = moving or reason in (outdated(state), connection_note(state, status))  # That it moves: in the bar.
         unsaid = None if is_said else reason
-        self._reason.show("" if unsaid is None else f'<p class="rl-note rl-why">{esc(text.say(unsaid))}</p>')
+        self._reason.show(why_html(text, unsaid))
         is_program = state.plan is not None and state.plan.program is not None
         self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)
         self._back.visible = may_go_back(state, reason)

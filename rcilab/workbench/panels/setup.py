@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.arm_features import tell_lack_of_part
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.setup.configuration_state import (
@@ -107,11 +108,13 @@ class SetupPanel:
         text, pending = self._text, pending_parts(state, status)
         rows = []
         for part in LISTED:
-            here, held = self._said(state.setup.wanted, part), text.say(describe_held(status, part))
+            lack = tell_lack_of_part(state.model, part)
+            here = self._said(state.setup.wanted, part) if lack is None else "—"
+            held = text("setup.held", held=text.say(describe_held(status, part))) if lack is None else text.say(lack)
             mark = ' class="rl-differs"' if part in pending else ""
             rows.append(
                 f"<tr{mark}><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(here)}"
-                f'<br><span class="rl-dim">{esc(text("setup.held", held=held))}</span></td></tr>'
+                f'<br><span class="rl-dim">{esc(held)}</span></td></tr>'
             )
         return f'<table class="rl-table rl-facts-table rl-setup">{"".join(rows)}</table>'
 

@@ -10,7 +10,7 @@ from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
 from rcilab.makers.maker import capabilities_of
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -55,7 +55,7 @@ class SignalsPanel:
                 text("reboot.press"), icon="rotate-clockwise", color="orange", hint=text("reboot.hint")
             )
             on_press(self._reboot, ask, _press("reboot"))
-            self._question = Html(gui)
+            self._reboot_lack, self._question = Html(gui), Html(gui)
             self._agree = gui.add_button(text("reboot.confirm"), icon="rotate-clockwise", color="red", visible=False)
             on_press(self._agree, ask, _press("confirm"))
             self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
@@ -65,14 +65,16 @@ class SignalsPanel:
         """Follows the controller."""
         text, is_ready = self._text, status.phase in ("idle", "fault")
         lack = tell_lack(state.model, "signals")
-        self._lack.show("" if lack is None else f'<p class="rl-note rl-why">{esc(text.say(lack))}</p>')
+        self._lack.show(why_html(text, lack))
         self._output.disabled = lack is not None
         for button in self._buttons:
             button.disabled = not is_ready or lack is not None
         self._levels.show(levels_html(state.model, status, text))
         self._wired.show(state.world.loop_back)
-        self._wired.handle.disabled = not is_ours(status)
-        self._reboot.disabled = not is_ready
+        self._wired.handle.disabled = not is_ours(status) or lack is not None
+        unable = tell_lack(state.model, "reboot")
+        self._reboot_lack.show(why_html(text, unable))
+        self._reboot.disabled = not is_ready or unable is not None
         self._reboot.visible = not state.reboot_asked
         self._agree.visible = self._cancel.visible = state.reboot_asked
         said = esc(text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack
+from rcilab.app.arm_features import tell_lack_of_part
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.configuration_state import own_limits, soft_limits
@@ -13,7 +13,7 @@ from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.setup.setup_fields import JOINT_ENDS
 from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, why_html
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -51,12 +51,13 @@ class SoftLimitsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the configuration."""
         limits = soft_limits(state)
+        lack = tell_lack_of_part(state.model, "joints")
         for end, joint, field in self._fields:
+            field.disable(lack is not None)
             number = shown(math.degrees(getattr(limits, end)[joint]))
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
-        lack = tell_lack(state.model, "joints")
-        self._lack.show("" if lack is None else f'<p class="rl-note rl-why">{esc(self._text.say(lack))}</p>')
-        self._whole.disabled = limits == own_limits(state)
+        self._lack.show(why_html(self._text, lack))
+        self._whole.disabled = limits == own_limits(state) or lack is not None
         self._auto.show(state.world.auto_limit)
-        self._auto.handle.disabled = not is_ours(status)
+        self._auto.handle.disabled = not is_ours(status) or lack is not None
