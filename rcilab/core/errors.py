@@ -13,6 +13,7 @@
         VersionMismatchError     .found, .expected
       ConnectionLostError
       CommandRejectedError       .command, .status: the controller refused a command
+        ManualRecoveryError      the arm is too far outside its range or its safety box
       ControlError               .faults, .run: the controller stopped the motion
       DeadlineError              also a TimeoutError
       UsageError                 also a RuntimeError: wrong call order
@@ -39,6 +40,7 @@ __all__ = [
     "DecodeError",
     "InvalidValueError",
     "KinematicsError",
+    "ManualRecoveryError",
     "ModelError",
     "PlanningError",
     "ProtocolError",
@@ -194,6 +196,10 @@ class CommandRejectedError(RcilabError):
         self.coded("rejected", command=command, status=reason or name)
         self.command = command
         self.status = status
+
+
+class ManualRecoveryError(CommandRejectedError):
+    """The controller does not recover an arm that is so far outside its joint range or its safety box."""
 
 
 SAFETY_STOP = "safety_stop"

@@ -583,6 +583,7 @@ class RobotSession(Closeable):
         """Clears the controller's faults and returns once they are gone.
 
         Raises:
+            ManualRecoveryError: The arm is too far outside its range or its safety box.
             CommandRejectedError: The controller refuses; the message says what it waits for.
             DeadlineError: It accepted, and the faults remained.
         """

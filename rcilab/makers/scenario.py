@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, TypeAlias
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.conformance.common_conditions import yielding_limits
@@ -90,6 +89,10 @@ def _as_it_is(scene: Scene) -> Scene:
     return scene
 
 
+def _at_home(model: RobotModel) -> JointVector:
+    return model.home
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FaultScenario:
     """One fault, and what makes a controller report it."""
@@ -102,21 +105,14 @@ class FaultScenario:
     """Returns the callback that provokes the fault."""
     prepare: Callable[[Scene], Scene] = field(default=_as_it_is)
     """Prepares the scene: narrows a limit, softens the arm. Nothing moves."""
-    pose: tuple[float, ...] | None = None
-    """Joint angles of a 7-axis arm that it begins at, [rad]; None: the arm's home."""
+    start: Callable[[RobotModel], JointVector] = field(default=_at_home)
+    """Returns the joint angles that the arm begins at, shape (n,), [rad]."""
     needs_elbow: bool = False
     """Whether it needs an arm with an arm angle."""
     is_commanded: bool = False
     """Whether a command breaks the condition, so that the arm does not follow it."""
     cuts_network: bool = False
     """Whether the network has to be repaired afterwards."""
-
-    def start(self, home: JointVector) -> JointVector:
-        """Returns the joint angles that the arm begins at, shape (n,), [rad]."""
-        if self.pose is None:
-            return home
-        pose = np.array(self.pose)
-        return pose if len(home) == 7 else np.delete(pose, 2)
 
     def __repr__(self) -> str:
         return f"<FaultScenario {self.fault.manual_name}, commanded as {self.mode}>"

@@ -14,7 +14,7 @@ from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch, GoalActions, SetArmAngle
 from rcilab.app.learn.learn_actions import LearnActions, PressLearn
 from rcilab.app.learn.learn_state import exhibited
-from rcilab.app.learn.lessons import LESSONS
+from rcilab.app.learn.lessons import LESSONS, lessons_of
 from rcilab.app.run.recording import Recording
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import LANGUAGES, Text, load_catalogue
@@ -145,6 +145,15 @@ def test_every_button_step_and_lesson_has_words() -> None:
 def run_that(stopped: str | None) -> Recording:
     run, none = SimpleNamespace(is_complete=True, stopped=stopped, faults=()), np.zeros((1, 7))
     return Recording(t=np.zeros(1), q=none, q_c=none, dq=none, delay=0, run=run)
+
+
+def test_a_lesson_that_an_arm_cannot_do_is_not_offered() -> None:
+    assert lessons_of(MODEL) == tuple(LESSONS)
+    assert set(LESSONS) - set(lessons_of(load_model("xMate3"))) == {"elbow"}
+    assert set(LESSONS) - set(lessons_of(load_model("Panda"))) == {"push", "network"}
+    bench = Bench(load_model("xMate3"))
+    bench.press("lesson", name="elbow")
+    assert bench.state.learn.lesson is None
 
 
 def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:

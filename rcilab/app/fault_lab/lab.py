@@ -16,7 +16,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.command import Command
-from rcilab.core.errors import CommandRejectedError, ControlError, RcilabError, UsageError
+from rcilab.core.errors import ControlError, ManualRecoveryError, RcilabError, UsageError
 from rcilab.core.fault import FaultCode, find_fault
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
@@ -26,7 +26,7 @@ from rcilab.execution.motion_callback import follow
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.maker import maker_of, parameters_of, require_simulator
+from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
@@ -101,7 +101,7 @@ class FaultLab(Closeable):
             self._robot.power_on()
         robot = self._robot
         progress(_OPENED)
-        start = scenario.start(self.model.home)
+        start = scenario.start(self.model)
         if np.abs(robot.receive_state().q_c - start).max() > _THERE:
             self._go(robot, start)
         scene = scenario.prepare(self._scene(robot))
@@ -158,7 +158,7 @@ class FaultLab(Closeable):
             self._wait_for_calm(robot)
         done += self._recover(robot)
         self._widen(robot)
-        robot.configure(RobotConfiguration(control=default_parameters(parameters_of(self.model))))
+        self._configure(robot, RobotConfiguration(control=default_parameters(parameters_of(self.model))))
         nudged = np.array(robot.receive_state().q_c)
         nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
         self._go(robot, nudged)
@@ -172,7 +172,10 @@ class FaultLab(Closeable):
     def _widen(self, robot: RobotSession) -> None:
         limits = self.model.limits.joint
         whole = SoftJointLimits(lower=tuple(limits.lower.tolist()), upper=tuple(limits.upper.tolist()))
-        robot.configure(RobotConfiguration(joints=whole, box=_OPEN))
+        self._configure(robot, RobotConfiguration(joints=whole, box=_OPEN))
+
+    def _configure(self, robot: RobotSession, configuration: RobotConfiguration) -> None:
+        robot.configure(configuration.only(capabilities_of(self.model).setup))
 
     def _wait_for_calm(self, robot: RobotSession) -> None:
         """Returns once the controller feels nothing any more: its estimate takes a moment to forget a push."""
@@ -183,7 +186,7 @@ class FaultLab(Closeable):
     def _recover(self, robot: RobotSession) -> list[Step]:
         try:
             robot.recover()
-        except CommandRejectedError:  # The arm is too far outside its range or its box.
+        except ManualRecoveryError:
             robot.power_off()
             self._widen(robot)
             robot.power_on()

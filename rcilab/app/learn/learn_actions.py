@@ -12,7 +12,7 @@ from rcilab.app.exhibition import exhibit_fault
 from rcilab.app.fault_lab import FaultDemo, FaultTable
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.learn.learn_state import LearnState, LessonState, Show
-from rcilab.app.learn.lessons import LESSONS, Watcher
+from rcilab.app.learn.lessons import LESSONS, Watcher, lessons_of
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
@@ -66,7 +66,7 @@ class LearnActions:
                 self._store.update(place=self._learn.show.place, playing=False)
             case "script":
                 self._set(is_script_shown=not self._learn.is_script_shown)
-            case "lesson" if request.name in LESSONS:
+            case "lesson" if request.name in lessons_of(self._store.state.model):
                 self._watcher = Watcher()
                 self._set(lesson=LessonState(name=request.name))
                 first = LESSONS[request.name][0].name

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from rcilab.app.run.plan_readiness import is_moving
+from rcilab.makers.maker import find_lack, maker_of
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
+    from rcilab.model.robot_model import RobotModel
 
 Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
 """Whether it is done, from the state when the step began, the state of now, and how the robot is."""
@@ -113,6 +115,17 @@ def _script(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 def _closed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
     return now.learn.show is None
+
+
+def lessons_of(model: RobotModel) -> tuple[str, ...]:
+    """Returns the names of the lessons that can be done with an arm."""
+    maker = maker_of(model)
+    possible = {
+        "elbow": bool(model.redundancy),
+        "push": find_lack(model, "guiding") is None,
+        "network": maker is not None and any(scenario.cuts_network for scenario in maker.scenarios()),
+    }
+    return tuple(name for name in LESSONS if possible.get(name, True))
 
 
 LESSONS: Mapping[str, tuple[Step, ...]] = MappingProxyType(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.learn.learn_actions import PressLearn
-from rcilab.app.learn.lessons import LESSONS
+from rcilab.app.learn.lessons import LESSONS, lessons_of
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
@@ -27,7 +27,7 @@ class LearnLessonPanel:
         self._choice = gui.add_folder(text("learn.lessons"))
         with self._choice:
             gui.add_html('<i class="rl-buttons rl-wall"></i>')
-            for name in LESSONS:
+            for name in lessons_of(state.model):
                 button = gui.add_button(text(f"lesson.{name}"), icon="school", color="blue")
                 on_press(button, ask, _begin(name))
         self._steps = Html(gui)

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
 from rcilab.app import fault_lab
 from rcilab.app.fault_lab.fault_demo import script
-from rcilab.core.errors import InvalidValueError, ModelError, UsageError
+from rcilab.core.errors import CommandRejectedError, InvalidValueError, ManualRecoveryError, ModelError, UsageError
 from rcilab.core.fault import FaultCode, find_fault
 from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.maker import maker_of
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
-FAULTS = fault_lab.FaultTable(load_model("xMatePro7"))
-BY_POSE = sorted(Fault, key=lambda fault: (FAULTS[fault].pose or (), fault))
+MODEL = load_model("xMatePro7")
+FAULTS = fault_lab.FaultTable(MODEL)
+BY_POSE = sorted(Fault, key=lambda fault: (tuple(FAULTS[fault].start(MODEL)), fault))
 """So that the arm need not travel between any two."""
 
 
@@ -70,6 +74,22 @@ def test_an_arm_without_a_virtual_controller_has_no_scenarios() -> None:
 def test_an_arm_without_an_elbow_has_no_fault_of_it() -> None:
     with fault_lab.FaultLab("xMate7") as booth, pytest.raises(UsageError, match="7 axes"):
         booth.provoke(Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION)
+
+
+def test_only_an_arm_that_is_too_far_outside_is_widened_and_any_other_refusal_is_an_error() -> None:
+    booth, robot = fault_lab.FaultLab("xMate3"), MagicMock()
+    robot.recover.side_effect = ManualRecoveryError("recover", "manual recovery needed")
+    assert booth._recover(robot) == ["refused", "power_off", "widen", "power_on"]
+    robot.recover.side_effect = CommandRejectedError("recover", "reflex")
+    with pytest.raises(CommandRejectedError, match="reflex"):
+        booth._recover(robot)
+
+
+def test_an_arm_is_sent_only_the_parts_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
+    maker, robot = maker_of(MODEL), MagicMock()
+    monkeypatch.setattr(type(maker), "capabilities", replace(maker.capabilities, setup=("joints",)))
+    fault_lab.FaultLab(MODEL)._widen(robot)
+    assert robot.configure.call_args.args[0].parts == ("joints",)
 
 
 def test_who_wants_it_no_more_ends_it(booth: fault_lab.FaultLab) -> None:

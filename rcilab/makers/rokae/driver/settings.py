@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, as_number, described
-from rcilab.core.errors import CommandRejectedError, InvalidValueError
+from rcilab.core.errors import CommandRejectedError, InvalidValueError, ManualRecoveryError
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.makers.rokae import wire as rci
@@ -199,7 +199,9 @@ class RciSettings:
             reason = find_refusal(self._request, lambda: self._link.latest)
         advice = _ADVICE.get((type(request), status), "") if reason is None else reason.sentence
         word = "" if reason is None else reason.word
-        raise CommandRejectedError(type(request).__name__, status, advice, reason=word)
+        is_outside = status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
+        kind = ManualRecoveryError if is_outside else CommandRejectedError
+        raise kind(type(request).__name__, status, advice, reason=word)
 
     def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
         """Sends a request and returns the answer; every command comes through here."""

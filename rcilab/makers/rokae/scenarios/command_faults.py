@@ -11,7 +11,7 @@ from math import radians
 
 import numpy as np
 
-from rcilab.core.arrays import Array, readonly_copy
+from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.safety_box import SafetyBox
@@ -19,8 +19,15 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
+from rcilab.model.robot_model import RobotModel
 
-LIVELY_ELBOW = tuple(radians(angle) for angle in (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0))  # [rad]
+
+def posed(*angles: float) -> Callable[[RobotModel], JointVector]:
+    """Returns where a scenario begins: seven joint angles, [rad], without the third one for a 6-axis arm."""
+    return lambda model: readonly_copy(angles if model.n == 7 else np.delete(angles, 2))
+
+
+lively_elbow = posed(*map(radians, (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0)))
 """Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
 
 _PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began.
@@ -205,7 +212,7 @@ COMMAND_SCENARIOS = (
     FaultScenario(
         fault=Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_position", act=_elbow, is_commanded=True, needs_elbow=True,
-        pose=LIVELY_ELBOW,
+        start=lively_elbow,
     ),
     FaultScenario(
         fault=Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="joint_position",
@@ -229,7 +236,7 @@ COMMAND_SCENARIOS = (
     ),
     FaultScenario(
         fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, group="command", mode="cartesian_position",
-        act=_singular, is_commanded=True, pose=(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
+        act=_singular, is_commanded=True, start=posed(0.1, 0.5, 0.0, 0.05, 0.0, 1.0, 0.0),
     ),
     FaultScenario(
         fault=Fault.COMMAND_TORQUE_DISCONTINUITY, group="command", mode="torque", act=_torque_rate,

@@ -10,7 +10,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, JointPosition
 from rcilab.core.state import RobotState
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.scenarios.command_faults import LIVELY_ELBOW, box_around_tool, soften_joint_1, torque_stream
+from rcilab.makers.rokae.scenarios.command_faults import box_around_tool, lively_elbow, soften_joint_1, torque_stream
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.sim.api import NetworkFaults
 
@@ -144,7 +144,7 @@ MEASURED_SCENARIOS = (
     FaultScenario(
         fault=Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION, group="position",
         mode="cartesian_impedance", prepare=_firm_tool, act=_elbow, needs_elbow=True,
-        pose=LIVELY_ELBOW,
+        start=lively_elbow,
     ),
     FaultScenario(
         fault=Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, group="velocity", mode="torque", prepare=Scene.yielding,
