@@ -9,7 +9,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from rcilab.app.text import Message, message
-from rcilab.core.arrays import Array
+from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.errors import KinematicsError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -86,7 +86,7 @@ def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow |
 
 
 def nearest_free(
-    model: RobotModel, target: Pose, psi: float, branch: int | None = None
+    model: RobotModel, target: Pose, psi: float, branch: int | None = None, box: SafetyBox | None = None
 ) -> tuple[float, Message | None]:
     """Returns the arm angle nearest to one at which the arm can stand, and why it is another one.
 
@@ -95,9 +95,10 @@ def nearest_free(
         target: Pose of the tool in base.
         psi: Wanted arm angle, [rad].
         branch: The way of standing to keep, as in `Elbow.branch`; None takes any.
+        box: What the tool shall stay in, as for `look_at_elbow`.
     """
     try:
-        arcs = model.feasible_arcs(target)
+        arcs = model.feasible_arcs(target, box)
     except KinematicsError:
         return psi, None
     found = None if branch is None else arcs.nearest(psi, branch)
@@ -105,12 +106,30 @@ def nearest_free(
     found = arcs.nearest(psi) if found is None else found
     if found is None or abs(math.remainder(found - psi, math.tau)) < SAID:
         return psi, None
-    return found, message(
-        "elbow.snapped",
-        wanted=psi,
-        why=message("elbow.why.other") if is_kept and arcs.at(psi).ok else say_why(arcs.at(psi).joints),
-        taken=found,
-    )
+    left = arcs.at(psi)
+    why = message("elbow.why.other") if is_kept and left.branches else _say_why_not(left)
+    code = "elbow.snapped" if arcs.at(found).ok else "elbow.snapped_only"
+    return found, message(code, wanted=psi, why=why, taken=found)
+
+
+def in_branch(model: RobotModel, target: Pose, psi: float, q: Array, branch: int) -> JointVector | None:
+    """Returns the joint angles of one way of standing, nearest to others; None where it is not possible.
+
+    Args:
+        model: A 7-axis arm.
+        target: Pose of the tool in base.
+        psi: Arm angle, [rad].
+        q: Joint angles that decide about full turns, shape (n,), [rad].
+        branch: The way of standing, as in `Elbow.branch`.
+    """
+    try:
+        stands = model.inverse(target, psi).all[branch]
+    except KinematicsError:
+        return None
+    turns = np.round((q - stands.q) / math.tau) * math.tau
+    turned = np.array(stands.q) + turns
+    inside = (turned > model.limits.joint.lower) & (turned < model.limits.joint.upper)
+    return readonly_copy(np.where(inside, turned, stands.q)) if stands.ok else None
 
 
 def say_why(joints: tuple[int, ...]) -> Message:
@@ -118,6 +137,10 @@ def say_why(joints: tuple[int, ...]) -> Message:
     if not joints:
         return message("elbow.why.singular")
     return message("elbow.why.limits", joints=", ".join(str(joint) for joint in joints))
+
+
+def _say_why_not(arc: Arc) -> Message:
+    return message("elbow.kind.reach") if "reach" in arc.reasons else say_why(arc.joints)
 
 
 def _look(found: FeasibleArcs, branch: int) -> tuple[ElbowArc, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import start_of_plans
-from rcilab.app.goal.elbow import nearest_free
+from rcilab.app.goal.elbow import in_branch, nearest_free
 from rcilab.app.goal.goal import Goal, goal_at, goal_toward
 from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
@@ -229,8 +229,10 @@ class GoalActions:
         """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
         if math.isfinite(request.psi) and self._store.state.model.redundancy:
             state = self._store.state
-            psi, snapped = nearest_free(state.model, state.goal.target, math.remainder(request.psi, math.tau), branch)
-            self.aim(state.goal.target, psi, snapped=snapped)
+            goal, wanted = state.goal, math.remainder(request.psi, math.tau)
+            psi, snapped = nearest_free(state.model, goal.target, wanted, branch, state.box)
+            near = None if branch is None else in_branch(state.model, goal.target, psi, goal.q, branch)
+            self.aim(goal.target, psi, near, snapped)
 
     def choose_branch(self, request: ChooseBranch) -> None:
         """Takes another analytic solution of the same pose."""

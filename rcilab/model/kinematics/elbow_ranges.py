@@ -13,6 +13,8 @@ INSIDE = 0.1
 """How far inside a range an arm angle is chosen automatically, [rad]. Tuning value: some six degrees."""
 
 _SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
+_LIMITING: frozenset[Reason] = frozenset({"joint limits", "reach"})
+"""Reasons for which no branch exists inside the joint limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,20 +62,24 @@ class FeasibleArcs:
     def nearest(self, psi: float, branch: int | None = None) -> float | None:
         """Returns the arm angle closest to one, [rad], at which a branch keeps every joint limit; None if none does.
 
-        It is `INSIDE` the range, or in the middle of a narrower one, unless the angle asked for is possible itself.
+        It is `INSIDE` a feasible range, or in the middle of a narrower one, unless the angle asked for is possible
+        itself. Where no range is feasible (the whole circle is singular, the tool is outside the safety box), joint
+        limits alone count.
 
         Args:
             psi: Wanted arm angle, [rad].
             branch: Which branch, 0 to 7, it shall be; None for any.
         """
-        found: float | None = None
-        stands = [arc for arc in self.arcs if arc.ok or arc.branches or arc.reasons == ("singularity",)]
+        stands = [arc for arc in self.arcs if _LIMITING.isdisjoint(arc.reasons)]
         possible = stands if branch is None else [arc for arc in self.arcs if branch in arc.branches]
-        for start, end in _joined([(arc.start, arc.end) for arc in possible]):
-            middle, half = 0.5 * (start + end), 0.5 * (end - start)
+        if any(_is_within(psi, *ends) for ends in _joined([(arc.start, arc.end) for arc in possible])):
+            return remainder(psi, tau)
+        found: float | None = None
+        free = [arc for arc in possible if arc.ok] or possible
+        for start, end in _joined([(arc.start, arc.end) for arc in free]):
+            middle, inner = 0.5 * (start + end), max(0.5 * (end - start) - INSIDE, 0.0)
             offset = remainder(psi - middle, tau)
-            inner = max(half - INSIDE, 0.0)
-            angle = psi if abs(offset) < half else middle + min(max(offset, -inner), inner)
+            angle = middle + min(max(offset, -inner), inner)
             if found is None or abs(remainder(angle - psi, tau)) < abs(remainder(found - psi, tau)):
                 found = angle
         return None if found is None else remainder(found, tau)
@@ -87,6 +93,11 @@ class FeasibleArcs:
         where = f"at {ranges} deg" if ranges else "at no arm angle"
         why = sorted({reason for arc in self.arcs for reason in arc.reasons})
         return f"<FeasibleArcs {where}; forbidden by: {', '.join(why) or 'nothing'}>"
+
+
+def _is_within(psi: float, start: float, end: float) -> bool:
+    """Returns whether an arm angle is in a range, ends excluded: there a joint is at its limit."""
+    return end - start > tau - _SAME or 0.0 < (psi - start) % tau < end - start
 
 
 def _joined(ranges: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:

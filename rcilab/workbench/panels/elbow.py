@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.elbow import LOOKS, Elbow, say_why
+from rcilab.app.goal.elbow import LOOKS, Elbow, ElbowArc, say_why
 from rcilab.app.goal.goal_actions import SetArmAngle
 from rcilab.app.text import Text
+from rcilab.model.kinematics.solvers.solver import Redundancy
 from rcilab.views.elbow_view import ARC_COLORS, free_colors, free_goodness
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
@@ -57,12 +58,19 @@ class ElbowPanel:
         is_nearest = goal.reach.tone == "bad"
         if (elbow, is_nearest) != self._drawn or elbow is None:
             self._drawn = elbow, is_nearest
-            self._ring.show(f'<p class="rl-note">{esc(self._text("elbow.none"))}</p>' if elbow is None
+            self._ring.show(no_ring_html(state.model.redundancy, self._text) if elbow is None
                             else ring_html(elbow, self._text, is_nearest=is_nearest))  # fmt: skip
         said = problems_html(state, self._text, [("psi", "ψ")])
         if goal.snapped is not None:
             said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.say(goal.snapped))}</p>'
         self._said.show(said)
+
+
+def no_ring_html(redundancy: Redundancy, text: Text) -> str:
+    """Returns why there is no ring: the pose has none, or no pose of this arm has one."""
+    joint = redundancy.joint
+    said = text("elbow.none") if joint is None else text("elbow.no_circle", joint=joint)
+    return f'<p class="rl-note">{esc(said)}</p>'
 
 
 def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:
@@ -104,13 +112,17 @@ def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:
 
 
 def _words(elbow: Elbow, text: Text, is_nearest: bool) -> str:
-    """Returns the free ranges; those in which the elbow hardly moves are left out."""
+    """Returns the free ranges; those in which the elbow hardly moves are left out, but for the one that it is in."""
     free = [arc for arc in elbow.arcs if arc.kind == "free"]
-    wide = [arc for arc in free if arc.end - arc.start > _NARROW]
-    if not wide:
+    if not any(_is_wide(arc) for arc in free):
         return text("elbow.stretched" if free else "elbow.nowhere")
+    told = [arc for arc in free if _is_wide(arc) or (elbow.psi - arc.start) % math.tau < arc.end - arc.start]
     key = "elbow.free_nearest" if is_nearest else "elbow.free"
-    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in wide))
+    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in told))
+
+
+def _is_wide(arc: ElbowArc) -> bool:
+    return arc.end - arc.start > _NARROW
 
 
 def _shaded(start: float, end: float, elbow: Elbow, text: Text) -> tuple[list[str], list[str]]:
