@@ -85,7 +85,7 @@ def as_motion(
 
 def _line_of(waypoint: int, file: Path) -> int:
     """Returns the line of a waypoint, from 1, in the file of a program that was read before."""
-    from rcilab.motion.lined_json import read_json
+    from rcilab.motion.located_json import read_json
 
     content: Any = read_json(file.read_bytes(), file.name).value
     return content["waypoints"].value[waypoint - 1].line

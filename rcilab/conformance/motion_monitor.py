@@ -13,9 +13,9 @@ from rcilab.conformance.box_monitor import BoxMonitor
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_monitor import MeasuredMonitor
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.conformance.standstill_monitor import StandstillMonitor
 from rcilab.conformance.start import StartState, as_start

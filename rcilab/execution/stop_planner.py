@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque

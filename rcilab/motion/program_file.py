@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rcilab.core.arrays import Unquoted, described
 from rcilab.core.atomic_file import read_whole, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
-from rcilab.motion.lined_json import LONGEST, LongListError, Node, read_json
+from rcilab.motion.located_json import LONGEST, LongListError, Node, read_json
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, MOST_WAYPOINTS, WORDS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 

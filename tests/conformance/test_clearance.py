@@ -13,7 +13,7 @@ from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
 from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
-from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.core.clearance import FLOOR, ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError

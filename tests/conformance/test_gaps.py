@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
 from rcilab.conformance.divided_differences import spans
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import faults_of
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS

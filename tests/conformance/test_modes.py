@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from rcilab.conformance.check import check
 from rcilab.conformance.common_conditions import condition_table
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import faults_of
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.motion_monitor import Monitor
 from rcilab.conformance.report import Report
 from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals

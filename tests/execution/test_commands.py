@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
-from rcilab.core.errors import CertificateError, CommandRejectedError, DeadlineError, InvalidValueError, UsageError
+from rcilab.core.errors import (
+    CertificateError,
+    CommandRejectedError,
+    DeadlineError,
+    InvalidValueError,
+    ManualRecoveryError,
+    UsageError,
+)
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae import wire as rci
@@ -172,6 +179,7 @@ def test_every_refusal_of_a_recovery_has_its_words(make_robot, status, words):
     with pytest.raises(CommandRejectedError, match=f"AutomaticErrorRecovery was refused: {words}") as caught:
         robot.recover()
     assert caught.value.status is status
+    assert isinstance(caught.value, ManualRecoveryError) is (status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED)
 
 
 @pytest.mark.parametrize(

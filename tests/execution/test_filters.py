@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
-from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError

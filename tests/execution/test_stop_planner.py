@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcilab.conformance.monitor import JointMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.core.command import JointPosition, JointTorque
 from rcilab.core.state import unknown_state
 from rcilab.execution.stop_planner import JointStopPlanner, StreamStopPlanner, TorqueStopPlanner

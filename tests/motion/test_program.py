@@ -20,7 +20,7 @@ import rcilab
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
-from rcilab.motion import Motion, Program, Waypoint, lined_json, plan_program
+from rcilab.motion import Motion, Program, Waypoint, located_json, plan_program
 from rcilab.motion.program_file import SCHEMA
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
 
@@ -352,9 +352,9 @@ def test_far_too_many_waypoints_are_counted_and_not_read():
         {"format": "rcilab program", "version": 1, "model": "xMatePro7", "start": [], "waypoints": listed}
     )
     read = []
-    node = lined_json.Node
+    node = located_json.Node
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lined_json, "Node", lambda value, line: read.append(line) or node(value, line))
+        patch.setattr(located_json, "Node", lambda value, line: read.append(line) or node(value, line))
         with pytest.raises(InvalidValueError, match="line 1, waypoints must be 1 to 10000, got 60000"):
             Program.from_json(text.encode(), "program.json")
     assert len(read) < 12 * 10_000

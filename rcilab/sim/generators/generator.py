@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from rcilab.conformance.box_monitor import BoxMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.check import HOLD_SAMPLES, check
+from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import LimitViolation, faults_of
-from rcilab.conformance.monitor import JointMonitor
 from rcilab.conformance.start import StartState
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
