@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from rcilab.app.setup.configuration_json import build_setup, setup_facts
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
-from rcilab.core.atomic_file import read_own_text, write_whole
+from rcilab.core.atomic_file import read_own_text, write_atomic
 from rcilab.core.errors import RcilabError
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import load_model
@@ -165,4 +165,4 @@ class Autosave:
     def _write(self, arms: dict[str, Any]) -> None:
         assert self._file is not None
         text = json.dumps({"format": _FORMAT, "version": _VERSION, "arms": arms, "looks": self._looks})
-        write_whole(self._file, text, survives_power_loss=False)
+        write_atomic(self._file, text, survives_power_loss=False)

@@ -153,7 +153,7 @@ def find_outside(model: RobotModel, q: JointVector) -> int | None:
 
 
 def _outside(place: str, limits: JointLimits, joint: int, angle: float) -> Message:
-    soft = limits.soft_bound_passed(joint, angle)
+    soft = limits.exceeded_soft_limit(joint, angle)
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
     if soft is not None:
         code = "plan.start_soft" if place == "start" else "plan.at_soft"

@@ -11,7 +11,7 @@ from importlib import import_module
 
 from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
 from rcilab.core.errors import RcilabError
-from rcilab.core.memory import OUT_OF_MEMORY, is_starved
+from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
 """Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
@@ -45,12 +45,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"rcilab: {one_line_each(str(error))}", file=sys.stderr)
         return _USAGE
     except (MemoryError, ImportError, RuntimeError) as error:
-        if not is_starved(error):
+        if not is_out_of_memory(error):
             raise
         print(f"rcilab: {OUT_OF_MEMORY}", file=sys.stderr)
         return _USAGE
     except OSError as error:
-        if is_starved(error):
+        if is_out_of_memory(error):
             print(f"rcilab: {OUT_OF_MEMORY}", file=sys.stderr)
             return _USAGE
         if error.errno in (errno.EMFILE, errno.ENFILE):

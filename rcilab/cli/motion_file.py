@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -22,13 +22,13 @@ def add_max_rows(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--max-rows",
         type=int,
-        default=MOST_ROWS,
+        default=DEFAULT_MAX_ROWS,
         metavar="N",
         help="cycles of 1 ms that the file may hold, with 1 KiB each, unpacked (default: %(default)s, 17 minutes)",
     )
 
 
-def read_file(file: Path, max_rows: int = MOST_ROWS) -> Motion | Program:
+def read_file(file: Path, max_rows: int = DEFAULT_MAX_ROWS) -> Motion | Program:
     """Returns the motion or, where the name ends in .json, the program in a file.
 
     Args:
@@ -51,7 +51,7 @@ def as_motion(
     model: RobotModel,
     file: Path,
     show: Callable[[str], None] = print,
-    max_rows: int = MOST_ROWS,
+    max_rows: int = DEFAULT_MAX_ROWS,
 ) -> Motion:
     """Returns the motion; a program is planned, and the notes of its planner are shown.
 

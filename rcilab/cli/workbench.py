@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.errors import UsageError
-from rcilab.core.memory import OUT_OF_MEMORY, is_starved
+from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -134,7 +134,7 @@ def _ended_by_starving(ending: threading.Event) -> Iterator[None]:
     before, died = threading.excepthook, threading.Event()
 
     def hear(args: threading.ExceptHookArgs) -> None:
-        if args.exc_value is None or not is_starved(args.exc_value):
+        if args.exc_value is None or not is_out_of_memory(args.exc_value):
             before(args)
             return
         died.set()

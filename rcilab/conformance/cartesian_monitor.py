@@ -13,7 +13,7 @@ from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
-from rcilab.core.spatial import IDENTITY, Pose, turn_between
+from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 
 _TURN = 2.0 * math.pi  # [rad]
 Six: TypeAlias = tuple[float, float, float, float, float, float]
@@ -82,7 +82,7 @@ class CartesianMonitor:
         self._spacing = (cycles, self._spacing[0])
         rotation, (x, y, z) = pose.parts
         last_rotation, (last_x, last_y, last_z) = self._pose.parts
-        wx, wy, wz = turn_between(last_rotation, rotation)
+        wx, wy, wz = rotation_between(last_rotation, rotation)
         twist = ((x - last_x) / h, (y - last_y) / h, (z - last_z) / h, wx / h, wy / h, wz / h)
         acceleration = _difference(twist, self.twist, second)
         self.jerk = _difference(acceleration, self.acceleration, third)

@@ -194,7 +194,7 @@ class _MotionChecker:
         off_start = self._signals.is_off_start
         joint = _axis(condition, column)
         is_angle = condition.signal == "joint" and condition.order == 0
-        soft = self._limits.joint.soft_bound_passed(joint, value) if is_angle else None
+        soft = self._limits.joint.exceeded_soft_limit(joint, value) if is_angle else None
         advice = advise(
             condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=off_start, soft=soft
         )

@@ -29,8 +29,8 @@ from rcilab.core.condition import (
     ConditionTable,
     all_limits,
     joint_limits,
-    same,
-    tolerance,
+    joint_tolerance,
+    symmetric_bounds,
 )
 from rcilab.core.limits import Limits
 from rcilab.robots.description import RobotDescription
@@ -101,7 +101,7 @@ def _tool_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds
     """Returns the function for the bounds of a norm of the tool, such as "translation_velocity"."""
 
     def bounds(limits: AnyLimits) -> Bounds:
-        return same(factor * getattr(all_limits(limits).cartesian, name))
+        return symmetric_bounds(factor * getattr(all_limits(limits).cartesian, name))
 
     return bounds
 
@@ -111,7 +111,7 @@ def _arm_angle_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], B
 
     def bounds(limits: AnyLimits) -> Bounds:
         arm_angle = all_limits(limits).arm_angle
-        return same(math.inf if arm_angle is None else factor * getattr(arm_angle, name))
+        return symmetric_bounds(math.inf if arm_angle is None else factor * getattr(arm_angle, name))
 
     return bounds
 
@@ -156,7 +156,7 @@ def _joint_end(stage: Literal["start", "end"], order: int) -> Condition:
         unit=("rad", "rad/s", "rad/s^2")[order],
         stage=stage,
         order=order,
-        bounds=tolerance((START_POSITION_TOLERANCE, REST_VELOCITY_TOLERANCE, REST_ACCELERATION_TOLERANCE)[order]),
+        bounds=joint_tolerance((START_POSITION_TOLERANCE, REST_VELOCITY_TOLERANCE, REST_ACCELERATION_TOLERANCE)[order]),
     )
 
 
@@ -188,7 +188,11 @@ def _arm_angle(order: int) -> Condition:
         stage="throughout",
         signal="arm_angle",
         order=order,
-        bounds=(_arm_angle_bounds(_NAMES[order]) if order else lambda limits: same(math.pi + ARM_ANGLE_TOLERANCE)),
+        bounds=(
+            _arm_angle_bounds(_NAMES[order])
+            if order
+            else lambda limits: symmetric_bounds(math.pi + ARM_ANGLE_TOLERANCE)
+        ),
     )
 
 
@@ -204,7 +208,7 @@ def _tool_end(stage: Literal["start", "end"], signal: Literal["translation", "ro
         stage=stage,
         signal=signal,
         order=order,
-        bounds=lambda limits: same(limit),
+        bounds=lambda limits: symmetric_bounds(limit),
     )
 
 
@@ -291,7 +295,7 @@ CARTESIAN_FRAME = Condition(
     stage="throughout",
     signal="frame",
     order=0,
-    bounds=lambda limits: same(1.0),
+    bounds=lambda limits: symmetric_bounds(1.0),
 )
 """How near the arm is to a singularity: 1 is what counts as on it. Infinite for what is no pose or out of reach."""
 
@@ -304,7 +308,7 @@ START_POSE = Condition(
     stage="start",
     signal="translation",
     order=0,
-    bounds=lambda limits: same(START_POSITION_TOLERANCE),
+    bounds=lambda limits: symmetric_bounds(START_POSITION_TOLERANCE),
 )
 
 TOOL_STANDSTILL_CONDITIONS: tuple[Condition, ...] = (
@@ -398,7 +402,7 @@ LOST_COMMANDS = Condition(
     stage="throughout",
     signal="lost_commands",
     order=0,
-    bounds=lambda limits: same(LOST_IN_ROW),
+    bounds=lambda limits: symmetric_bounds(LOST_IN_ROW),
 )
 
 COMMON_CONDITIONS = ConditionTable(

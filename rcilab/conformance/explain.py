@@ -203,7 +203,7 @@ def explain_place(found: ConditionResult | Violation, language: Language = "en")
     if found.links is not None:
         first, second = (_link(number, _Voice(language)) for number in found.links)
         return say(language, "place.pair", first=first, second=second)
-    return say(language, f"place.{'joint' if row.is_per_joint else row.place(found.joint)}", axis=axis)
+    return say(language, f"place.{'joint' if row.is_per_joint else row.location(found.joint)}", axis=axis)
 
 
 def explain_quantity(row: Condition, language: Language = "en") -> str:

@@ -32,13 +32,13 @@ class LimitViolation(NamedTuple):
         if row.is_clearance:
             return f"{self.links}: {row.quantity} {self.value:.4g} m is not above {self.bound:g} m"
         if row.signal == "position":
-            return f"{row.place(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
+            return f"{row.location(0)}: {row.quantity} is {self.value:.4g} m outside the safety box"
         if row.signal == "frame":
-            return f"{row.place(0)}: {row.quantity} is improper, out of reach or singular"
+            return f"{row.location(0)}: {row.quantity} is improper, out of reach or singular"
         if row.signal == "elbow_sign":
-            return f"{row.place(0)}: it is flipped to the other side than at the start"
+            return f"{row.location(0)}: it is flipped to the other side than at the start"
         value, bound = amount(self.value, self.bound, least=6)
-        return f"{row.place(self.axis)}: {row.quantity} {value} {row.unit} passes {bound} {row.unit}"
+        return f"{row.location(self.axis)}: {row.quantity} {value} {row.unit} passes {bound} {row.unit}"
 
     @property
     def remark(self) -> Remark:

@@ -26,7 +26,7 @@ from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.safety_box import SafetyBox, active_box, box_from
+from rcilab.core.safety_box import SafetyBox, active_box, box_for_start
 from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.core.state import Mode, require_mode
 from rcilab.model.robot_model import RobotModel, require_model
@@ -122,8 +122,8 @@ class Monitor:
         joint = range_from(self._model.limits.joint, q, RECOVERY_RANGE)
         limits = replace(self._model.limits, joint=joint)
         position = self._model.forward(q).parts[1]
-        self._measured = MeasuredMonitor(limits, box_from(self._safety_box, position))
-        box = box_from(self._safety_box, position)
+        self._measured = MeasuredMonitor(limits, box_for_start(self._safety_box, position))
+        box = box_for_start(self._safety_box, position)
         self._joints = None if self.mode == "torque" else JointMonitor(joint, self._joint_rows)
         self._tool = CartesianMonitor(limits, box, self._tool_rows) if self._is_cartesian else None
         self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, self._box_row)

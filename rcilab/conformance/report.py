@@ -79,7 +79,7 @@ class ConditionResult:
     @property
     def place(self) -> str:
         """Whose value it is: "joint 2", "tool", or "base and link 5"."""
-        return str(self.links) if self.links else self.condition.place(self.joint)
+        return str(self.links) if self.links else self.condition.location(self.joint)
 
     @property
     def shown(self) -> tuple[float, float]:
@@ -163,7 +163,7 @@ class Violation:
     @property
     def place(self) -> str:
         """Whose value it is: "joint 2", "tool", or "base and link 5"."""
-        return str(self.links) if self.links else self.condition.place(self.joint)
+        return str(self.links) if self.links else self.condition.location(self.joint)
 
     def explain(self, language: Language = "en", units: Units | None = None) -> str:
         """Returns it in sentences: the fact, the fault, the remedy. Arguments as of `Report.explain`.

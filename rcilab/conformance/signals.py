@@ -17,7 +17,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.clearance import ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
-from rcilab.core.safety_box import EntryBox, SafetyBox, box_from
+from rcilab.core.safety_box import EntryBox, SafetyBox, box_for_start
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
@@ -99,7 +99,7 @@ class MotionSignals:
 
     def _excess(self, box: SafetyBox) -> Array:
         way = self._model.position_path(self._differences[0])
-        entry = box_from(box, self._model.forward(self._start.q).parts[1])
+        entry = box_for_start(box, self._model.forward(self._start.q).parts[1])
         if isinstance(entry, EntryBox):
             return np.array([entry.excess(position) for position in way.tolist()])
         return box.excess_path(way)

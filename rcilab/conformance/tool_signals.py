@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.spatial import Rotation9, turn_between
+from rcilab.core.spatial import Rotation9, rotation_between
 from rcilab.model.robot_model import RobotModel
 
 BEFORE = 3
@@ -21,7 +21,7 @@ Differences: TypeAlias = tuple[Array, Array, Array, Array]
 """A signal and its first, second and third backward difference, a row a cycle."""
 
 _FLIPPING = 3  # From 0: the elbow flips with joint 4.
-_EXACT = 1e-8  # Sine of a turn up to which the sine is the angle; as in `turn_between`.
+_EXACT = 1e-8  # Sine of a turn up to which the sine is the angle; as in `rotation_between`.
 
 
 class ToolSignals:
@@ -133,7 +133,7 @@ def turns(rotations: Array) -> Array:
     scale = np.where(is_large, np.arctan2(sine, cosine) / np.where(is_large, sine, 1.0), 1.0)
     found = sines * scale[:, np.newaxis]
     for row in np.flatnonzero(~is_large & (cosine < 0.0)).tolist():  # Half a turn: only its axis is to be found.
-        found[row] = turn_between(_nine(rotations[row]), _nine(rotations[row + 1]))
+        found[row] = rotation_between(_nine(rotations[row]), _nine(rotations[row + 1]))
     return found
 
 

@@ -26,7 +26,7 @@ Matrix: TypeAlias = Array
 
 
 def scalar(value: float) -> Array:
-    """Returns a number as a read-only array of shape (): a constant that numpy does not convert in every product."""
+    """Returns a number as a read-only array of shape (), which numpy need not convert in every product."""
     return readonly_copy(value)
 
 
@@ -40,14 +40,14 @@ def readonly_copy(value: ArrayLike) -> Array:
 
 
 def make_readonly(array: Array) -> Array:
-    """Makes an array of the caller read-only and returns it, so that `readonly_copy` does not copy it."""
+    """Makes an array read-only in place and returns it; `readonly_copy` then does not copy it."""
     # Positional, which numpy's stubs do not declare: by keyword the call takes twice as long.
     array.setflags(False)  # pyright: ignore[reportCallIssue]
     return array
 
 
 class Unquoted(str):
-    """Text that an error shows without quotes in place of a value."""
+    """Text that an error message shows without quotes instead of a value."""
 
     __slots__ = ()
 
@@ -55,7 +55,7 @@ class Unquoted(str):
 
 
 def described(value: object) -> object:
-    """Returns what an error shows of a value, in one line: the shape of a table, anything else unchanged."""
+    """Returns a value as an error message shows it, in one line: of a table only its shape."""
     if getattr(value, "ndim", 0) > 1:
         return Unquoted(f"an array of shape {getattr(value, 'shape', '')}")
     return value.tolist() if isinstance(value, np.ndarray) else value
@@ -103,7 +103,7 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
     if array.shape != (size,):
         problem = f"has shape {array.shape}, needs ({size},){_in(unit)}"
         raise InvalidValueError(name, value, problem).coded("numbers", count=size)
-    if not all(map(math.isfinite, array.tolist())):  # Faster than numpy for a few numbers, most of all the first time.
+    if not all(map(math.isfinite, array.tolist())):  # Faster than numpy for a few numbers, above all in the first call.
         raise InvalidValueError(name, value, f"must be finite in every element{_in(unit)}").coded("not_finite")
     array.flags.writeable = False
     return array
@@ -152,7 +152,7 @@ def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Arr
     """
     try:
         is_table = np.ndim(value) > 1
-    except ValueError:  # Rows of different lengths: the error of as_vector describes them.
+    except ValueError:  # Rows of different lengths: as_vector raises the error for them.
         is_table = False
     array = as_path(value, columns, name, unit) if is_table else as_vector(value, columns, name, unit)
     if like is not None and array.shape[:-1] != like.shape[:-1]:

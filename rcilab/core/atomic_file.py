@@ -23,7 +23,7 @@ def replacing(file: str | PathLike[str], *, survives_power_loss: bool = False) -
 
     Args:
         file: The file; its folder must exist.
-        survives_power_loss: Whether to wait until it is on the disk. Without it a killed process loses nothing either.
+        survives_power_loss: Whether to wait until the data is on the disk. A killed process loses nothing in any case.
 
     Raises:
         OSError: The file cannot be written.
@@ -49,7 +49,7 @@ def replacing(file: str | PathLike[str], *, survives_power_loss: bool = False) -
 
 
 def _mode_of(path: Path) -> int:
-    """Returns the permissions of a file, or those that a new one gets."""
+    """Returns the permissions of a file, or those of a new one."""
     try:
         mode = path.stat().st_mode & 0o777
     except FileNotFoundError:
@@ -61,13 +61,13 @@ def _mode_of(path: Path) -> int:
     return mode
 
 
-def write_whole(file: Path, text: str, *, survives_power_loss: bool = True) -> None:
-    """Writes a text file and creates its folders; after a failure nothing of it is left.
+def write_atomic(file: Path, text: str, *, survives_power_loss: bool = True) -> None:
+    """Writes a text file and creates its folders; after a failure the file is unchanged.
 
     Args:
         file: The file.
         text: Its new content.
-        survives_power_loss: Whether to wait until it is on the disk. Without it a killed process loses nothing either.
+        survives_power_loss: Whether to wait until the data is on the disk. A killed process loses nothing in any case.
 
     Raises:
         OSError: The file cannot be written.
@@ -81,8 +81,8 @@ def read_own_text(file: Path) -> str:
     """Returns the text of a file that this program writes itself, in a folder of the user.
 
     Raises:
-        OSError: It cannot be read, or is not a regular file; a named pipe in its place would be waited for without end.
-        UnicodeDecodeError: It is not text.
+        OSError: It cannot be read, or is not a regular file; reading a named pipe would block forever.
+        UnicodeDecodeError: It is not UTF-8 text.
     """
     with open(os.open(file, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
@@ -90,13 +90,13 @@ def read_own_text(file: Path) -> str:
         return stream.read().decode()
 
 
-def read_whole(file: Path, what: str, most: int) -> bytes:
-    """Returns the content of a file.
+def read_limited(file: Path, what: str, max_bytes: int) -> bytes:
+    """Returns the content of a file, up to a number of bytes.
 
     Args:
         file: The file.
-        what: The kind of file, for the error: "program file".
-        most: Largest number of bytes to read.
+        what: Kind of file, for the error, such as "program file".
+        max_bytes: Largest number of bytes to read.
 
     Raises:
         InvalidValueError: The file does not exist or cannot be read.
@@ -104,7 +104,7 @@ def read_whole(file: Path, what: str, most: int) -> bytes:
     try:
         with file.open("rb") as stream:
             status = os.fstat(stream.fileno())  # Allocate the file's size, not the bound.
-            return stream.read(min(most, status.st_size + 1) if stat.S_ISREG(status.st_mode) else most)
+            return stream.read(min(max_bytes, status.st_size + 1) if stat.S_ISREG(status.st_mode) else max_bytes)
     except FileNotFoundError as error:
         raise InvalidValueError(what, str(file), "does not exist").coded("no_file", file=str(file)) from error
     except OSError as error:

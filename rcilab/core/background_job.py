@@ -13,7 +13,7 @@ Context = TypeVar("Context")
 Result = TypeVar("Result")
 
 ProgressCallback: TypeAlias = Callable[[float], None]
-"""Receives the progress, 0 to 1; does not return once the job is cancelled."""
+"""Receives the progress, 0 to 1; raises an exception that ends the job once the job is cancelled."""
 
 
 class BackgroundJob(Generic[Context, Result]):
@@ -34,24 +34,24 @@ class BackgroundJob(Generic[Context, Result]):
 
     @property
     def is_done(self) -> bool:
-        """Whether a result can be taken."""
+        """Whether a result is ready."""
         return self._job is not None and self._job.outcome.done()
 
     def wait(self, timeout: float) -> None:
-        """Waits until a result can be taken, at most `timeout`, [s]; returns at once without a job."""
+        """Waits until a result is ready, at most `timeout`, [s]; returns at once without a job."""
         job = self._job
         if job is not None:
             wait([job.outcome], timeout)
 
-    def start(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
+    def start(self, context: Context, run: Callable[[ProgressCallback], Result]) -> None:
         """Starts a job; a running one is cancelled.
 
         Args:
-            about: Context of the job, returned with its result.
+            context: Value that is returned with the result of the job.
             run: The job.
         """
         self.cancel()
-        self._job = _Job(about, run)
+        self._job = _Job(context, run)
         threading.Thread(target=self._job.run, name=self._name, daemon=True).start()
 
     def cancel(self) -> None:
@@ -60,14 +60,14 @@ class BackgroundJob(Generic[Context, Result]):
             self._job.cancelled.set()
         self._job = None
 
-    def take(self) -> tuple[Context, Result | RcilabError]:
-        """Returns context and result of the finished job; an `RcilabError` is returned as the result."""
+    def pop_result(self) -> tuple[Context, Result | RcilabError]:
+        """Removes the finished job and returns its context and result; an `RcilabError` is returned as the result."""
         job, self._job = self._job, None
         assert job is not None
         try:
-            return job.about, job.outcome.result()
+            return job.context, job.outcome.result()
         except RcilabError as error:
-            return job.about, error
+            return job.context, error
 
 
 class _CancelledError(Exception):
@@ -77,8 +77,8 @@ class _CancelledError(Exception):
 class _Job(Generic[Context, Result]):
     """One job in its thread."""
 
-    def __init__(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
-        self.about, self._run = about, run
+    def __init__(self, context: Context, run: Callable[[ProgressCallback], Result]) -> None:
+        self.context, self._run = context, run
         self.progress = 0.0
         self.cancelled = threading.Event()
         self.outcome: Future[Result] = Future()
@@ -86,7 +86,7 @@ class _Job(Generic[Context, Result]):
     def run(self) -> None:
         try:
             self.outcome.set_result(self._run(self._report_progress))
-        except Exception as error:  # `take` returns or raises it.
+        except Exception as error:  # `pop_result` returns or raises it.
             self.outcome.set_exception(error)
 
     def _report_progress(self, share: float) -> None:

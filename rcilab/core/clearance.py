@@ -10,7 +10,7 @@ from rcilab.core.arrays import as_number
 from rcilab.core.errors import InvalidValueError
 
 ADVISED_DISTANCE = 0.02  # [m]
-"""Covers what the capsules leave out: a link's rim (at most 12 mm), cables, the braking distance."""
+"""Covers what the capsules do not model: a link's rim (at most 12 mm), cables, the braking distance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,7 +18,7 @@ class ClearanceLimit:
     """Minimum distances of the capsules around the links from each other and from the floor.
 
     A motion with a distance of `links` or `floor` or less is refused; one with `advised` or less gets a
-    recommendation. The floor is a horizontal plane under the whole arm. The base stands on it and is not checked.
+    recommendation. The floor is a horizontal plane under the whole arm. The base is mounted on it and is not checked.
 
     Raises:
         InvalidValueError: A number is not finite, or a distance or radius is below 0.
@@ -50,7 +50,7 @@ class ClearanceLimit:
 
 
 STANDARD_DISTANCE = ClearanceLimit()
-"""Links that do not touch each other nor a floor at height 0, with 20 mm recommended."""
+"""Links that touch neither each other nor a floor at height 0, with 20 mm recommended."""
 
 FLOOR = -1
 """Link number of the floor."""

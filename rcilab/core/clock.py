@@ -35,7 +35,7 @@ class SystemClock:
 
 
 class ManualClock:
-    """A clock that moves only in `advance` and `sleep_until`.
+    """A clock that advances only in `advance` and `sleep_until`.
 
     Args:
         start: First reading, [s].
@@ -49,9 +49,9 @@ class ManualClock:
         return self._now
 
     def advance(self, duration: float) -> None:
-        """Moves forward by `duration`, [s]."""
+        """Advances the clock by `duration`, [s]."""
         self._now += duration
 
     def sleep_until(self, deadline: float) -> None:
-        """Moves to `deadline`, [s], unless it has passed."""
+        """Sets the clock to `deadline`, [s], unless that has passed."""
         self._now = max(self._now, deadline)

@@ -33,8 +33,8 @@ Signal: TypeAlias = Literal[
     "lost_commands",
 ]
 """The quantity of a condition: every joint's angle or torque; the tool's position, the norms of its translation and
-rotation; the arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the side
-of the elbow; external torques and force; commands that did not arrive."""
+rotation; the arm angle; the tool's pose as a whole; the smallest distance between links, or from the floor; the sign
+of the elbow angle; external torques and force; commands that did not arrive."""
 
 Bounds: TypeAlias = tuple[Array, Array]
 """Lower and upper bound, each of shape (n,) for joints and (1,) for anything else."""
@@ -42,14 +42,14 @@ Bounds: TypeAlias = tuple[Array, Array]
 AnyLimits: TypeAlias = Limits | JointLimits
 """All limits of an arm; for a condition on joints, those of the joints are enough."""
 
-_PLACES: dict[Signal, str] = {
+_LOCATIONS: dict[Signal, str] = {
     "arm_angle": "elbow",
     "elbow_sign": "elbow",
     "link_distance": "links",
     "floor_distance": "links",
     "lost_commands": "network",
 }
-"""What the value belongs to; any other signal belongs to the tool."""
+"""Part of the arm that a signal belongs to; any other signal belongs to the tool."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,7 +61,7 @@ class Condition:
     quantity: str
     """Name of the quantity, such as "commanded velocity"."""
     formula: str
-    """As printed in the maker's manual or on its page."""
+    """As printed in the maker's manual or on its website."""
     necessity: Necessity
     """The robot stops when a necessary condition is violated."""
     unit: str
@@ -93,11 +93,11 @@ class Condition:
         """Whether every joint has its own value and bound."""
         return self.signal in ("joint", "torque", "external_torque")
 
-    def place(self, axis: int) -> str:
-        """Returns what the value belongs to: "joint 2", "tool", "elbow", "links", "network"."""
+    def location(self, axis: int) -> str:
+        """Returns the part of the arm that the value belongs to: "joint 2", "tool", "elbow", "links", "network"."""
         if self.is_per_joint:
             return f"joint {axis}"
-        return _PLACES.get(self.signal, "tool")
+        return _LOCATIONS.get(self.signal, "tool")
 
     def __repr__(self) -> str:
         return f"<Condition {self.id}: {self.formula} ({self.necessity})>"
@@ -119,14 +119,14 @@ def all_limits(limits: AnyLimits) -> Limits:
     return limits
 
 
-def same(value: float) -> Bounds:
-    """Returns a single pair of bounds around zero."""
+def symmetric_bounds(value: float) -> Bounds:
+    """Returns the bounds -value and value, each of shape (1,)."""
     bound = np.array([value])
     return -bound, bound
 
 
-def tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
-    """Returns a function for bounds around zero that are the same for every joint."""
+def joint_tolerance(value: float) -> Callable[[AnyLimits], Bounds]:
+    """Returns a function that computes the bounds -value and value for every joint."""
 
     def bounds(limits: AnyLimits) -> Bounds:
         bound = np.full(len(joint_limits(limits).velocity), value)
@@ -144,9 +144,9 @@ class ConditionTable:
     motion: tuple[Condition, ...]
     """For every joint motion."""
     cartesian: tuple[Condition, ...]
-    """For a motion that is sent as poses of the tool."""
+    """For a motion sent as poses of the tool."""
     torque: tuple[Condition, ...]
-    """For a motion that is sent as torques."""
+    """For a motion sent as torques."""
     measured: tuple[Condition, ...]
     """For measured values."""
     box: Condition

@@ -43,7 +43,7 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     message_id              number of the controller cycle
     t                       time since the first command of the motion, in controller cycles, [s]; NaN outside
     received_ns, sent_ns    monotonic stamps of the state's arrival and of the answer (0: not answered), [ns]
-    lateness                how late it was handled, by the robot's own 1 ms grid, [s]; NaN: no deadline
+    lateness                delay of its handling against the robot's own 1 ms grid, [s]; NaN: no deadline
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
     command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
@@ -61,8 +61,8 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     theta                   motor positions, motor side of the gear, [rad], shape (n,)
     ======================  ==================================================================================
 
-    A complete row continues with the rest of the state, `OTHER_STATE_FIELDS`, named as in `RobotState`. A field that a
-    file of an earlier version does not have is NaN.
+    A complete row continues with the rest of the state, `OTHER_STATE_FIELDS`, named as in `RobotState`. A field that is
+    missing in a file of an earlier version is NaN.
 
     Args:
         n: Number of joints.
@@ -161,27 +161,28 @@ def split_columns(name: str, unit: str | Callable[[tuple[int, ...]], str], value
         values: The array, shape (N, ...).
     """
     columns: list[Column] = []
-    for place in np.ndindex(values.shape[1:]):
-        index = ",".join(str(i + 1) for i in place)
-        its = unit if isinstance(unit, str) else unit(place)
-        columns.append(Column(f"{name}[{index}]" if place else name, its, values[(slice(None), *place)]))
+    for index in np.ndindex(values.shape[1:]):
+        subscript = ",".join(str(i + 1) for i in index)
+        column_unit = unit if isinstance(unit, str) else unit(index)
+        title = f"{name}[{subscript}]" if index else name
+        columns.append(Column(title, column_unit, values[(slice(None), *index)]))
     return columns
 
 
 def cycle_columns(cycles: NDArray[np.void]) -> list[Column]:
-    """Returns every number of recorded cycles, each as a column with its unit."""
+    """Returns recorded cycles as columns of numbers, each with its unit."""
     columns: list[Column] = []
     for name in _fields(cycles):
         columns += split_columns(name, partial(_unit, name), cycles[name])
     return columns
 
 
-def _unit(name: str, place: tuple[int, ...]) -> str:
+def _unit(name: str, index: tuple[int, ...]) -> str:
     """Returns the unit of one number of a field; the last column of a pose is the position."""
     if name in _POSES:
-        return "m" if place[0] < 3 and place[1] == 3 else ""
+        return "m" if index[0] < 3 and index[1] == 3 else ""
     if name in _SCREWS:
-        return _SCREWS[name][place[0] // 3]
+        return _SCREWS[name][index[0] // 3]
     return UNITS.get(name, "")
 
 
@@ -221,7 +222,7 @@ def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
     """
     path = Path(fspath(file))
     if path.suffix not in _WRITERS:
-        raise InvalidValueError("file", fspath(file), f"must end in {' or '.join(_WRITERS)}, which chooses the format")
+        raise InvalidValueError("file", fspath(file), f"must end in {' or '.join(_WRITERS)}, which selects the format")
     try:
         with replacing(path) as stream:
             _WRITERS[path.suffix](cycles, stream)
@@ -232,7 +233,7 @@ def save_cycles(cycles: NDArray[np.void], file: str | PathLike[str]) -> None:
 
 
 def write_npz(cycles: NDArray[np.void], stream: IO[bytes]) -> None:
-    """Writes recorded cycles as one array a field."""
+    """Writes recorded cycles as one array per field."""
     arrays: dict[str, Any] = {name: np.ascontiguousarray(cycles[name]) for name in _fields(cycles)}
     np.savez_compressed(stream, **arrays)
 

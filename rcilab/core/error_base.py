@@ -1,4 +1,4 @@
-"""The root of the errors and the two for wrong use, for modules that `errors.py` imports."""
+"""The base class of the errors and the two errors for wrong use, for modules that `errors.py` imports."""
 
 from __future__ import annotations
 
@@ -7,25 +7,25 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Self
 
-_UNSHOWN = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+_UNSAFE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """Characters that control a terminal, break a line or reverse the writing direction, and surrogates."""
-_LONGEST = 2000  # Characters of a text in an error; the longest in normal use have about 600.
+_MAX_LENGTH = 2000  # Characters of a text in an error; the longest in normal use have about 600.
 
 
-def plain_text(text: str, most: int = _LONGEST) -> str:
+def plain_text(text: str, max_length: int = _MAX_LENGTH) -> str:
     """Returns a text that is safe to print: one line, control characters escaped, of limited length.
 
     Args:
         text: Text from any source.
-        most: Largest number of characters; a longer text is cut.
+        max_length: Largest number of characters; a longer text is cut.
     """
-    if len(text) > most:
-        text = text[: most - 1] + "…"
-    return _UNSHOWN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+    if len(text) > max_length:
+        text = text[: max_length - 1] + "…"
+    return _UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 class RcilabError(Exception):
-    """The root of all exceptions of this package.
+    """The base class of all exceptions of this package.
 
     Attributes:
         code: Key of its message `error.CODE` in the catalogues, for a UI in another language; "" without one.
@@ -36,7 +36,7 @@ class RcilabError(Exception):
     facts: Mapping[str, object] = MappingProxyType({})
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickles message and attributes: a constructor takes facts, not the message that it builds from them."""
+        """Pickles message and attributes: a constructor takes facts, not the message built from them."""
         return _restore, (type(self), self.args, self.__dict__)
 
     def coded(self, code: str, **facts: object) -> Self:
@@ -57,7 +57,7 @@ class UsageError(RcilabError, RuntimeError):
 
 
 class InvalidValueError(UsageError, ValueError):
-    """A value that cannot be used: wrong shape, not finite, out of range.
+    """An invalid value: wrong shape, not finite, out of range.
 
     Attributes:
         name: Name of the value.

@@ -4,7 +4,7 @@
       ModelError                 an unknown robot, an invalid description of an arm
       KinematicsError
         UnreachableError         no joint angles give this pose
-        SingularError            the answer is not defined at this configuration
+        SingularError            the result is not defined at this configuration
       PlanningError
       ConformanceError           .violations: the motion violates a condition
         CertificateError         .changed: the certificate does not match the motion or the robot
@@ -66,9 +66,9 @@ class UnreachableError(KinematicsError):
     """No joint angles give this pose.
 
     Attributes:
-        distance: How far the wrist centre is from the reachable shell, [m]; 0 when reach is not the reason.
+        distance: Distance of the wrist centre from the reachable shell, [m]; 0 when reach is not the reason.
         joint: Number of the joint (from 1) whose limit prevents it, or None.
-        excess: How far that joint would exceed its limit, [rad].
+        excess: Angle by which that joint would exceed its limit, [rad].
     """
 
     def __init__(self, message: str, *, distance: float = 0.0, joint: int | None = None, excess: float = 0.0) -> None:
@@ -79,14 +79,14 @@ class UnreachableError(KinematicsError):
 
 
 class SingularError(KinematicsError):
-    """The answer is not defined at this configuration: an axis vanishes or an angle has no reference."""
+    """The result is not defined at this configuration: an axis vanishes or an angle has no reference."""
 
 
 class PlanningError(RcilabError):
     """No motion can be planned for this request.
 
     Attributes:
-        share: Where a path cannot be followed, as a part of its length, 0 to 1; None if no point of it is the cause.
+        share: Point where the path cannot be followed, as a fraction of its length, 0 to 1; None if no point is to blame.
         waypoint: Number of the program's waypoint whose segment fails, from 1; None without a program.
     """
 
@@ -112,7 +112,7 @@ class CertificateError(ConformanceError):
     """The motion was never checked, or something has changed since the check.
 
     Attributes:
-        changed: What differs: any of motion, model, limits, tool, load, safety box, start state.
+        changed: The parts that differ: any of motion, model, limits, tool, load, safety box, start state.
     """
 
     def __init__(self, message: str, changed: Iterable[str] = ()) -> None:

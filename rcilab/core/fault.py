@@ -18,7 +18,7 @@ class FaultCode(IntEnum):
 
     @property
     def key(self) -> str:
-        """Names it in the catalogues, such as `fault.KEY` for the cause and `remedy.KEY`."""
+        """Key in the catalogues: `fault.KEY` for the cause, `remedy.KEY` for the remedy."""
         return f"{self.maker}.{self.name}"
 
     @property
@@ -33,7 +33,7 @@ class FaultCode(IntEnum):
 
     @property
     def remedy(self) -> str:
-        """What to do about it, one sentence; empty if the maker gives no advice."""
+        """How to clear it, one sentence; empty if the maker gives no advice."""
         return ""
 
 
@@ -43,9 +43,9 @@ def find_fault(faults: type[FaultCode], name: FaultCode | str) -> FaultCode:
     Raises:
         InvalidValueError: It does not exist; the message lists the maker's faults.
     """
-    wanted = (name.name if isinstance(name, FaultCode) else name).replace("_", "").lower()
+    requested = (name.name if isinstance(name, FaultCode) else name).replace("_", "").lower()
     for fault in faults:
-        if wanted in (fault.manual_name.replace("_", "").lower(), fault.name.replace("_", "").lower()):
+        if requested in (fault.manual_name.replace("_", "").lower(), fault.name.replace("_", "").lower()):
             return fault
     known = ", ".join(fault.manual_name for fault in faults)
     raise InvalidValueError("fault", str(name), f"does not exist; known: {known}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rcilab.core.errors import InvalidValueError
 
-MOST_ROWS = 1_000_000
+DEFAULT_MAX_ROWS = 1_000_000
 """Cycles of 1 ms in a motion or a run: 17 minutes. Checking a row takes 1.1 KB, so this many rows take 1.1 GB."""
 ROW_BYTES = 1024
 """Largest size of a row in a file, unpacked. A cycle of a run takes 816 bytes; the rest is margin."""

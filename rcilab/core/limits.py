@@ -10,7 +10,9 @@ from typing import Literal
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 
-_ROUNDING = 1e-6  # [rad] Soft limits within this distance of the arm's own, converted from degrees, equal them.
+_ROUNDING = (
+    1e-6  # [rad] Soft limits that are this close to the arm's own limits equal them: they are converted from degrees.
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,7 +38,7 @@ class JointLimits:
     stiffness: JointVector
     """Largest stiffness that `setJointImpedance` accepts, [N m/rad]."""
     own: JointLimits | None = None
-    """The arm's own limits if soft limits of the joint angles are set; None: these are its own."""
+    """The arm's own limits if soft limits of the joint angles are set; else None."""
 
     def __repr__(self) -> str:
         names = ", ".join(name for name in self.__slots__ if name != "own")
@@ -49,7 +51,7 @@ class JointLimits:
         inwards = getattr(self, side)[joint - 1] - getattr(self.own, side)[joint - 1]
         return bool((inwards if side == "lower" else -inwards) > _ROUNDING)
 
-    def soft_bound_passed(self, joint: int, angle: float) -> float | None:
+    def exceeded_soft_limit(self, joint: int, angle: float) -> float | None:
         """Returns the soft limit that an angle of a joint, counted from 1, reaches or exceeds, [rad], or None."""
         lower, upper = float(self.lower[joint - 1]), float(self.upper[joint - 1])
         if angle <= lower:

@@ -35,11 +35,11 @@ class ReportedPose(Pose):
             return getattr(self, name)
 
     def as_row_major(self) -> tuple[float, ...]:
-        """Returns the 16 numbers as they were reported."""
+        """Returns the 16 numbers as reported."""
         return tuple(self._numbers.ravel().tolist())
 
     def tobytes(self) -> bytes:
-        """Returns those numbers as 16 little-endian doubles."""
+        """Returns the numbers as 16 little-endian doubles."""
         return self._numbers.tobytes()
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Matrix:

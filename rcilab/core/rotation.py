@@ -7,19 +7,19 @@ import math
 import numpy as np
 
 from rcilab.core.arrays import Array, Matrix
-from rcilab.core.spatial import Rotation9, turn_between
+from rcilab.core.spatial import Rotation9, rotation_between
 
 _TINY = 1e-12  # [rad] Below it the axis of a rotation is not defined numerically.
 
 
 def rotation_vector(R_old: Matrix, R_new: Matrix) -> Array:
-    """Returns the rotation vector from one orientation to another in their common axes, shape (3,), [rad].
+    """Returns the rotation vector from one orientation to another, in their common axes, shape (3,), [rad].
 
     Args:
         R_old: Shape (3, 3).
         R_new: Shape (3, 3).
     """
-    return np.array(turn_between(nine(R_old), nine(R_new)))
+    return np.array(rotation_between(as_rotation9(R_old), as_rotation9(R_new)))
 
 
 def rotation_matrix(vector: Array) -> Matrix:
@@ -32,7 +32,7 @@ def rotation_matrix(vector: Array) -> Matrix:
     return np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
 
 
-def nine(R: Matrix) -> Rotation9:
+def as_rotation9(R: Matrix) -> Rotation9:
     """Returns a rotation matrix, shape (3, 3), as nine floats, row-major."""
     a, b, c, d, e, f, g, h, i = R.ravel().tolist()
     return a, b, c, d, e, f, g, h, i

@@ -27,7 +27,7 @@ class SafetyBox:
     T_base_box: Pose
     """Pose of its centre."""
     active: bool = True
-    """Whether it is enforced; an inactive one is kept and has no effect."""
+    """Whether it is enforced; an inactive box has no effect."""
 
     def __post_init__(self) -> None:
         """Checks the values."""
@@ -41,7 +41,7 @@ class SafetyBox:
         object.__setattr__(self, "size", size)
 
     def excess(self, position: Sequence[float]) -> float:
-        """Returns how far a point lies outside, [m]: its distance from the box, negative inside.
+        """Returns the distance of a point from the box, [m], negative inside.
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -56,7 +56,7 @@ class SafetyBox:
             return max(dx, dy, dz)
         return hypot(dx if dx > 0.0 else 0.0, dy if dy > 0.0 else 0.0, dz if dz > 0.0 else 0.0)
 
-    def passed_face(self, position: Sequence[float] | Array) -> tuple[str, float]:
+    def exceeded_face(self, position: Sequence[float] | Array) -> tuple[str, float]:
         """Returns the face that a point exceeds most, such as "+x", and by how much, [m]; negative inside.
 
         Args:
@@ -68,7 +68,7 @@ class SafetyBox:
         return ("+" if local[axis] >= 0.0 else "−") + "xyz"[axis], float(beyond[axis])
 
     def excess_path(self, positions: Array) -> Array:
-        """Returns `excess` of many points.
+        """Returns `excess` for many points.
 
         Args:
             positions: Points in the base frame, shape (N, 3), [m].
@@ -88,7 +88,7 @@ class SafetyBox:
 
 
 class EntryBox:
-    """A safety box for a tool that starts outside it: faces that it starts beyond may only be crossed inwards.
+    """A safety box for a tool that starts outside it: the faces it starts beyond may only be crossed inwards.
 
     Such a face moves with the tool until the tool is inside; the other faces are those of the box. Owned by one
     monitor, which calls it once per cycle.
@@ -98,7 +98,7 @@ class EntryBox:
         positions: Start positions of the tool in the base frame, three numbers each, [m]; the farthest one counts.
     """
 
-    _ROUNDING = 1e-6  # [m] How far outwards rounding may move a tool that is commanded to stay.
+    _ROUNDING = 1e-6  # [m] Outward motion that rounding may cause in a tool that is commanded to stay.
 
     def __init__(self, box: SafetyBox, *positions: Sequence[float]) -> None:
         self._box = box
@@ -109,7 +109,7 @@ class EntryBox:
         ]
 
     def excess(self, position: Sequence[float]) -> float:
-        """Returns how far a point lies outside the extended box, [m]; see `SafetyBox.excess`.
+        """Returns the distance of a point from the extended box, [m]; see `SafetyBox.excess`.
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -118,8 +118,8 @@ class EntryBox:
         deepest = max(beyond)
         return deepest if deepest <= 0.0 else hypot(*(max(0.0, distance) for distance in beyond))
 
-    def passed_face(self, position: Sequence[float]) -> tuple[float, str, float]:
-        """Returns how far a point exceeds a face beyond what is allowed, which one, and how far beyond the box's own.
+    def exceeded_face(self, position: Sequence[float]) -> tuple[float, str, float]:
+        """Returns the excess over the extended box, [m], the face, such as "+x", and the excess over the box, [m].
 
         Args:
             position: The point in the base frame, three numbers, [m].
@@ -131,7 +131,7 @@ class EntryBox:
         return beyond[axis], name, abs(local[axis]) - self._half[axis]
 
     def _beyond(self, local: Sequence[float]) -> list[float]:
-        """Returns how far a point exceeds the faces along each axis, which then follow it inwards."""
+        """Returns the excess of a point along each axis, [m], then moves the extended faces inwards to the point."""
         beyond = [max(low - x, x - high) for x, (low, high) in zip(local, self._faces, strict=True)]
         self._faces = [
             (min(-half, max(low, x - self._ROUNDING)), max(half, min(high, x + self._ROUNDING)))
@@ -145,8 +145,8 @@ class EntryBox:
         return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
 
 
-def box_from(box: SafetyBox | None, *positions: Sequence[float]) -> SafetyBox | EntryBox | None:
-    """Returns the box for a tool that starts at a position: the safety box, or one extended to the start; or None.
+def box_for_start(box: SafetyBox | None, *positions: Sequence[float]) -> SafetyBox | EntryBox | None:
+    """Returns the box for a tool with these start positions: the safety box, one extended to the start, or None.
 
     Args:
         box: The safety box; None or an inactive one gives None.
@@ -160,7 +160,7 @@ def require_box(box: object) -> SafetyBox:
     """Returns `box` if it is a `SafetyBox`, active or not.
 
     Raises:
-        InvalidValueError: It is something else; the message says how to make one.
+        InvalidValueError: It is something else; the message says how to construct one.
     """
     if isinstance(box, SafetyBox):
         return box

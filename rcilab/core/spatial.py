@@ -22,7 +22,7 @@ Rotation9: TypeAlias = tuple[float, float, float, float, float, float, float, fl
 """A rotation matrix as nine floats, row-major, for scalar code on the 1 kHz path."""
 
 UNIT_TOLERANCE = 1e-5
-"""How far rows and columns of a rotation may be from unit length; the vendor's client uses the same."""
+"""Largest deviation of rows and columns of a rotation from unit length; the vendor's client uses the same."""
 
 PERPENDICULAR_TOLERANCE = 1e-4
 """Largest cosine of the angle between two rows. The vendor's client does not check it; a rotation rounded to five
@@ -46,7 +46,7 @@ class Pose:
     """
 
     __slots__ = ("_p", "_r")
-    __array_ufunc__ = None  # So that numpy hands `matrix @ pose` to __rmatmul__.
+    __array_ufunc__ = None  # numpy then leaves `matrix @ pose` to __rmatmul__.
 
     _r: Rotation9
     _p: tuple[float, float, float]
@@ -151,7 +151,7 @@ class Pose:
         )  # fmt: skip
 
     def tobytes(self) -> bytes:
-        """Returns those numbers as in datagrams and recordings: 16 little-endian doubles."""
+        """Returns the numbers as in datagrams and recordings: 16 little-endian doubles."""
         return _NUMBERS.pack(*self.as_row_major())
 
     def inverse(self) -> Pose:
@@ -216,7 +216,7 @@ class Pose:
         try:
             points = np.asarray(other, dtype=np.float64)
         except (TypeError, ValueError, OverflowError):
-            raise _no_pose("pose", other) from None
+            raise _pose_error("pose", other) from None
         if points.ndim not in (1, 2) or points.shape[-1] != 3:
             raise InvalidValueError("factor", described(other), "must be a Pose, or points of shape (3,) or (N, 3)")
         return points @ self.rotation.T + self.position
@@ -262,10 +262,10 @@ def as_pose(value: object, name: str = "pose", advice: str = "") -> Pose:
     except InvalidValueError as error:
         if is_transform(value):
             raise InvalidValueError(name, described(value), error.requirement) from error
-        raise _no_pose(name, value, advice) from None
+        raise _pose_error(name, value, advice) from None
 
 
-def _no_pose(name: str, value: object, advice: str = "") -> InvalidValueError:
+def _pose_error(name: str, value: object, advice: str = "") -> InvalidValueError:
     return InvalidValueError(name, described(value), f"must be a Pose or a matrix of shape (4, 4){advice}")
 
 
@@ -273,7 +273,7 @@ IDENTITY = Pose.from_parts((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 
 
 
 def find_rotation_error(r: Rotation9) -> str | None:
-    """Returns why nine finite numbers, row-major, are not a rotation matrix; None if they are, within rounding."""
+    """Returns why nine finite numbers, row-major, are not a rotation matrix; None if they are one, within rounding."""
     a, b, c, d, e, f, g, h, i = r
     squares = (
         a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i,
@@ -349,7 +349,7 @@ def rpy_from_rotation(r: Rotation9) -> tuple[float, float, float]:
     return math.atan2(r[7], r[8]), pitch, math.atan2(r[3], r[0])
 
 
-def turn_between(old: Rotation9, new: Rotation9) -> tuple[float, float, float]:
+def rotation_between(old: Rotation9, new: Rotation9) -> tuple[float, float, float]:
     """Returns the rotation vector, [rad], from `old` to `new`, in the axes in which both are given.
 
     Its direction is the axis, its length the angle, 0 to pi: log(R_new R_old^T). Accurate also for the small rotations

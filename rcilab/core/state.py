@@ -62,7 +62,7 @@ class RobotState:
     """Everything the robot reports in one cycle. Commanded values end in `_c`; all others are measured."""
 
     message_id: int
-    """Number of the controller cycle; the command that answers this state carries it back."""
+    """Number of the controller cycle; the command for this state repeats it."""
     q: JointVector
     """Joint angles, [rad]."""
     q_c: JointVector
@@ -125,8 +125,10 @@ class RobotState:
         return f"<RobotState {self.message_id}: q = {angles} deg; {modes}; faults: {faults}>"
 
 
-_Open: Any = make_dataclass("_Open", [field.name for field in fields(RobotState)], eq=False, repr=False, slots=True)
-"""A state that is not frozen yet, with the same fields, so that its class can be changed."""
+_MutableState: Any = make_dataclass(
+    "_MutableState", [field.name for field in fields(RobotState)], eq=False, repr=False, slots=True
+)
+"""A mutable class with the fields of `RobotState`, whose instances can change their class to it."""
 
 
 def build_state(values: Iterable[object]) -> RobotState:
@@ -134,16 +136,16 @@ def build_state(values: Iterable[object]) -> RobotState:
 
     For the 1 kHz path: the constructor of a frozen dataclass takes six times as long.
     """
-    state = _Open(*values)
+    state = _MutableState(*values)
     state.__class__ = RobotState
     return state
 
 
 def unknown_state(n: int) -> RobotState:
-    """Returns a state of which nothing is known, for controllers that report less than this.
+    """Returns a state without any known value, for controllers that report only some of the fields.
 
-    A driver replaces what its controller reports: `replace(unknown_state(6), message_id=1, q=q)`. Numbers are NaN, the
-    modes idle, no fault is set.
+    A driver fills in the fields that its controller reports: `replace(unknown_state(6), message_id=1, q=q)`. Numbers
+    are NaN, the modes idle, no fault is set.
 
     Args:
         n: Number of joints.
@@ -170,7 +172,7 @@ def require_mode(mode: object) -> Mode:
     """Returns `mode` if it is a command mode.
 
     Raises:
-        InvalidValueError: It is not; the message lists those that exist.
+        InvalidValueError: It is not; the message lists the command modes.
     """
     for known in MODES:
         if isinstance(mode, str) and mode == known:

@@ -12,7 +12,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
-from rcilab.core.rotation import nine
+from rcilab.core.rotation import as_rotation9
 from rcilab.core.spatial import find_rotation_error
 from rcilab.core.state import RobotState
 
@@ -43,7 +43,7 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
     if command.psi is not None and not math.isfinite(command.psi):
         raise InvalidValueError("psi", command.psi, "must be finite [rad], or None")
     T = _numbers(name, command.T_base_tool, (4, 4), "m")
-    error = find_rotation_error(nine(T[:3, :3]))
+    error = find_rotation_error(as_rotation9(T[:3, :3]))
     if error is not None:
         raise InvalidValueError(name, "T_base_tool", error)
     return CartesianPosition(T, command.psi, command.finished)

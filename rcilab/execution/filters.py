@@ -16,7 +16,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
-from rcilab.core.rotation import nine, rotation_matrix, rotation_vector
+from rcilab.core.rotation import as_rotation9, rotation_matrix, rotation_vector
 from rcilab.motion import LIMIT_MARGIN
 from rcilab.motion.path import slerp
 
@@ -53,7 +53,7 @@ def low_pass_pose(u: Array, x: Array, k: float) -> Array:
     """Returns the next pose from the commanded pose u and the last one x, (4, 4): the turn in the same proportion."""
     T = u.copy()
     T[:3, 3] = low_pass(u[:3, 3], x[:3, 3], k)
-    T[:3, :3] = np.array(slerp(nine(x[:3, :3]), nine(u[:3, :3]), k)).reshape(3, 3)
+    T[:3, :3] = np.array(slerp(as_rotation9(x[:3, :3]), as_rotation9(u[:3, :3]), k)).reshape(3, 3)
     return T
 
 

@@ -46,7 +46,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
-        soft, back = limits.soft_bound_passed(i + 1, angle), "plan_recovery(model, q) moves back inside"
+        soft, back = limits.exceeded_soft_limit(i + 1, angle), "plan_recovery(model, q) moves back inside"
         if soft is None and what == "start":
             raise PlanningError(f"{said}where the arm is there, {back}").coded("range_start", **facts)
         if soft is None:
@@ -84,7 +84,7 @@ def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[
     """Returns which bound is crossed and where, in words and as facts: with a limit where a soft one was set."""
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
     facts: dict[str, float] = {"joint": joint, "angle": angle, "low": low, "high": high}
-    soft = limits.soft_bound_passed(joint, angle)
+    soft = limits.exceeded_soft_limit(joint, angle)
     if soft is None:
         what = f"joint {joint} would {verb} its limit at {degrees(angle):.2f} deg"
         return f"{what} ({degrees(low):.0f} to {degrees(high):.0f} deg)", facts

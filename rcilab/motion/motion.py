@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import MOST_ROWS, require_rows
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_rows
 from rcilab.i18n.locale import Language
 from rcilab.i18n.localized_text import language
 from rcilab.i18n.translator import Remark
@@ -260,7 +260,7 @@ class Motion:
         storage.save(file, self._write_npz, lambda stream: storage.write_rows(stream, self.times, self.q))
 
     @classmethod
-    def load(cls, file: str | PathLike[str] | BinaryIO, *, max_rows: int = MOST_ROWS) -> Motion:
+    def load(cls, file: str | PathLike[str] | BinaryIO, *, max_rows: int = DEFAULT_MAX_ROWS) -> Motion:
         """Returns the motion in a file (.npz or .csv, see `save`).
 
         A CSV whose times are not the 1 ms grid is read as `load_samples` reads it.
@@ -287,7 +287,7 @@ class Motion:
         *,
         rate_hz: float | None = None,
         unit: Literal["rad", "deg"] = "rad",
-        max_rows: int = MOST_ROWS,
+        max_rows: int = DEFAULT_MAX_ROWS,
     ) -> Motion:
         """Returns the motion through joint samples of another program, at any rate, even or not.
 

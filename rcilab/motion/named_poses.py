@@ -11,7 +11,7 @@ from typing import Any, cast
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_vector, described, readonly_copy
-from rcilab.core.atomic_file import read_own_text, write_whole
+from rcilab.core.atomic_file import read_own_text, write_atomic
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.model.robot_model import RobotModel, require_model
 
@@ -142,7 +142,7 @@ class NamedPoseStore:
         """Replaces the file atomically."""
         content = {**content, "poses": {**content["poses"], self._model.name: own}}
         try:
-            write_whole(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
+            write_atomic(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
         except OSError as error:
             raise self._unsound(f"cannot be written: {error.strerror}").coded("unwritable") from error
 

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from rcilab.core.arrays import Array
-from rcilab.core.spatial import Rotation9, turn_between
+from rcilab.core.spatial import Rotation9, rotation_between
 
 _LOOKS = 200
 """Evenly spaced points at which the largest rate of a rotation through a middle orientation is searched."""
@@ -137,7 +137,7 @@ def turns_between(rotations: Array) -> Array:
 
 def _turn_of(a: Rotation9, b: Rotation9) -> tuple[float, float, float]:
     """Returns the rotation vector that turns a into b, in the axes of a: log(R_a^T R_b)."""
-    x, y, z = turn_between(a, b)  # In base.
+    x, y, z = rotation_between(a, b)  # In base.
     return (a[0] * x + a[3] * y + a[6] * z, a[1] * x + a[4] * y + a[7] * z, a[2] * x + a[5] * y + a[8] * z)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rcilab.core.arrays import Array, JointVector, as_number, as_vector, described, make_readonly
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
-from rcilab.core.file_bounds import MOST_ROWS, require_max_rows
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_max_rows
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.blend import Blend, build_blend
@@ -47,7 +47,7 @@ def plan_program(
     rounds: int = 1,
     law: JointLaw = "jerk_limited",
     progress: Callable[[float], None] | None = None,
-    max_rows: int = MOST_ROWS,
+    max_rows: int = DEFAULT_MAX_ROWS,
 ) -> Motion:
     """Returns the motion through the waypoints of a program, from standstill to standstill.
 

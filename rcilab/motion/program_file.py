@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rcilab.core.arrays import Unquoted, described
-from rcilab.core.atomic_file import read_whole, replacing
+from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
 from rcilab.motion.located_json import LONGEST, LongListError, Node, read_json
 from rcilab.motion.waypoint import ALLOWED, ALWAYS, MOST_WAYPOINTS, WORDS, Waypoint, require_count, require_fit
@@ -73,7 +73,7 @@ def load_program(file: str | PathLike[str], build: Callable[..., P]) -> P:
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("program file", described(file), "must be a file name")
     path = Path(fspath(file))
-    content = read_whole(path, "program file", LONGEST + 1)
+    content = read_limited(path, "program file", LONGEST + 1)
     return read_program(content, path.name, build)
 
 

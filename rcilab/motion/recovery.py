@@ -67,7 +67,7 @@ def plan_recovery(
 
 
 def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> PlanningError:
-    soft, most = limits.soft_bound_passed(joint, angle), f"{degrees(RECOVERY_RANGE):g}"
+    soft, most = limits.exceeded_soft_limit(joint, angle), f"{degrees(RECOVERY_RANGE):g}"
     facts = {"joint": joint, "angle": angle, "beyond": beyond, "most": RECOVERY_RANGE}
     where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
     said = (

@@ -12,7 +12,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, as_number, as_path, as_vector
-from rcilab.core.atomic_file import read_whole
+from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
@@ -61,7 +61,7 @@ def read_samples(
     path = Path(fspath(file))
     if path.suffix.lower() not in _READERS:
         raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}")
-    content = read_whole(path, "samples", max_rows * ROW_BYTES + 1)
+    content = read_limited(path, "samples", max_rows * ROW_BYTES + 1)
     require_bytes(len(content), max_rows, "samples", path.name)
     times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
     if times is None:

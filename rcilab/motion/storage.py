@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, JointPath, as_number
-from rcilab.core.atomic_file import read_whole, replacing
+from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
@@ -123,7 +123,7 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dict[str, np.ndarray]:
     most = max_rows * ROW_BYTES + 1
-    content = read_whole(Path(file), "motion file", most) if isinstance(file, str | PathLike) else file.read(most)
+    content = read_limited(Path(file), "motion file", most) if isinstance(file, str | PathLike) else file.read(most)
     if not content:
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from rcilab.core.atomic_file import read_own_text, write_whole
+from rcilab.core.atomic_file import read_own_text, write_atomic
 from rcilab.core.errors import UsageError
 
 INDEX = "index.md"
@@ -71,10 +71,10 @@ def copy_lessons(folder: Path, source: Path | None = None) -> CopiedLessons:
             text = lesson.read_text(encoding="utf-8")
             name = _place(folder, lesson.name, text, given)
             if name is not None:
-                write_whole(folder / name, text)
+                write_atomic(folder / name, text)
                 given[name] = _digest(text)
                 (written if name == lesson.name else beside).append(name)
-        write_whole(folder / _RECORD, json.dumps(given, indent=1, sort_keys=True))
+        write_atomic(folder / _RECORD, json.dumps(given, indent=1, sort_keys=True))
     except OSError as error:
         raise UsageError(
             f"the lessons cannot be copied into {folder}: {error.strerror}; name a folder that you may write to"

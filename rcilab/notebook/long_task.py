@@ -105,7 +105,7 @@ class LongTask(Generic[Context, Result]):
             self._work.wait(self._shown_after)
             while not self._ending.is_set():
                 if self._work.is_done:
-                    self._take(*self._work.take())
+                    self._take(*self._work.pop_result())
                     return
                 share = self._work.progress
                 if share is None:  # Given up.

@@ -16,7 +16,7 @@ from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.i18n.localized_text import language
 from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
@@ -418,7 +418,7 @@ def build_run(
     )
 
 
-def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
+def load_run(file: str | PathLike[str], *, max_rows: int = DEFAULT_MAX_ROWS) -> Run:
     """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
 
     Args:
@@ -435,6 +435,6 @@ def load_run(file: str | PathLike[str], *, max_rows: int = MOST_ROWS) -> Run:
     return read_run(file, max_rows, Run)
 
 
-def decode_run(content: bytes, name: str = "stream", *, max_rows: int = MOST_ROWS) -> Run:
+def decode_run(content: bytes, name: str = "stream", *, max_rows: int = DEFAULT_MAX_ROWS) -> Run:
     """Returns the run in the bytes of a `.rcirun` file; see `load_run`."""
     return decode_content(content, name, max_rows, Run)

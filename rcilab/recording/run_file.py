@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import described
-from rcilab.core.atomic_file import read_whole
+from rcilab.core.atomic_file import read_limited
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.file_bounds import require_max_rows, require_rows
@@ -235,7 +235,7 @@ def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) 
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("run file", described(file), "must be a file name")
     name = fspath(file)
-    content = read_whole(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
+    content = read_limited(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
     return decode_content(content, name, max_rows, build)
 
 

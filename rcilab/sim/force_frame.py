@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.spatial import Pose, Rotation9, rotation_from_wxyz, turn_between
+from rcilab.core.spatial import Pose, Rotation9, rotation_between, rotation_from_wxyz
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.arm_parameters import ArmParameters, ForceAxesKind
 
@@ -86,7 +86,7 @@ class ForceAxes:
 
 def _approach(now: Rotation9, wanted: Rotation9) -> tuple[Rotation9, bool]:
     """Returns axes a cycle later on their way to those that are wanted, and whether they have arrived."""
-    x, y, z = turn_between(now, wanted)
+    x, y, z = rotation_between(now, wanted)
     angle = math.hypot(x, y, z)
     if angle <= _TURN_STEP:
         return wanted, True

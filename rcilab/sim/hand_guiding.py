@@ -14,7 +14,7 @@ import numpy as np
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import Pose, turn_between
+from rcilab.core.spatial import Pose, rotation_between
 from rcilab.model.dynamics.rigid_body import ToolTerms
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import design_damping
@@ -99,7 +99,7 @@ def _held(model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: P
     cartesian = model.limits.cartesian
     if freedom is GuidedFreedom.ROTATION:
         return cartesian.translation_stiffness, T_held.position - terms.pose.position
-    return cartesian.rotation_stiffness, np.array(turn_between(terms.pose.parts[0], T_held.parts[0]))
+    return cartesian.rotation_stiffness, np.array(rotation_between(terms.pose.parts[0], T_held.parts[0]))
 
 
 def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:

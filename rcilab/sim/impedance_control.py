@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, Matrix, scalar
-from rcilab.core.spatial import Pose, turn_between
+from rcilab.core.spatial import Pose, rotation_between
 from rcilab.model.dynamics.rigid_body import ToolTerms
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import DAMPING_RATIO, ModalDamping, design_damping
@@ -109,7 +109,7 @@ def cartesian_impedance(
 def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
     """Returns position and rotation vector from the measured to the commanded tool, base axes, [m, rad]."""
     (r_c, (x, y, z)), (r, (px, py, pz)) = T_c.parts, T.parts
-    return x - px, y - py, z - pz, *turn_between(r, r_c)
+    return x - px, y - py, z - pz, *rotation_between(r, r_c)
 
 
 def _turned(rows: Array, axes: Matrix) -> Array:

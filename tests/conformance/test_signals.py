@@ -11,7 +11,7 @@ from rcilab.conformance.signals import HOLD_SAMPLES, MotionSignals
 from rcilab.conformance.start import StartState
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.safety_box import SafetyBox, box_from
+from rcilab.core.safety_box import SafetyBox, box_for_start
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
@@ -90,7 +90,7 @@ def test_monitor_and_check_give_one_verdict_on_the_safety_box(model, seed, edge)
     rng = np.random.default_rng(seed)
     centre = model.forward(motion.q[int(rng.integers(0, len(motion)))]).position
     box = SafetyBox(size=tuple(edge * rng.uniform(0.5, 1.5, 3)), T_base_box=Pose.from_rpy(centre, rng.normal(size=3)))
-    monitor = BoxMonitor(box_from(box, model.forward(motion.q[0]).position.tolist()), RCI_CONDITIONS.box)
+    monitor = BoxMonitor(box_for_start(box, model.forward(motion.q[0]).position.tolist()), RCI_CONDITIONS.box)
     played = [bool(monitor.step(model.forward(q).position.tolist())) for q in motion.q]
     played += played[-1:] * HOLD_SAMPLES
     report = check(motion, model, box=box, distance=None)

@@ -18,7 +18,7 @@ from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
-from rcilab.core.safety_box import SafetyBox, box_from
+from rcilab.core.safety_box import SafetyBox, box_for_start
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
 from rcilab.model.robot_model import load_model
@@ -54,7 +54,7 @@ def test_the_box_is_judged_alike_by_check_and_monitor(seed, spoils):
         q[rng.integers(len(q)), rng.integers(7)] += rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-4.0, 0.0)
     T_base_box = MODEL.forward(q[0]) @ Pose.from_rpy(rng.uniform(-0.1, 0.1, 3), rng.uniform(-3.0, 3.0, 3))
     box = SafetyBox(size=tuple(rng.uniform(0.05, 0.6, 3)), T_base_box=T_base_box)
-    monitor = BoxMonitor(box_from(box, MODEL.forward(q[0]).parts[1]), RCI_CONDITIONS.box)
+    monitor = BoxMonitor(box_for_start(box, MODEL.forward(q[0]).parts[1]), RCI_CONDITIONS.box)
     rows = [*q, *[q[-1]] * HOLD_SAMPLES]
     played = [bool(monitor.step(MODEL.forward(row).parts[1])) for row in rows]
     expected = np.zeros(len(rows), dtype=bool)

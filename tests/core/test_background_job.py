@@ -18,7 +18,7 @@ def jobs() -> BackgroundJob[str, int]:
 
 def finished(jobs: BackgroundJob[str, int]) -> tuple[str, object]:
     wait_for(lambda: jobs.is_done, 20.0, "the job")
-    return jobs.take()
+    return jobs.pop_result()
 
 
 def test_a_result_comes_back_once_with_what_it_is_about(jobs):

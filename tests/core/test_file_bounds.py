@@ -17,7 +17,7 @@ import pytest
 
 import rcilab
 from rcilab.core.errors import InvalidValueError, PlanningError
-from rcilab.core.file_bounds import MOST_ROWS
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.recording.chunks import encode_block, encode_header
 from rcilab.recording.export import export_run
@@ -194,7 +194,7 @@ def test_a_program_that_takes_hours_is_refused_before_it_is_judged():
     program = Program(model=MODEL.name, start=MODEL.home, waypoints=there)
     with pytest.raises(PlanningError, match="take fewer rounds or shorter dwells, or pass max_rows=12"):
         rcilab.plan_program(MODEL, program)
-    assert rcilab.plan_program(MODEL, program, max_rows=2 * MOST_ROWS).duration > 1200.0
+    assert rcilab.plan_program(MODEL, program, max_rows=2 * DEFAULT_MAX_ROWS).duration > 1200.0
 
 
 @pytest.mark.parametrize("bound", [0, -1, 1.5, True, None, "many"])

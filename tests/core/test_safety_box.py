@@ -49,7 +49,7 @@ def test_excess_agrees_with_the_nearest_point_of_the_box(point):
     [((0.25, 0.1, -0.2), "+x", 0.05), ((0.23, -0.36, 0.5), "−y", 0.06), ((0.0, 0.0, -0.499), "−z", -0.001)],
 )
 def test_the_face_that_a_point_lies_farthest_past_is_named(point, face, distance):
-    assert TURNED.passed_face(at(*point)) == (face, pytest.approx(distance, abs=1e-12))
+    assert TURNED.exceeded_face(at(*point)) == (face, pytest.approx(distance, abs=1e-12))
 
 
 def test_a_path_of_points_is_judged_as_each_of_them():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rcilab.core.command import CartesianPosition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import IDENTITY, Pose, turn_between
+from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Waypoint, plan_line
 
@@ -87,7 +87,7 @@ def test_the_turn_between_two_rotations_is_the_one_that_was_made(pose, axis, exp
     angle = 10.0**exponent  # 1 nrad, which is one cycle of a slow wrist, up to nearly half a turn.
     axis = np.array(axis) / np.linalg.norm(axis)
     step = Pose(wxyz=[np.cos(angle / 2.0), *(np.sin(angle / 2.0) * axis)])
-    turn = turn_between(pose.parts[0], (step @ pose).parts[0])
+    turn = rotation_between(pose.parts[0], (step @ pose).parts[0])
     np.testing.assert_allclose(turn, angle * axis, rtol=1e-6, atol=1e-15 + 1e-6 * angle)
 
 
@@ -95,14 +95,14 @@ def test_the_turn_between_two_rotations_is_the_one_that_was_made(pose, axis, exp
 def test_half_a_turn_has_an_axis_and_a_length_of_pi(axis):
     a = np.array(axis, dtype=float)
     old = Pose.from_rpy((0.0, 0.0, 0.0), (0.2, 0.4, -0.3))
-    turn = np.array(turn_between(old.parts[0], (Pose(wxyz=[0.0, *a]) @ old).parts[0]))
+    turn = np.array(rotation_between(old.parts[0], (Pose(wxyz=[0.0, *a]) @ old).parts[0]))
     assert np.linalg.norm(turn) == pytest.approx(np.pi)
     assert abs(turn @ a) == pytest.approx(np.pi)
 
 
 def test_no_turn_is_zero():
     old = Pose.from_rpy((0.0, 0.0, 0.0), (0.2, 0.4, -0.3)).parts[0]
-    np.testing.assert_allclose(turn_between(old, old), np.zeros(3), atol=1e-16)
+    np.testing.assert_allclose(rotation_between(old, old), np.zeros(3), atol=1e-16)
 
 
 @given(poses, poses)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.core.spatial import rotation_from_wxyz, turn_between
+from rcilab.core.spatial import rotation_between, rotation_from_wxyz
 from rcilab.motion.orientation_path import Slerp, turn_through, turn_to, turns_between
 from rcilab.motion.path import slerp
 
@@ -50,7 +50,7 @@ def test_angular_velocity_and_acceleration_are_continuous_at_the_middle(start, m
 
 @given(rotations, rotations, places)
 def test_what_a_slerp_passes_in_proportion_is_that_slerp(start, goal, place):
-    if np.linalg.norm(turn_between(start, goal)) > 3.1:  # About half a turn there are two shorter ways.
+    if np.linalg.norm(rotation_between(start, goal)) > 3.1:  # About half a turn there are two shorter ways.
         return
     turning = turn_through(start, slerp(start, goal, place), goal, place)
     for share in (0.0, 0.2, 0.5, 0.9, 1.0):
@@ -77,7 +77,7 @@ def test_the_whole_may_turn_further_than_half_round():
 
 @given(rotations, rotations, st.floats(0.0, 1.0))
 def test_a_steady_turn_between_two_orientations_is_their_slerp(start, goal, share):
-    if np.linalg.norm(turn_between(start, goal)) > 3.1:
+    if np.linalg.norm(rotation_between(start, goal)) > 3.1:
         return
     assert np.abs(at(turn_to(start, goal), share).ravel() - slerp(start, goal, share)).max() < 1e-9
 
@@ -92,5 +92,5 @@ def test_a_steady_turn_may_go_round_and_round():
 @given(rotations, st.tuples(*[st.floats(-0.8, 0.8)] * 3))
 def test_the_turn_from_row_to_row_is_in_base_axes(start, turn):
     rows = np.stack((np.array(start).reshape(3, 3), at(Slerp(start, turn), 1.0)))
-    expected = turn_between(start, rows[1].ravel().tolist())
+    expected = rotation_between(start, rows[1].ravel().tolist())
     assert np.abs(turns_between(rows)[0] - expected).max() < 1e-9

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rcilab.core.errors import InvalidValueError, PlanningError
-from rcilab.core.spatial import IDENTITY, Pose, turn_between
+from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 from rcilab.motion.cartesian import schedule
 from rcilab.motion.path import build_arc, build_line, slerp
 
@@ -138,4 +138,4 @@ def test_what_is_no_pose_is_named():
 @given(st.floats(0.0, 1.0), st.floats(0.01, 3.1))
 def test_slerp_turns_in_proportion(share, angle):
     a, b = IDENTITY.parts[0], turned(angle).parts[0]
-    assert np.allclose(turn_between(a, slerp(a, b, share)), (0.0, 0.0, share * angle), atol=1e-9)
+    assert np.allclose(rotation_between(a, slerp(a, b, share)), (0.0, 0.0, share * angle), atol=1e-9)

@@ -10,7 +10,7 @@ import pytest
 
 from rcilab.control_process.simulate import simulate
 from rcilab.core.command import CartesianPosition
-from rcilab.core.spatial import Pose, turn_between
+from rcilab.core.spatial import Pose, rotation_between
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import load_model
 from rcilab.sim.arm_parameters import ForceAxesKind
@@ -108,7 +108,7 @@ def test_the_axes_of_a_path_turn_by_a_bounded_step_and_arrive():
     for cycle in range(600):
         axes.follow([0.0, -0.1, 1e-7], Tool(tool))
         now = axes.rotation(tool)
-        assert math.hypot(*turn_between(before, now)) < 0.007
+        assert math.hypot(*rotation_between(before, now)) < 0.007
         assert axes.is_settled or cycle < 510
         before = now
     assert np.array(before).reshape(3, 3)[:, 0] == pytest.approx([0.0, -1.0, 0.0], abs=1e-5)

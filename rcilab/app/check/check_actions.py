@@ -73,7 +73,7 @@ class CheckActions:
         """Shows how far something is, and what came of it; forgets what is about another plan."""
         if self._work.is_done:
             self._set(doing=None)
-            about, result = self._work.take()
+            about, result = self._work.pop_result()
             if isinstance(result, RcilabError):
                 self._answer("bad", tell_error(result))
             elif isinstance(result, SlowdownJob):

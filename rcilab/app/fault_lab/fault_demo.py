@@ -87,7 +87,7 @@ class FaultDemo:
     @property
     def place(self) -> str:
         """Whose value it is: "joint 1", "tool", "elbow", "network"."""
-        return self.condition.place(self.signal.axis)
+        return self.condition.location(self.signal.axis)
 
     @property
     def source(self) -> str:

@@ -116,7 +116,7 @@ def why_not(refusal: UnreachableError, missed: float) -> Message:
 
 def _at_limit(model: RobotModel, q: JointVector, least: JointLimitMargin) -> Message:
     limits, joint, angle = model.limits.joint, least.joint, float(q[least.joint - 1])
-    soft = limits.soft_bound_passed(joint, angle)
+    soft = limits.exceeded_soft_limit(joint, angle)
     if soft is not None:
         return message("reach.at_soft", joint=joint, angle=angle, limit=soft)
     if least.angle == 0.0:

@@ -82,7 +82,7 @@ class LearnActions:
         """Shows how far a provocation is and what came of it; closes the show; looks what the learner has done."""
         learn = self._learn
         if self._work.is_done:
-            self._finish(self._work.take()[1])
+            self._finish(self._work.pop_result()[1])
         elif self._work.progress is not None and self._work.progress != learn.progress:
             self._set(progress=self._work.progress)
         self._look_beside()

@@ -150,7 +150,7 @@ class ProgramActions:
         if self._planner.is_done:
             self._store.update(busy=None)
             self._shelves.set(progress=None)
-            self._finish(*self._planner.take())
+            self._finish(*self._planner.pop_result())
         elif self._planner.progress != self._shelves.state.progress:
             self._shelves.set(progress=self._planner.progress)
         elif (

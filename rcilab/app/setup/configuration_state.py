@@ -105,7 +105,7 @@ def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
     box = active_box(state.setup.wanted.box)
     if box is None:
         return None
-    face, distance = box.passed_face(position)
+    face, distance = box.exceeded_face(position)
     return message("ready.outside", distance=distance, face=face) if distance > _SEEN else None
 
 

@@ -32,7 +32,15 @@ from rcilab.conformance.common_conditions import (
     TORQUE_RANGE,
     TORQUE_RATE,
 )
-from rcilab.core.condition import AnyLimits, Bounds, Condition, ConditionTable, joint_limits, same, tolerance
+from rcilab.core.condition import (
+    AnyLimits,
+    Bounds,
+    Condition,
+    ConditionTable,
+    joint_limits,
+    joint_tolerance,
+    symmetric_bounds,
+)
 from rcilab.makers.franka.errors import FrankaError
 
 _PAGE = "Franka's page Robot and interface specifications"
@@ -78,7 +86,7 @@ def _motion_row(row: Condition) -> Condition:
             necessity="necessary",
             fault=FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
             source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: ours)",
-            bounds=tolerance(START_TOLERANCE),
+            bounds=joint_tolerance(START_TOLERANCE),
         )
     ours = "" if row.signal == "torque" else "; tolerance: ours"
     return replace(row, source=f"{_PAGE}, recommended (printed for Cartesian trajectories{ours})")
@@ -154,7 +162,7 @@ _TOOL = (
     replace(
         START_POSE,
         source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)",
-        bounds=lambda limits: same(START_TOLERANCE),
+        bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
         necessity="necessary",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
     ),
@@ -169,7 +177,7 @@ _TOOL = (
         stage="start",
         signal="arm_angle",
         order=0,
-        bounds=lambda limits: same(START_TOLERANCE),
+        bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
     ),
     *(
         replace(row, source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)")
@@ -227,7 +235,7 @@ _BEHAVIOUR = (
         stage="throughout",
         signal="external_force",
         order=0,
-        bounds=lambda limits: same(math.inf),
+        bounds=lambda limits: symmetric_bounds(math.inf),
     ),
     replace(
         LOST_COMMANDS,

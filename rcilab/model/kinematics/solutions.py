@@ -107,7 +107,7 @@ class Solutions(Sequence[JointVector]):
         elif self.psi is not None:
             place += f" at arm angle {degrees(self.psi):.1f} deg"
             advice += " or change the arm angle"
-        soft = None if best.joint is None else self._limits.soft_bound_passed(joint, angle)
+        soft = None if best.joint is None else self._limits.exceeded_soft_limit(joint, angle)
         limit = "its limit" if soft is None else f"the soft limit of {degrees(soft):.2f} deg that was set"
         beyond = f"{degrees(best.excess):.1f} deg beyond {limit}"
         if best.excess < _AT_LIMIT:

@@ -19,7 +19,7 @@ from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, KinematicsError
-from rcilab.core.spatial import Pose, rotation_from_wxyz, turn_between, wxyz_from_rotation
+from rcilab.core.spatial import Pose, rotation_between, rotation_from_wxyz, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
@@ -133,7 +133,7 @@ class CartesianGenerator:
             return  # It is refused like any other command that is no pose.
         rotation, position = self._pose.parts
         translation = dist(position, (x, y, z))
-        turn = hypot(*turn_between(rotation, pose.parts[0]))
+        turn = hypot(*rotation_between(rotation, pose.parts[0]))
         lag = remainder(psi - self._psi, tau)
         if not (translation or turn or lag):
             return

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rcilab.core.arrays import JointVector
 from rcilab.core.limits import Limits
-from rcilab.core.safety_box import EntryBox, SafetyBox, active_box, box_from
+from rcilab.core.safety_box import EntryBox, SafetyBox, active_box, box_for_start
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import range_from
@@ -44,7 +44,7 @@ class MotionLimits:
 
     def entry_box(self) -> SafetyBox | EntryBox | None:
         """Returns what bounds the tool; where it starts outside the box, it may only move in."""
-        return box_from(self.box, *(pose.parts[1] for pose in self.starts))
+        return box_for_start(self.box, *(pose.parts[1] for pose in self.starts))
 
 
 def build_motion_limits(

@@ -17,7 +17,7 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
-from rcilab.core.rotation import nine
+from rcilab.core.rotation import as_rotation9
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode
@@ -199,4 +199,4 @@ def _describe_torques(tau: Array) -> str:
 
 def _pose(T: Array) -> Pose:
     x, y, z = T[:3, 3].tolist()
-    return Pose.from_parts(nine(T[:3, :3]), (x, y, z))
+    return Pose.from_parts(as_rotation9(T[:3, :3]), (x, y, z))

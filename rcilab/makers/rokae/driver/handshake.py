@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
-from rcilab.core.spatial import IDENTITY, as_pose, turn_between
+from rcilab.core.spatial import IDENTITY, as_pose, rotation_between
 from rcilab.makers.rokae.driver.address import RciAddress
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
@@ -59,7 +59,7 @@ def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
     tool = flange.inverse() @ as_pose(state.T_base_tool_c)
     mine = model.T_flange_tool
     off = float(np.linalg.norm(tool.position - mine.position))
-    turned = math.hypot(*turn_between(tool.parts[0], mine.parts[0]))
+    turned = math.hypot(*rotation_between(tool.parts[0], mine.parts[0]))
     if off < _SAME_TOOL and turned < _SAME_TOOL:
         return model
     if not mine.is_close(IDENTITY, 0.0):

@@ -93,7 +93,7 @@ def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box:
         places = path[np.isfinite(path).all(axis=1)].tolist()
         if places:
             entered = EntryBox(box, places[0])
-            passed += map(entered.passed_face, places)
+            passed += map(entered.exceeded_face, places)
     if not passed:
         return ""
     _, face, beyond = max(passed)

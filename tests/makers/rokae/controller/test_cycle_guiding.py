@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.spatial import turn_between
+from rcilab.core.spatial import rotation_between
 from rcilab.core.state import RobotMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.state_machine import Event, Phase
@@ -20,7 +20,7 @@ TRANSLATION, ROTATION, FREE = rci.DragType
 
 
 def turned(before: np.ndarray, after: np.ndarray) -> float:
-    return math.hypot(*turn_between(tuple(before[:3, :3].ravel()), tuple(after[:3, :3].ravel())))
+    return math.hypot(*rotation_between(tuple(before[:3, :3].ravel()), tuple(after[:3, :3].ravel())))
 
 
 def drag(hand, space: int, kind: int, wrench: tuple[float, ...], cycles: int = 500) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.core.spatial import IDENTITY, Pose, turn_between
+from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 from rcilab.makers.rokae import wire as rci
 from rcilab.motion.joint import plan_joint
 from rcilab.sim.filters import LowPass, PoseLowPass, low_pass_gain
@@ -37,7 +37,7 @@ def test_a_pose_is_filtered_in_position_orientation_and_arm_angle_alike() -> Non
     pose, psi = low_pass.step(goal, -3.1)
     gain = low_pass_gain(100.0)
     assert np.allclose(pose.position, gain * goal.position, rtol=0, atol=1e-15)
-    assert math.hypot(*turn_between(IDENTITY.parts[0], pose.parts[0])) == pytest.approx(gain * 0.5, rel=1e-12)
+    assert math.hypot(*rotation_between(IDENTITY.parts[0], pose.parts[0])) == pytest.approx(gain * 0.5, rel=1e-12)
     assert psi == pytest.approx(3.1 + gain * (math.tau - 6.2), rel=1e-12)  # The short way, through pi.
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.core.spatial import Pose, turn_between
+from rcilab.core.spatial import Pose, rotation_between
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.faults import Fault
@@ -86,7 +86,7 @@ def test_a_turn_of_the_tool_is_followed_through_the_tool_that_was_set(make_hand,
         T[:3, :3] = T[:3, :3] @ Pose.from_rpy((0, 0, 0), (angle, 0, 0)).rotation
         hand.pose(T)
     assert hand.state.faults == ()
-    turn = turn_between(tuple(start[:3, :3].ravel()), tuple(hand.state.T_base_tool_c.rotation.ravel()))
+    turn = rotation_between(tuple(start[:3, :3].ravel()), tuple(hand.state.T_base_tool_c.rotation.ravel()))
     assert math.hypot(*turn) == pytest.approx(0.4, abs=1e-9)
     assert np.allclose(hand.state.T_base_tool_c.position, start[:3, 3], rtol=0, atol=1e-12)
 
