@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message
 from rcilab.makers.maker import Feature, capabilities_of, find_lack
 
@@ -20,7 +20,7 @@ def tell_lack(model: RobotModel, feature: Feature) -> Message | None:
     lack = find_lack(model, feature)
     if lack is None:
         return None
-    said = tell(lack)
+    said = describe_error(lack)
     assert isinstance(said, Message)  # Every lack has a code.
     return said
 

@@ -15,7 +15,7 @@ from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel
 
@@ -125,7 +125,7 @@ def make_plan(
         motion = _go(model, start, goal, speed, law, kind, via)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
-        return message("plan.failed", error=tell(error))
+        return message("plan.failed", error=describe_error(error))
     away = int(np.abs(motion.goal - goal).argmax())
     note = None
     if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
@@ -142,7 +142,7 @@ def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None =
         motion = plan_recovery(model, start, box)
         report = check(motion, model, start=start, box=box, distance=None)
     except RcilabError as error:
-        return message("plan.failed", error=tell(error))
+        return message("plan.failed", error=describe_error(error))
     return build_plan_view(model, motion, report, box)
 
 

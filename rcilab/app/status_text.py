@@ -18,8 +18,8 @@ from rcilab.core.errors import (
     UsageError,
 )
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.i18n.error_messages import tell
-from rcilab.i18n.translator import Finished, Message, Text, message
+from rcilab.i18n.error_messages import describe_error
+from rcilab.i18n.translator import LiteralText, Message, Text, message
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
@@ -56,7 +56,7 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
     if isinstance(error, ConnectionLostError) and status is not None:
         known = status.code in (*_CRASHES, *_LOST) or status.incident is None
         return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
-    return message("notice.error", text=tell(error))
+    return message("notice.error", text=describe_error(error))
 
 
 def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
@@ -67,7 +67,7 @@ def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
         return _tell_loss(code, status)
-    return message("notice.plain", text=Finished(sentence))
+    return message("notice.plain", text=LiteralText(sentence))
 
 
 def tell_status(status: SupervisorStatus) -> Message:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rcilab.i18n import translator as text
 from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES, Language
-from rcilab.i18n.translator import Explains, Message, message
+from rcilab.i18n.translator import Explainable, Message, message
 from rcilab.i18n.units import USUAL, Unit, Units
 
 __all__ = ["LANGUAGES", "Message", "Text", "load_catalogue", "message"]
@@ -29,7 +29,7 @@ class Text(text.Text):
     def __init__(self, language: str, units: Units = USUAL) -> None:
         super().__init__(language, _PAGE, units)
 
-    def _explain(self, said: Explains) -> str:
+    def _explain(self, said: Explainable) -> str:
         return said.explain(self.language, self.units)
 
     def unit(self, usual: str) -> Unit:

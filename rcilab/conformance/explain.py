@@ -11,7 +11,7 @@ from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
 from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
-from rcilab.i18n.rounding import amount
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:
@@ -254,16 +254,16 @@ def _link(number: int, voice: _Voice) -> str:
 def _amounts(row: Condition, value: float, bound: float, voice: _Voice) -> tuple[str, str]:
     """Returns value and bound with units, with as few digits as show that they differ."""
     if voice.units is not None:
-        first, second = voice.units.numbers(row.unit, value, bound)
+        first, second = voice.units.format_numbers(row.unit, value, bound)
         return _with_unit(row, first, voice.units, voice), _with_unit(row, second, voice.units, voice)
-    texts = amount(value, bound)
+    texts = format_pair(value, bound)
     first, second = (_in_unit(row, number, text, voice) for number, text in zip((value, bound), texts, strict=True))
     return first, second
 
 
 def _one(row: Condition, value: float, voice: _Voice) -> str:
     if voice.units is not None:
-        return _with_unit(row, voice.units.numbers(row.unit, value)[0], voice.units, voice)
+        return _with_unit(row, voice.units.format_numbers(row.unit, value)[0], voice.units, voice)
     return _in_unit(row, value, f"{value:.4g}", voice)
 
 

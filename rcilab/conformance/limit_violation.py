@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition
 from rcilab.core.fault import FaultCode
-from rcilab.i18n.rounding import amount
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.translator import Remark
 
 
@@ -37,7 +37,7 @@ class LimitViolation(NamedTuple):
             return f"{row.location(0)}: {row.quantity} is improper, out of reach or singular"
         if row.signal == "elbow_sign":
             return f"{row.location(0)}: it is flipped to the other side than at the start"
-        value, bound = amount(self.value, self.bound, least=6)
+        value, bound = format_pair(self.value, self.bound, min_digits=6)
         return f"{row.location(self.axis)}: {row.quantity} {value} {row.unit} passes {bound} {row.unit}"
 
     @property

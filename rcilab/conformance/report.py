@@ -17,8 +17,8 @@ from rcilab.core.clearance import LinkPair
 from rcilab.core.condition import Condition, Necessity
 from rcilab.core.errors import ConformanceError
 from rcilab.core.fault import FaultCode
-from rcilab.i18n.localized_text import language as notebook_language
-from rcilab.i18n.rounding import amount
+from rcilab.i18n.notebook_language import language as notebook_language
+from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.units import Units
 from rcilab.motion.motion import Motion
 
@@ -106,7 +106,7 @@ class ConditionResult:
         if self.condition.signal == "position":
             return f"{self.shown[0]:.4g}", "0", used
         if self.condition.stage == "throughout":
-            return *amount(self.value, self.bound), used
+            return *format_pair(self.value, self.bound), used
         return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
 
     @property
@@ -187,7 +187,7 @@ class Violation:
     def _what(self) -> str:
         """Returns quantity, value and bound in words."""
         row = self.condition
-        value, bound = amount(self.value, self.bound)
+        value, bound = format_pair(self.value, self.bound)
         if row.stage != "throughout":
             return f"{row.quantity} is {value} {row.unit}, not 0"
         if row.signal == "position":

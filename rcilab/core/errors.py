@@ -86,7 +86,7 @@ class PlanningError(RcilabError):
     """No motion can be planned for this request.
 
     Attributes:
-        share: Point where the path cannot be followed, as a fraction of its length, 0 to 1; None if no point is to blame.
+        share: Point at which a path cannot be followed, as a fraction of its length, 0 to 1; None without such a point.
         waypoint: Number of the program's waypoint whose segment fails, from 1; None without a program.
     """
 

@@ -1,1 +1,1 @@
-"""What page and notebook say in the same words, and how they read what people type."""
+"""Texts, units and number input that the page, the notebook and the command line share."""

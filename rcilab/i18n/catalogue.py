@@ -1,7 +1,7 @@
-"""Catalogues of texts: one gettext file a room, with the English text and its translation side by side.
+"""Catalogues of texts: one gettext file per package, with the English text and its translation side by side.
 
-`catalogues/zh.po` of a package has an entry a text: `msgctxt` is the key, `msgid` the English text, `msgstr` the
-Chinese one. Variables are `{name}`, filled by `str.format`.
+`catalogues/zh.po` of a package has one entry per text: `msgctxt` is the key, `msgid` the English text, `msgstr` the
+Chinese one. Variables are written `{name}` and filled in by `str.format`.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ from types import MappingProxyType
 from rcilab.i18n.locale import Language
 
 SHARED = "rcilab.i18n"
-"""The package whose catalogue every user interface has."""
+"""The package whose catalogue every user interface loads."""
 MAKERS = tuple(
     f"rcilab.makers.{file.parents[1].name}"
     for file in sorted(Path(__file__).parents[1].glob("makers/*/catalogues/zh.po"))
 )
-"""The packages of the makers: names of faults, parameters, conditions. Found by folder, as nothing here imports one."""
+"""The packages of the makers, with names of faults, parameters and conditions. Found by folder, because this package
+does not import them."""
 
 
 @lru_cache
 def load_catalogue(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all texts of a package in one language by key.
+    """Returns all texts of a package in one language, by key.
 
     Args:
-        package: Such as rcilab.app; its folder `catalogues` holds the file.
+        package: Name of the package, such as rcilab.app; its folder `catalogues` holds the file.
         language: "en" or "zh".
     """
     column = 0 if language == "en" else 1
@@ -37,20 +38,20 @@ def load_catalogue(package: str, language: Language) -> Mapping[str, str]:
 
 @lru_cache
 def load_ui_catalogue(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all texts of one language that a user interface has: the shared ones, the makers' and its own."""
+    """Returns all texts of a user interface in one language: the shared ones, those of the makers and its own."""
     return merge_catalogues((SHARED, *MAKERS, package), language)
 
 
 @lru_cache
 def merge_catalogues(packages: tuple[str, ...], language: Language) -> Mapping[str, str]:
-    """Returns all texts of several packages; where two have the same key, that of the later one."""
+    """Returns all texts of several packages; of two with the same key, the later one."""
     return MappingProxyType({k: text for package in packages for k, text in load_catalogue(package, language).items()})
 
 
 @lru_cache
 def _read(package: str) -> Mapping[str, tuple[str, str]]:
-    """Returns English text and translation by key."""
-    from babel.messages.pofile import read_po  # 30 ms, which a process that shows no text does not spend.
+    """Returns English text and translation, by key."""
+    from babel.messages.pofile import read_po  # Takes 30 ms; many processes show no text.
 
     with (files(package) / "catalogues" / "zh.po").open("rb") as file:
         return {

@@ -1,4 +1,4 @@
-"""What went wrong, as a message: in the words of the catalogues where the error says which."""
+"""Messages for errors and notes: texts of the catalogues where the error has a code, else its English text."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from functools import reduce
 from typing import Any
 
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.i18n.translator import Amount, Finished, Message, Remark, message
+from rcilab.i18n.translator import ComparedValue, LiteralText, Message, Remark, message
 
 _NAMES = frozenset({"status", "kind", "condition", "feature"})
-"""Facts that are names with words of their own: the answer to a command, the type of a waypoint, a condition, a feature
-that an arm lacks."""
+"""Facts whose values have their own catalogue entries: the reply to a command, the type of a waypoint, a condition, a
+feature that an arm does not have."""
 _REQUIREMENTS = frozenset(
     {
         "span", "least", "rounds", "missing", "missing_beside", "unknown", "axes", "turns", "no_unit", "beyond",
@@ -21,56 +21,57 @@ _REQUIREMENTS = frozenset(
         "table_order",
     }
 )  # fmt: skip
-"""What a value has to be, and is not: said alone, these name it first."""
-_PLACES = {"waypoint": "waypoint_error", "way": "way_error", "way_to_start": "way_error", "blend": "way_error"}
-"""What is not about a target: a waypoint of a program, or the way to one; and where its words for what is in
-`_ADVISING` are."""
-_ADVISING = frozenset({"too_far", "too_close", "no_angles", "joint_beyond", "joint_beyond_soft", "no_motion"})
-"""Reasons whose words say what to do with the target."""
-_SHOWN = 40  # Characters of a value that is repeated.
+"""Codes of requirements on a value; their messages begin with the name of the value."""
+_SCOPES = {"waypoint": "waypoint_error", "way": "way_error", "way_to_start": "way_error", "blend": "way_error"}
+"""Prefix of the keys for the reasons in `_WITH_ADVICE`, by the code of the error that contains the reason: a waypoint,
+or the path to one."""
+_WITH_ADVICE = frozenset({"too_far", "too_close", "no_angles", "joint_beyond", "joint_beyond_soft", "no_motion"})
+"""Reasons whose messages advise what to do with the target, the waypoint or the path."""
+_MAX_SHOWN = 40  # Characters of a value in a message.
 
 
-def tell(error: RcilabError) -> Message | Finished:
-    """Returns an error for a face to say; one without a code keeps its English sentence, in the units of the face."""
-    said = _tell_reason(error)
+def describe_error(error: RcilabError) -> Message | LiteralText:
+    """Returns the message for an error; without a code its English text."""
+    reason = _describe_reason(error)
     if isinstance(error, InvalidValueError) and error.code in _REQUIREMENTS:
         value = str(error.value)
-        shown = value if len(value) <= _SHOWN else value[: _SHOWN - 1] + "…"
-        return message("value.unfit", name=error.name, value="" if error.value is None else shown, reason=said)
-    return said
+        shown = value if len(value) <= _MAX_SHOWN else value[: _MAX_SHOWN - 1] + "…"
+        return message("value.unfit", name=error.name, value="" if error.value is None else shown, reason=reason)
+    return reason
 
 
-def tell_note(note: str) -> Message | Finished:
-    """Returns what a planner or a controller remarks; a note without a code keeps its English sentence."""
+def describe_note(note: str) -> Message | LiteralText:
+    """Returns the message for a note of a planner or a controller; without a code its English text."""
     if not (isinstance(note, Remark) and note.code):
-        return Finished(note)
+        return LiteralText(note)
     if len(note.parts) != 1:
-        parts = [tell_note(part) for part in note.parts] or [Finished(note)]
-        return reduce(_both, reversed(parts))
+        parts = [describe_note(part) for part in note.parts] or [LiteralText(note)]
+        return reduce(_join, reversed(parts))
     facts: dict[str, Any] = {
-        name: tell_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()
+        name: describe_note(fact) if isinstance(fact, Remark) else fact for name, fact in note.facts.items()
     }
     if "unit" in facts:
         value, bound, unit = float(facts["value"]), float(facts["bound"]), str(facts.pop("unit"))
-        facts |= {"value": Amount(value, bound, unit), "bound": Amount(bound, value, unit)}
-    return message(f"remark.{note.code}", **_named(facts))
+        facts |= {"value": ComparedValue(value, bound, unit), "bound": ComparedValue(bound, value, unit)}
+    return message(f"remark.{note.code}", **_with_names(facts))
 
 
-def _both(second: Message | Finished, first: Message | Finished) -> Message | Finished:
+def _join(second: Message | LiteralText, first: Message | LiteralText) -> Message | LiteralText:
     return message("remark.both", first=first, second=second)
 
 
-def _tell_reason(error: RcilabError, about: str = "error") -> Message | Finished:
+def _describe_reason(error: RcilabError, scope: str = "error") -> Message | LiteralText:
     if not error.code:
-        return Finished(str(error))
-    inner = _PLACES.get(error.code, about)
+        return LiteralText(str(error))
+    inner = _SCOPES.get(error.code, scope)
     facts = {
-        name: _tell_reason(fact, inner) if isinstance(fact, RcilabError) else fact for name, fact in error.facts.items()
+        name: _describe_reason(fact, inner) if isinstance(fact, RcilabError) else fact
+        for name, fact in error.facts.items()
     }
-    return message(f"{about if error.code in _ADVISING else 'error'}.{error.code}", **_named(facts))
+    return message(f"{scope if error.code in _WITH_ADVICE else 'error'}.{error.code}", **_with_names(facts))
 
 
-def _named(facts: Mapping[str, object]) -> dict[str, object]:
-    """Returns facts with names that have words of their own put into words."""
+def _with_names(facts: Mapping[str, object]) -> dict[str, object]:
+    """Returns the facts, with those in `_NAMES` replaced by messages."""
     names = {name: message(f"{name}.{str(facts[name]).replace(' ', '_')}") for name in _NAMES & facts.keys()}
     return {**facts, **names}

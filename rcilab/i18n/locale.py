@@ -12,14 +12,14 @@ Language: TypeAlias = Literal["en", "zh"]
 """English or Chinese."""
 
 LANGUAGES: Mapping[str, str] = MappingProxyType({"en": "English", "zh": "中文"})
-"""What each calls itself."""
+"""Name of each language in that language."""
 
 
 def require_language(language: str) -> Language:
-    """Returns the language if there is one of this name.
+    """Returns `language` if the user interfaces have it.
 
     Raises:
-        InvalidValueError: It does not exist; the message lists those that do.
+        InvalidValueError: They do not; the message lists the languages.
     """
     if language not in LANGUAGES:
         raise InvalidValueError("language", language, f"is unknown; known: {', '.join(LANGUAGES)}")

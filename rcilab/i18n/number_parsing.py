@@ -1,6 +1,6 @@
-"""Numbers as people type them. Every answer is a value or a sentence, never an exception.
+"""Parsing of typed numbers. The result is a value or a message, never an exception.
 
-Why not viser's own number boxes: they turn a typed "-0.25" into "+0.25" and send every key.
+viser's own number fields are not used: they turn a typed "-0.25" into "+0.25" and send every key press.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from dataclasses import dataclass
 
 from rcilab.i18n.translator import Message, message
 
-_TWO_WAYS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-"""A comma that is a decimal comma to some and groups thousands for others, such as 1,000."""
+_AMBIGUOUS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+"""A number whose comma can be a decimal comma or a thousands separator, such as 1,000."""
 _UNITS: dict[str, dict[str, float]] = {
     "deg": {"deg": 1.0, "°": 1.0, "rad": math.degrees(1.0)},
     "mm": {"mm": 1.0, "m": 1000.0},
 }
-"""What may stand behind a number, and how many of the field's own unit it is; longer names first."""
-_LONGEST = 40  # Characters; no number is longer on purpose.
+"""Units accepted after a number, by the field's unit, each in the field's unit; longer names first."""
+_MAX_LENGTH = 40  # Characters; longer than any number that is meant as one.
 
 
 @dataclass(frozen=True)
 class Parsed:
-    """A number, or why the text is not one."""
+    """A number, or the reason why the text is not a valid one."""
 
     value: float | None
     problem: Message | None = None
@@ -34,25 +34,25 @@ def parse_number(
 ) -> Parsed:
     """Returns the number in a typed text.
 
-    Accepts a decimal comma, a typographic minus and a unit behind the number, in which it then counts; where a
-    comma may as well group thousands, the answer asks which is meant.
+    Accepts a decimal comma, a typographic minus sign, and a unit after the number, from which it is converted. An
+    ambiguous comma is rejected with a message that lists both readings.
 
     Args:
-        typed: As it stands in the field.
+        typed: Content of the field.
         low: Smallest number allowed, in the unit of the field.
         high: Largest number allowed.
         unit: The unit of the field, such as "deg".
-        soft_low: Whether the smallest is a soft limit of a joint.
-        soft_high: Whether the largest is one.
+        soft_low: Whether `low` is a soft limit of a joint.
+        soft_high: Whether `high` is one.
     """
     shown = typed.strip()
-    shown = shown if len(shown) <= _LONGEST else shown[: _LONGEST - 1] + "…"
-    plain = typed.strip()[: 10 * _LONGEST].replace("−", "-").replace("–", "-")
-    behind = next((name for name in _UNITS.get(unit, {unit: 1.0}) if name and plain.endswith(name)), "")
-    plain = plain.removesuffix(behind).strip()
+    shown = shown if len(shown) <= _MAX_LENGTH else shown[: _MAX_LENGTH - 1] + "…"
+    plain = typed.strip()[: 10 * _MAX_LENGTH].replace("−", "-").replace("–", "-")
+    suffix = next((name for name in _UNITS.get(unit, {unit: 1.0}) if name and plain.endswith(name)), "")
+    plain = plain.removesuffix(suffix).strip()
     if not plain:
         return Parsed(None, message("parse.empty", bounds=_bounds(low, high, unit)))
-    if _TWO_WAYS.fullmatch(plain):
+    if _AMBIGUOUS.fullmatch(plain):
         return Parsed(
             None, message("parse.two_ways", typed=shown, point=plain.replace(",", "."), whole=plain.replace(",", ""))
         )
@@ -66,7 +66,7 @@ def parse_number(
         return Parsed(None, message("parse.garbage", typed=shown, unit=unit))
     if not math.isfinite(value):
         return Parsed(None, message("parse.not_finite", typed=shown, unit=unit))
-    value *= _UNITS.get(unit, {}).get(behind, 1.0)
+    value *= _UNITS.get(unit, {}).get(suffix, 1.0)
     if (soft_low and value < low) or (soft_high and value > high):
         limit = math.radians(low if value < low else high)
         return Parsed(None, message("parse.range_soft", typed=shown, bounds=_bounds(low, high, unit), limit=limit))
@@ -84,7 +84,7 @@ def _bounds(low: float, high: float, unit: str) -> Message:
 
 @dataclass(frozen=True)
 class ParsedQuaternion:
-    """A unit quaternion, wxyz, or why the text is not one."""
+    """A unit quaternion, wxyz, or the reason why the text is not a valid one."""
 
     value: tuple[float, ...] | None
     problem: Message | None = None
@@ -93,9 +93,9 @@ class ParsedQuaternion:
 def parse_quaternion(typed: str) -> ParsedQuaternion:
     """Returns the orientation typed as four numbers w x y z, normalised.
 
-    Between the numbers stand blanks, semicolons or commas; decimal commas only where blanks or semicolons part them.
+    The separators are blanks, semicolons or commas; decimal commas are accepted only with blanks or semicolons.
     """
-    plain = typed.strip()[: 8 * _LONGEST].strip("()[]{} ")
+    plain = typed.strip()[: 8 * _MAX_LENGTH].strip("()[]{} ")
     parts = [part.rstrip(",") for part in re.split(r"[\s;]+", plain) if part.strip(",")]
     if len(parts) == 1:
         parts = [part for part in plain.split(",") if part]

@@ -1,4 +1,4 @@
-"""Words of a face of the program: one catalogue a language, found by key, filled with values."""
+"""Messages and their rendering in the language and the units of a user."""
 
 from __future__ import annotations
 
@@ -16,46 +16,51 @@ _STOPS = (".", "。")
 
 
 @runtime_checkable
-class Explains(Protocol):
-    """What can be among the values of a message and has words of its own: a violation, an exhibit's line."""
+class Explainable(Protocol):
+    """A value of a message that renders itself, such as a violation."""
 
     def explain(self, language: Language, units: Units | None = None) -> str:
-        """Returns itself in words."""
+        """Returns the text of this value."""
         ...
 
 
 @dataclass(frozen=True)
-class Finished:
-    """An English sentence of the library that has no text in the catalogues; it stays as it is."""
+class LiteralText:
+    """An English text without a catalogue entry; it is shown as it is."""
 
     sentence: str
 
     def explain(self, language: Language, units: Units | None = None) -> str:
-        """Returns the sentence."""
+        """Returns the text."""
         return self.sentence
 
 
 @dataclass(frozen=True)
-class Amount:
-    """A value of a condition beside the one it is compared with, both of an SI unit."""
+class ComparedValue:
+    """A value together with the one it is compared with, both in an SI unit."""
 
     value: float
     other: float
     unit: str
 
     def explain(self, language: Language, units: Units | None = None) -> str:
-        """Returns it with its unit and as few digits as show that it differs from the other; without units in SI."""
+        """Returns the value with its unit, with the fewest digits that show whether it differs from the other.
+
+        Args:
+            language: Without effect.
+            units: Units of the user; None for SI.
+        """
         shown = units or SI
-        return shown.with_unit(shown.numbers(self.unit, self.value, self.other)[0], self.unit)
+        return shown.with_unit(shown.format_numbers(self.unit, self.value, self.other)[0], self.unit)
 
 
 class Remark(str):
-    """An English sentence that faces can also say in their own words.
+    """An English sentence that user interfaces can also show from their catalogues.
 
     Args:
         sentence: In English.
-        code: Names what it says; its words are `remark.CODE` of the catalogues.
-        facts: What fills them: numbers in SI, with a "unit" for "value" and "bound"; text; or remarks.
+        code: Its catalogue key is `remark.CODE`; "" without an entry.
+        facts: Values of the entry: numbers in SI, with a "unit" for "value" and "bound"; text; or remarks.
     """
 
     code: str
@@ -63,7 +68,7 @@ class Remark(str):
 
     @classmethod
     def all(cls, remarks: Iterable[str]) -> Remark:
-        """Returns several in one line."""
+        """Returns several remarks as one, in one line."""
         parts: list[Remark] = []
         for remark in remarks:
             parts += remark.parts if isinstance(remark, Remark) else (cls(remark),)
@@ -73,30 +78,30 @@ class Remark(str):
 
     @property
     def parts(self) -> tuple[Remark, ...]:
-        """Those that stand in one line here; itself when it is a single one."""
+        """The remarks joined here; the remark itself if it is a single one."""
         if self.code != "all":
             return (self,)
         return tuple(fact for fact in self.facts.values() if isinstance(fact, Remark))
 
     def as_dict(self) -> dict[str, object]:
-        """Returns it as JSON has it; `from_dict` makes it anew."""
+        """Returns the remark as JSON data, for `from_dict`."""
         facts = {name: _as_json(fact) for name, fact in self.facts.items()}
         return {"said": str(self), "code": self.code, "facts": facts}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Remark:
-        """Returns what `as_dict` has written.
+        """Returns the remark from the data of `as_dict`.
 
         Raises:
-            LookupError: It is something else.
-            TypeError: It is something else.
+            LookupError: The data are not valid.
+            TypeError: The data are not valid.
         """
         facts = {
             name: cls.from_dict(fact) if isinstance(fact, dict) else fact for name, fact in content["facts"].items()
         }
         return cls(str(content["said"]), str(content["code"]), **facts)
 
-    def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # The class says it.
+    def __new__(cls, sentence: str, code: str = "", **facts: object) -> Remark:  # noqa: D102  # See the class.
         remark = super().__new__(cls, sentence)
         remark.code, remark.facts = code, facts
         return remark
@@ -104,42 +109,42 @@ class Remark(str):
 
 @dataclass(frozen=True)
 class Message:
-    """Something to say, before it is known in which language."""
+    """A text for a user, before it is rendered in a language."""
 
     code: str
     """Key in the catalogues."""
     values: Mapping[str, object] = field(default_factory=dict)
-    """What the sentence is filled with."""
+    """Values of the variables in the text."""
 
 
-def follow(lead: str, rest: str) -> tuple[str, str]:
-    """Returns a lead and what follows it, with a space between them where the lead's script has one."""
+def with_space(lead: str, rest: str) -> tuple[str, str]:
+    """Returns two texts to be joined, with a space before the second unless the first ends in Chinese."""
     return lead, rest if lead[-1:] >= "\u3000" else f" {rest}"
 
 
 def message(code: str, **values: object) -> Message:
-    """Returns a message by its key and the values that fill it."""
+    """Returns a message from its key and the values of its variables."""
     return Message(code, MappingProxyType(values))
 
 
 def _as_json(fact: object) -> object:
-    """Returns a fact as JSON has it, which knows neither infinity nor nan."""
+    """Returns a fact as JSON data; infinity and NaN, which JSON does not have, as text."""
     if isinstance(fact, Remark):
         return fact.as_dict()
     return str(fact) if isinstance(fact, float) and not math.isfinite(fact) else fact
 
 
 class Text:
-    """The catalogue of one language, called with a key.
+    """The texts of a user interface in one language; call it with a key.
 
     Attributes:
-        language: Which.
-        units: What angles and lengths are shown in.
+        language: "en" or "zh".
+        units: Units of angles and lengths.
 
     Args:
         language: "en" or "zh".
-        package: The package with the texts of this user interface beside the shared ones, such as rcilab.app.
-        units: What angles and lengths are shown in.
+        package: Package with the texts of this user interface, such as rcilab.app; shared texts are added.
+        units: Units of angles and lengths.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
@@ -151,33 +156,29 @@ class Text:
         self._entries = load_ui_catalogue(package, self.language)
 
     def __call__(self, code: str, **values: object) -> str:
-        """Returns the words for a key; the key itself when the catalogue lacks it (a test keeps it complete)."""
+        """Returns the text for a key; the key itself if it is missing (a test keeps the catalogues complete)."""
         entry = self._entries.get(code)
         return code if entry is None else self.units.fill(entry, self._embedded(entry, values))
 
     def has(self, code: str) -> bool:
-        """Returns whether the catalogue knows a key."""
+        """Returns whether the catalogue has a key."""
         return code in self._entries
 
-    def say(self, said: Message) -> str:
-        """Returns a message in this language; what has words of its own among its values is translated first."""
-        return self(said.code, **{name: self._put(value) for name, value in said.values.items()})
-
-    def tell(self, said: Message | Explains) -> str:
-        """Returns what `rcilab.i18n.error_messages` makes of an error or a remark, in this language."""
-        return self.say(said) if isinstance(said, Message) else self._explain(said)
+    def render(self, item: Message | Explainable) -> str:
+        """Returns a message or an explainable value as text; such values inside a message are rendered first."""
+        if not isinstance(item, Message):
+            return self._explain(item)
+        return self(item.code, **{name: self._render_value(value) for name, value in item.values.items()})
 
     @staticmethod
     def _embedded(entry: str, values: Mapping[str, object]) -> Mapping[str, object]:
-        """Returns values as an entry takes them: a finished sentence gives up its full stop where another follows."""
+        """Returns the values for an entry; a value that ends in a full stop loses it where the entry has one."""
         ends = {name: value for name, value in values.items() if isinstance(value, str) and value[-1:] in _STOPS}
         followed = {name: value for name, value in ends.items() if any(f"{{{name}}}{stop}" in entry for stop in _STOPS)}
         return {**values, **{name: value[:-1] for name, value in followed.items()}} if followed else values
 
-    def _put(self, value: object) -> object:
-        if isinstance(value, Message):
-            return self.say(value)
-        return self._explain(value) if isinstance(value, Explains) else value
+    def _render_value(self, value: object) -> object:
+        return self.render(value) if isinstance(value, Message | Explainable) else value
 
-    def _explain(self, said: Explains) -> str:
-        return said.explain(self.language)
+    def _explain(self, item: Explainable) -> str:
+        return item.explain(self.language)

@@ -1,8 +1,7 @@
-"""In which units angles and lengths are shown and typed: the one place that converts them for people.
+"""Units in which angles and lengths are shown and typed: the only conversion for users.
 
-Values of messages are in SI. A variable of a catalogue says its unit, its digits and nothing else: `{angle:rad.1f}` is
-12.3° or 0.215 rad. `{deg:2.9}` and `{mm/s:250}` are numbers that stand in the text itself. Fields are written and
-typed in degrees and millimetres.
+Values of messages are in SI. A variable of a catalogue states its unit and its digits: `{angle:rad.1f}` becomes 12.3°
+or 0.215 rad. `{deg:2.9}` and `{mm/s:250}` are constants in the text. Fields are in degrees and millimetres.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Literal, cast
 
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 
 AngleUnit = Literal["deg", "rad"]
 LengthUnit = Literal["mm", "m"]
@@ -24,7 +23,7 @@ ANGLES: tuple[AngleUnit, ...] = ("deg", "rad")
 LENGTHS: tuple[LengthUnit, ...] = ("mm", "m")
 
 _MORE_DIGITS = {"rad": 2, "m": 3}
-"""Digits behind the point that the larger unit needs to say as much."""
+"""Additional decimals that the larger unit needs for the same resolution."""
 _FIXED = {
     "deg": ("rad", math.pi / 180.0),
     "mm": ("m", 1e-3),
@@ -32,30 +31,30 @@ _FIXED = {
     "mm/s": ("m/s", 1e-3),
     "rad/s²": ("rad/s^2", 1.0),
 }
-"""Variables of the catalogues for numbers of the text itself: SI unit, and how many of it one is."""
+"""Units of constants in the text: SI unit, and the factor to it."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What stands in for degrees or millimetres on this page."""
+    """The unit shown for degrees or for millimetres."""
 
     name: str
     """deg, rad, mm or m."""
     factor: float
-    """How many of it one degree, or one millimetre, is."""
+    """One degree, or one millimetre, in this unit."""
 
     def convert(self, number: str) -> str:
-        """Returns the text of a number in degrees or millimetres in this unit; any other text stays."""
+        """Converts the text of a number in degrees or millimetres to this unit; any other text is unchanged."""
         if self.factor == 1.0:
             return number
         try:
             value = float(number)
         except ValueError:
             return number
-        return fixed(self.factor * value, len(number.partition(".")[2]) + _MORE_DIGITS[self.name])
+        return format_fixed(self.factor * value, len(number.partition(".")[2]) + _MORE_DIGITS[self.name])
 
     def complete(self, typed: str) -> str:
-        """Returns what was typed with this unit behind it, unless it is the usual one or another was typed."""
+        """Appends this unit to a typed number, unless it is the usual unit or a unit was typed."""
         return typed if self.factor == 1.0 or not typed.strip()[-1:].isdigit() else f"{typed.strip()} {self.name}"
 
 
@@ -67,33 +66,33 @@ class Units:
     length: LengthUnit = "mm"
 
     def unit(self, usual: str) -> Unit:
-        """Returns what is shown for "deg" or "mm"; any other unit is shown as it is."""
+        """Returns the unit shown for "deg" or "mm"; any other unit is unchanged."""
         if usual in ("deg", "°") and self.angle == "rad":
             return Unit("rad", math.pi / 180.0)
         if usual == "mm" and self.length == "m":
             return Unit("m", 1e-3)
         return Unit(usual, 1.0)
 
-    def angle_of(self, angle: float, digits: int = 1) -> str:
+    def format_angle(self, angle: float, digits: int = 1) -> str:
         """Returns an angle with its unit, such as "12.3°" or "0.215 rad".
 
         Args:
             angle: [rad].
-            digits: Behind the point, in degrees; radians get two more.
+            digits: Decimals in degrees; radians get two more.
         """
         return self._shown(math.degrees(angle), "deg", digits)
 
-    def length_of(self, length: float, digits: int = 0) -> str:
+    def format_length(self, length: float, digits: int = 0) -> str:
         """Returns a length with its unit, such as "42 mm" or "0.042 m".
 
         Args:
             length: [m].
-            digits: Behind the point, in millimetres; metres get three more.
+            digits: Decimals in millimetres; metres get three more.
         """
         return self._shown(1000.0 * length, "mm", digits)
 
     def from_si(self, unit: str) -> tuple[float, str]:
-        """Returns how many of its unit on the page one SI unit is, and that one's name: of rad/s^2, 57.3 and °/s²."""
+        """Returns factor and name of the unit shown for an SI unit: 57.3 and °/s² for rad/s^2."""
         raised = unit.replace("^2", "²").replace("^3", "³").replace("N m", "N·m")
         if raised == "rad" or raised.startswith("rad/"):
             return (math.degrees(1.0), "°" + raised[3:]) if self.angle == "deg" else (1.0, raised)
@@ -101,11 +100,11 @@ class Units:
             return (1000.0, "m" + raised) if self.length == "mm" else (1.0, raised)
         return 1.0, raised
 
-    def numbers(self, unit: str, *values: float) -> tuple[str, ...]:
-        """Returns numbers of an SI unit in that of the page, with as few digits as show which of them differ.
+    def format_numbers(self, unit: str, *values: float) -> tuple[str, ...]:
+        """Converts numbers from an SI unit and formats them with the fewest digits that show which of them differ.
 
         Args:
-            unit: Such as rad/s^2; a unit of neither angle nor length stays.
+            unit: SI unit, such as rad/s^2; units other than of angle and length are not converted.
             values: In that unit.
         """
         factor, _ = self.from_si(unit)
@@ -118,22 +117,22 @@ class Units:
         return tuple(_EXPONENT.sub(_as_power, text) for text in texts)
 
     def with_unit(self, numbers: str, unit: str) -> str:
-        """Returns what `numbers` has made of an SI unit, and its unit on the page behind."""
+        """Appends the unit shown for an SI unit to the result of `numbers`."""
         return _with_unit(numbers, self.from_si(unit)[1])
 
     def fill(self, entry: str, values: Mapping[str, object] = MappingProxyType({})) -> str:
-        """Returns an entry of a catalogue with its variables filled; numbers of an angle or a length are in SI."""
+        """Fills in the variables of a catalogue entry; angles and lengths are in SI."""
         if "{" not in entry:
             return entry
         return entry.format(**{**_names(self), **{name: _Value(value, self) for name, value in values.items()}})
 
     def format(self, value: object, spec: str) -> str:
-        """Returns a number with its unit, or several.
+        """Formats one or several numbers with their unit.
 
         Args:
-            value: In the SI unit, or a sequence of numbers; two in a sequence of pairs are the ends of a range.
-            spec: Unit, point and digits, such as "rad.1f", "m/s.3g" or "m.1z", which has at most so many; they count
-                in degrees and millimetres, radians and metres get more. A "#" at the end leaves the unit out.
+            value: A number in the SI unit, or a sequence of numbers; a pair inside a sequence is a range.
+            spec: Unit, point and digits, such as "rad.1f", "m/s.3g" or "m.1z" (at most 1 decimal). The digits apply
+                to degrees and millimetres; radians and metres get more. A "#" at the end omits the unit.
         """
         unit, _, form = spec.partition(".")
         numbers = self._digits(value, unit, form.rstrip("#"))
@@ -143,16 +142,16 @@ class Units:
         if isinstance(value, (tuple, list)):
             return between.join(self._digits(one, unit, form, "…") for one in value)
         number, usual, factor = float(cast(float, value)), _scale(USUAL, unit)[0], _scale(self, unit)[0]
-        text = _in_form(usual * number, form)
+        text = _format_number(usual * number, form)
         if factor == usual or not math.isfinite(number):
             return text
         if "e" in text:
             return f"{factor * number:.3g}"
-        return fixed(factor * number, len(text.partition(".")[2]) + _MORE_DIGITS[unit.partition("/")[0]])
+        return format_fixed(factor * number, len(text.partition(".")[2]) + _MORE_DIGITS[unit.partition("/")[0]])
 
     def _shown(self, value: float, usual: str, digits: int) -> str:
         unit = self.unit(usual)
-        return _with_unit(fixed(unit.factor * value, digits + _MORE_DIGITS.get(unit.name, 0)), _sign(unit))
+        return _with_unit(format_fixed(unit.factor * value, digits + _MORE_DIGITS.get(unit.name, 0)), _sign(unit))
 
 
 USUAL = Units()
@@ -162,11 +161,11 @@ SI = Units(angle="rad", length="m")
 _EXPONENT = re.compile(r"(\d[\d.]*)e([+-]\d+)")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LARGE = 1e7
-"""From here on a number has an exponent."""
+"""From this value on, numbers have an exponent."""
 
 
 def plain_number(value: float, digits: int = 4) -> str:
-    """Returns a number with so many digits, without an exponent where it can be read without."""
+    """Formats a number with significant digits; an exponent only below 1e-4 and from `_LARGE` on."""
     text = f"{value + 0.0:.{digits}g}"  # No "-0".
     if "e" not in text or not math.isfinite(value):
         return text
@@ -180,11 +179,11 @@ def _as_power(found: re.Match[str]) -> str:
     return f"10{power}" if float(found[1]) == 1.0 else f"{found[1]}·10{power}"
 
 
-def _in_form(value: float, form: str) -> str:
+def _format_number(value: float, form: str) -> str:
     digits, kind = int(form[:-1]), form[-1]
     if kind == "g":
         return f"{value + 0.0:.{digits}g}"
-    text = fixed(value, digits)
+    text = format_fixed(value, digits)
     return text.rstrip("0").rstrip(".") if kind == "z" and digits else text
 
 
@@ -198,7 +197,7 @@ def _with_unit(text: str, name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Value:
-    """A value of a message: `{name:rad.1f}` formats a number in the units of the user; text stays as it is."""
+    """A value of a message: `{name:rad.1f}` formats a number in the units of the user; text is unchanged."""
 
     value: object
     units: Units
@@ -211,7 +210,7 @@ class _Value:
 
 @dataclass(frozen=True, slots=True)
 class _FixedNumber:
-    """A number that stands in the text itself: `{deg:2.9}`."""
+    """A constant in the text: `{deg:2.9}`."""
 
     unit: str
     scale: float
@@ -223,12 +222,12 @@ class _FixedNumber:
 
 @lru_cache
 def _scale(units: Units, unit: str) -> tuple[float, str]:
-    """Returns `Units.from_si` without computing it again: the page fills hundreds of texts a second."""
+    """Caches `Units.from_si`: the page fills hundreds of texts per second."""
     return units.from_si(unit)
 
 
 @lru_cache
 def _names(units: Units) -> Mapping[str, object]:
-    """Returns the variables that every text has."""
+    """Returns the variables that every text can use."""
     fixed_numbers = {name: _FixedNumber(unit, scale, units) for name, (unit, scale) in _FIXED.items()}
     return MappingProxyType({"in_deg": units.angle, "in_mm": units.length, **fixed_numbers})

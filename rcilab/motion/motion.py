@@ -17,7 +17,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_rows
 from rcilab.i18n.locale import Language
-from rcilab.i18n.localized_text import language
+from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark
 from rcilab.motion import storage
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial

@@ -116,7 +116,7 @@ class FaultPanel(Part):
             details = _exhibit_html(exhibit, text)
         else:
             details = ("" if fault is None else _card_html(fault, text)) + soft(
-                text("fault.private") if obstacle is None else text.say(obstacle)
+                text("fault.private") if obstacle is None else text.render(obstacle)
             )
         write(self._shown_text, said + details)
         self.provoke.disabled = obstacle is not None or self._work.is_busy
@@ -138,7 +138,7 @@ class FaultPanel(Part):
 
     def _take(self, fault: FaultCode, found: FaultDemo | RcilabError) -> None:
         if isinstance(found, RcilabError):
-            self._failed = problem(self.text.say(message("learn.failed", error=tell_error(found))))
+            self._failed = problem(self.text.render(message("learn.failed", error=tell_error(found))))
             return
         self.exhibit = found
         self.fault.value = found.fault

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, PoseName
 from rcilab.core.arrays import JointVector
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
@@ -95,7 +95,7 @@ class JogPanel(Part):
             self._writing = False
         write(self._pose, self._tell_pose())
         reach = state.now.goal.reach
-        write(self._reach, verdict(reach.tone, self.text(f"reach.tone.{reach.tone}"), self.text.say(reach.reason)))
+        write(self._reach, verdict(reach.tone, self.text(f"reach.tone.{reach.tone}"), self.text.render(reach.reason)))
 
     def _tell_pose(self) -> str:
         pose = self.model.forward(self.state.now.goal.q)
@@ -105,7 +105,7 @@ class JogPanel(Part):
         cells = [f"{name} <b>{number:.1f}</b>{unit}" for name, number, unit in zip(names, numbers, units, strict=True)]
         psi = self.state.now.goal.psi
         if psi is not None:
-            cells.append(f"{self.text('jog.arm_angle')} <b>{fixed(math.degrees(psi), 1)}</b>°")
+            cells.append(f"{self.text('jog.arm_angle')} <b>{format_fixed(math.degrees(psi), 1)}</b>°")
         elif self.model.redundancy:
             cells.append(self.text("jog.no_arm_angle"))
         return f'<p class="rl-soft rl-num">{self.text("jog.tool")}: {", ".join(cells)}</p>'

@@ -25,7 +25,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from rcilab.i18n.localized_text import shell
+from rcilab.i18n.notebook_language import shell
 
 Way = Literal["loopback", "proxy", "static"]
 _LOOPBACK = ("127.0.0.1", "localhost", "::1", "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rcilab.i18n.locale import Language
-from rcilab.i18n.localized_text import language
+from rcilab.i18n.notebook_language import language
 
 __all__ = ["answer", "language"]
 

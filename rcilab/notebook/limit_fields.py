@@ -107,7 +107,7 @@ class LimitFields:
     def _propose(self, lower: list[float], upper: list[float]) -> None:
         for low, high in zip(lower, upper, strict=True):
             if not low < high:
-                write(self.said, problem(self._text.say(message("setup.joint_ends", low=low, high=high))))
+                write(self.said, problem(self._text.render(message("setup.joint_ends", low=low, high=high))))
                 return
         self._asked = SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
         now = self._state.now

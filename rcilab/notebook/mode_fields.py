@@ -66,7 +66,7 @@ class ModeFields:
         is_moving = status is not None and status.phase in ("moving", "stopping")
         self.mode.disabled = is_moving or is_only_planned(state.model)
         lack = tell_lack(state.model, state.now.drive.mode)
-        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if lack is None else text.say(lack)))
+        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if lack is None else text.render(lack)))
         for group in self._groups:
             folder, shown = self.folders[group.name], None if state.now.drive.mode in group.modes else "none"
             if folder.layout.display != shown:
@@ -88,7 +88,7 @@ class ModeFields:
     def _tell_held(self, status: SupervisorStatus, pending: bool) -> str:
         state, text = self._state, self._text
         if state.now.drive.refusal is not None:
-            return problem(text("ready.control_refused", error=text.say(state.now.drive.refusal)))
+            return problem(text("ready.control_refused", error=text.render(state.now.drive.refusal)))
         known = state.session is None and state.robot is not None and state.now.is_virtual
         rows = held_rows(self._groups, state.now.drive.mode, status.setup.control, text, is_known=known)
         held = soft(text("control.held")) + table([], [list(row) for row in rows])
@@ -102,7 +102,8 @@ class ModeFields:
         self._ask(PressControl(what="send"))
         notice = self._state.now.notice
         write(
-            self._said, "" if notice is None or notice is before else verdict("warn", "▲", self._text.say(notice.text))
+            self._said,
+            "" if notice is None or notice is before else verdict("warn", "▲", self._text.render(notice.text)),
         )
 
     def _ask(self, request: PressControl | SetControl) -> None:
@@ -136,7 +137,7 @@ class ModeFields:
     def _field(self, group: ParameterGroup, index: int) -> NumberField:
         item = group.parameters[index]
         take = partial(self._set_number, group.name, index)
-        name = self._text.say(item.label)
+        name = self._text.render(item.label)
         return NumberField(self._text, name, item.unit, item.low, item.high, take, digits=None, widths=_WIDTHS)
 
     def _fill(self, group: ParameterGroup) -> None:

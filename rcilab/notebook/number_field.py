@@ -8,7 +8,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 from rcilab.i18n.translator import Text
 from rcilab.notebook.style import block, problem, write
 from rcilab.notebook.widget_sharing import lean
@@ -79,7 +79,7 @@ class NumberField:
     def _write(self, value: float | None) -> str:
         if value is None:
             return ""
-        return f"{value:g}" if self._digits is None else fixed(value, self._digits)
+        return f"{value:g}" if self._digits is None else format_fixed(value, self._digits)
 
     def _on_typed(self, change: Any) -> None:
         if change["new"] == self._shown:
@@ -87,7 +87,7 @@ class NumberField:
         parsed = parse_number(change["new"], self._low, self._high, self._unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            write(self.said, problem(self._text.say(parsed.problem)))
+            write(self.said, problem(self._text.render(parsed.problem)))
             return
         write(self.said, "")
         self._shown = change["new"]  # It is what was meant: a rounded number may follow.

@@ -9,7 +9,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.core.closeable import Closeable
-from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.cells import kernel_cells

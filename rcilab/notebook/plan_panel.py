@@ -13,7 +13,7 @@ from rcilab.app.planning import LAWS, Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import RcilabError
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
 from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.number_field import NumberField
@@ -136,7 +136,7 @@ class PlanPanel(Part):
 
     def _take(self, about: Plan | None, found: Plan | Message | SlowDown | RcilabError) -> None:
         if isinstance(found, RcilabError):
-            self.state.show(message("plan.failed", error=tell(found)))
+            self.state.show(message("plan.failed", error=describe_error(found)))
         elif not isinstance(found, SlowDown):
             self.state.show(found)
         elif about is not None and about is self.state.now.plan:  # Else it was planned again.
@@ -154,7 +154,7 @@ class PlanPanel(Part):
         self.plan.disabled = self.slow_down.disabled = self._work.is_busy
         self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
-            said = "" if state.now.no_plan is None else verdict("warn", "▲", text.say(state.now.no_plan))
+            said = "" if state.now.no_plan is None else verdict("warn", "▲", text.render(state.now.no_plan))
             write(self._said, said or soft(text("plan.none", button=text("target.plan"))))
             return
         report = plan.report
@@ -164,7 +164,7 @@ class PlanPanel(Part):
             said += " " + text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
         elif plan.short is not None:
             tone, word = "warn", "target.not_there"
-            said += " " + text("target.leads_short", short=text.say(plan.short))
+            said += " " + text("target.leads_short", short=text.render(plan.short))
         if not state.is_goal_of_plan and plan.short is None:
             said += " " + text("plan.moved")
         write(self._said, verdict(tone, text(word), said) + self._told_of_slowing(plan))

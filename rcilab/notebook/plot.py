@@ -16,7 +16,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
-from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion

@@ -15,7 +15,7 @@ from rcilab.core.arrays import Array, as_vector
 from rcilab.core.atomic_file import replacing
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import InvalidValueError, UsageError
-from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.notebook.kernel_reachability import find_place

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rcilab.conformance.explain import explain_formula, explain_place, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
-from rcilab.i18n.shown import value_against_bound
+from rcilab.i18n.condition_values import value_against_bound
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import Tone, block, esc, soft, verdict, write
 
@@ -41,7 +41,7 @@ class ReportView(Part):
             reason = self.state.now.no_plan
             write(
                 self._verdict,
-                soft(text("plan.none", button=text("target.plan")) if reason is None else text.say(reason)),
+                soft(text("plan.none", button=text("target.plan")) if reason is None else text.render(reason)),
             )
             write(self._rows, "")
             return

@@ -26,7 +26,7 @@ def name_phase(status: SupervisorStatus | None, text: Text) -> str:
 
 def tell_trouble(status: SupervisorStatus | None, text: Text) -> str:
     """Returns why a robot that ought to be there is not; empty where nothing is wrong."""
-    return "" if status is None or status.phase not in ("lost", "crashed") else text.say(tell_status(status))
+    return "" if status is None or status.phase not in ("lost", "crashed") else text.render(tell_status(status))
 
 
 def tell_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
@@ -45,7 +45,7 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
         ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
         ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
         ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
-        ("success", text.say(tell_success(status))),
+        ("success", text.render(tell_success(status))),
         ("rate", f"{status.rate_hz:.0f} Hz"),
     ]
     late = status.lateness
@@ -81,7 +81,7 @@ def outcome_html(
         if outcome.what == "execute":
             return stopped
         why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))
-        return verdict("bad", "✗", text.say(why))
+        return verdict("bad", "✗", text.render(why))
     if run is not None and run.stopped:
         return stopped
     if run is not None and len(run.q):

@@ -256,7 +256,7 @@ class RunPanel(Part):
             self._world.tick(status)
             notice = self.state.now.notice
         if notice is not None and notice is not before:
-            write(self._outcome, problem(self.text.say(notice.text)))
+            write(self._outcome, problem(self.text.render(notice.text)))
 
     def _take_in(self, outcome: Outcome) -> None:
         if outcome.what == "limits":
@@ -276,14 +276,14 @@ class RunPanel(Part):
     def _on_execute(self) -> None:
         reason, plan = _obstacle(self.state), self.state.now.plan
         if reason is not None:
-            write(self._said, problem(self.text.say(reason)))
+            write(self._said, problem(self.text.render(reason)))
             return
         if self.state.now.is_virtual:
             self._move()
             return
         assert plan is not None  # Without one there is an obstacle.
         question = ask_to_move(plan, self.state.now.target)
-        write(self._question, verdict("warn", "▲", self.text.say(question)))
+        write(self._question, verdict("warn", "▲", self.text.render(question)))
         self._answers.layout.display = None
 
     def _move(self) -> None:
@@ -298,7 +298,9 @@ class RunPanel(Part):
                 with self.state.lock:
                     self._requests.execute(plan)
             except PlanningError as error:
-                write(self._outcome, problem(self.text.say(tell_refusal(error, self.state.model, self.state.status))))
+                write(
+                    self._outcome, problem(self.text.render(tell_refusal(error, self.state.model, self.state.status)))
+                )
 
     def _forget_question(self) -> None:
         write(self._question, "")
@@ -330,7 +332,7 @@ class RunPanel(Part):
         )
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))
-        trouble = tell_trouble(status, text) or ("" if reason is None else text.say(reason))
+        trouble = tell_trouble(status, text) or ("" if reason is None else text.render(reason))
         is_cells = isinstance(state.robot, SessionConnection) and state.robot.is_cells
         if is_cells and not self._was_cells:
             write(self._outcome, "")
@@ -377,7 +379,7 @@ class RunPanel(Part):
             try:
                 act()
             except RcilabError as error:
-                write(self._outcome, problem(self.text.say(tell_refusal(error, self.model, self.state.status))))
+                write(self._outcome, problem(self.text.render(tell_refusal(error, self.model, self.state.status))))
 
         button.on_click(press)
         return button

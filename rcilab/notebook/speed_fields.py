@@ -69,7 +69,7 @@ class SpeedFields:
                 self._writing = False
         refusal = self._state.now.drive.override_refusal
         said = "" if not running or status is None else soft(self._tell_way(status, is_held))
-        write(self._way, said + ("" if refusal is None or not running else problem(self._text.say(refusal))))
+        write(self._way, said + ("" if refusal is None or not running else problem(self._text.render(refusal))))
 
     def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
         speed_override = f"{100.0 * status.speed_override:.0f}"

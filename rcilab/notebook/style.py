@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import ipywidgets
 
-from rcilab.i18n.translator import Message, Text, follow
+from rcilab.i18n.translator import Message, Text, with_space
 from rcilab.notebook.widget_sharing import is_shared, lean, once
 
 Tone = Literal["good", "warn", "bad", "none"]
@@ -50,7 +50,7 @@ def write(widget: Any, content: str) -> None:
 
 def verdict(tone: Tone, word: str, rest: str) -> str:
     """Returns a line with a coloured edge: a word that says it all, and the sentence."""
-    lead, follows = follow(word, rest)
+    lead, follows = with_space(word, rest)
     return f'<p class="rl-verdict rl-{tone}" role="status"><b>{esc(lead)}</b>{esc(follows)}</p>'
 
 
@@ -61,7 +61,7 @@ def soft(text: str) -> str:
 
 def why_html(text: Text, why: Message | None) -> str:
     """Returns why something is off, beside it; empty for None."""
-    return "" if why is None else soft(text.say(why))
+    return "" if why is None else soft(text.render(why))
 
 
 def problem(text: str) -> str:

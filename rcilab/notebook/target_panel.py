@@ -114,9 +114,9 @@ class TargetPanel(Part):
             for field, value in zip(self.fields, values, strict=True):
                 field.show(float(value))
             tone = goal.reach.tone
-            said = verdict(tone, text(f"reach.tone.{tone}"), text.say(goal.reach.reason))
+            said = verdict(tone, text(f"reach.tone.{tone}"), text.render(goal.reach.reason))
             if goal.reach.short is not None:
-                said += soft(text("target.leads_short", short=text.say(goal.reach.short)))
+                said += soft(text("target.leads_short", short=text.render(goal.reach.short)))
             write(self._reach, said)
             if self.psi is not None:
                 self._show_arm_angle()

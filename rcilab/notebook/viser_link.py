@@ -7,7 +7,7 @@ import threading
 
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import UsageError
-from rcilab.i18n.localized_text import chosen_language
+from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError, KinematicsError
-from rcilab.i18n.localized_text import chosen_language
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.notebook_language import chosen_language
+from rcilab.i18n.rounding import format_fixed
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.notebook.cells import kernel_cells
@@ -116,7 +116,7 @@ class JointSliders:
         if self._model.redundancy:
             try:
                 psi = math.degrees(self._model.arm_angle(self._q))
-                parts.append(f"{self._text('jog.arm_angle')} {fixed(psi, 1)}°")
+                parts.append(f"{self._text('jog.arm_angle')} {format_fixed(psi, 1)}°")
             except KinematicsError:  # Stretched or straight above the base: there is no elbow to measure.
                 parts.append(self._text("jog.no_arm_angle"))
         self.pose.value = f"<code>{self._text('jog.tool')}: {'; '.join(parts)}</code>"

@@ -17,7 +17,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
-from rcilab.i18n.localized_text import language
+from rcilab.i18n.notebook_language import language
 from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
 from rcilab.recording.export import save_run

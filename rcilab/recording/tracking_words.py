@@ -16,10 +16,10 @@ def error_rows(run: Run, tracking: Tracking, text: Text) -> list[list[str]]:
     """Returns how far joints and tool were from the plan: where, RMS and largest."""
     units = text.units
     pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
-    rows = [[f"J{j}", *(units.angle_of(value, 4) for value in pair)] for j, pair in enumerate(pairs, start=1)]
+    rows = [[f"J{j}", *(units.format_angle(value, 4) for value in pair)] for j, pair in enumerate(pairs, start=1)]
     if run.model is not None:
-        away = [units.length_of(value, 3) for value in (tracking.position_rms, tracking.position_max)]
-        turn = [units.angle_of(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
+        away = [units.format_length(value, 3) for value in (tracking.position_rms, tracking.position_max)]
+        turn = [units.format_angle(value, 4) for value in (tracking.rotation_rms, tracking.rotation_max)]
         rows += [[text("tracking.tool"), *away], [text("tracking.turn"), *turn]]
     return rows
 

@@ -15,7 +15,7 @@ from rcilab.app.request import Request, TypeField
 from rcilab.app.text import Message, Text
 from rcilab.app.view_actions import DropProblem
 from rcilab.core.spatial import Pose
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 from rcilab.i18n.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
@@ -42,7 +42,7 @@ def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> No
 
 def why_html(text: Text, why: Message | None) -> str:
     """Returns why something is off, beside it; empty for None."""
-    return "" if why is None else f'<p class="rl-note rl-why">{esc(text.say(why))}</p>'
+    return "" if why is None else f'<p class="rl-note rl-why">{esc(text.render(why))}</p>'
 
 
 class BoundControl:
@@ -205,7 +205,7 @@ def esc(text: object) -> str:
 
 def shown(number: float) -> str:
     """Returns a number for a field: two decimals, and never "-0.00"."""
-    return fixed(float(number), 2)
+    return format_fixed(float(number), 2)
 
 
 def shown_pose(pose: Pose) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
 from rcilab.core.spatial import Pose
 from rcilab.execution.start_pose_check import describe_start_mismatch
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import Units
@@ -191,11 +191,11 @@ def test_what_goes_wrong_is_said_in_chinese(what):
     with pytest.raises(RcilabError) as caught:
         PROVOKED[what]()
     told = tell_error(caught.value)
-    require_chinese(Text("zh", Units(angle="rad", length="m")).say(told))
+    require_chinese(Text("zh", Units(angle="rad", length="m")).render(told))
     for language, stop in (("zh", "。"), ("en", ".")):
         for code in ("notice.refused", "ready.setup_refused", "ready.control_refused", "learn.failed", "notice.error"):
             values = {"what": "x", "text" if code == "notice.error" else "error": told}
-            said = Text(language, Units(angle="rad", length="m")).say(message(code, **values))
+            said = Text(language, Units(angle="rad", length="m")).render(message(code, **values))
             assert said.endswith(stop), said
             assert not said.endswith(2 * stop), said
 
@@ -218,7 +218,7 @@ def test_why_the_controller_stopped_is_said_in_chinese(what):
     _, back = decode_world_answer(encode_world_answer(status, 1))
     assert isinstance(back, WorldStatus)
     assert back.reason == REASONS[what], "the English sentence stays as it was"
-    require_chinese(Text("zh", Units(angle="rad", length="m")).tell(tell_note(back.reason)))
+    require_chinese(Text("zh", Units(angle="rad", length="m")).render(describe_note(back.reason)))
 
 
 @pytest.mark.parametrize("name", ROBOT_NAMES)
@@ -232,19 +232,19 @@ def test_the_sources_of_limits_are_said_in_chinese(name):
 def test_bad_typed_numbers_are_answered_in_chinese(typed):
     problem = parse_number(typed, -170.0, 170.0, "deg").problem
     assert problem is not None
-    assert not re.search(r"[A-Za-z]{4,}|°", Text("zh", Units(angle="rad")).say(problem))
+    assert not re.search(r"[A-Za-z]{4,}|°", Text("zh", Units(angle="rad")).render(problem))
     problem = parse_quaternion("1 2").problem
     assert problem is not None
-    assert re.search(r"[\u4e00-\u9fff]", Text("zh").say(problem))
+    assert re.search(r"[\u4e00-\u9fff]", Text("zh").render(problem))
 
 
 def test_exports_say_what_is_missing_in_chinese():
     error = MissingExtraError("mcap", "MCAP")
-    said = Text("zh").say(message("export.missing", library=error.library))
+    said = Text("zh").render(message("export.missing", library=error.library))
     assert re.search(r"[\u4e00-\u9fff]", said)
 
 
 def test_what_has_no_text_in_the_catalogues_keeps_its_english_sentence():
     said = tell_error(CertificateError("x")), tell_error(RcilabError("joint 1 is at 0.35 rad"))
-    assert Text("zh").say(said[0]).startswith("未执行")
-    assert Text("zh").say(said[1]) == "joint 1 is at 0.35 rad。"
+    assert Text("zh").render(said[0]).startswith("未执行")
+    assert Text("zh").render(said[1]) == "joint 1 is at 0.35 rad。"

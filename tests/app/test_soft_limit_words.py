@@ -61,7 +61,7 @@ def test_the_page_names_the_soft_limit_of_a_goal(language) -> None:
         "field": parse_number("40", -170.0, 30.0, "deg", soft_high=True).problem,
     }
     for place, message in said.items():
-        words = Text(language).say(message)
+        words = Text(language).render(message)
         assert {"en": "soft limit", "zh": "软限位"}[language] in words, place
         assert "30°" in words or "30.0°" in words, place
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.i18n.translator import Amount
+from rcilab.i18n.translator import ComparedValue
 from rcilab.i18n.units import SI, Unit, Units
 
 
@@ -27,9 +27,9 @@ def test_every_unit_in_a_catalogue_belongs_to_a_variable(language):
 
 def test_sentences_are_said_in_the_units_of_the_page():
     said = message("reach.short", distance=0.042, turn=math.radians(12.5))
-    assert Text("en").say(said) == "42 mm and 12.5°"
-    assert Text("en", SI).say(said) == "0.042 m and 0.218 rad"
-    assert Text("zh", Units(angle="rad")).say(said) == "42 mm、0.218 rad"
+    assert Text("en").render(said) == "42 mm and 12.5°"
+    assert Text("en", SI).render(said) == "0.042 m and 0.218 rad"
+    assert Text("zh", Units(angle="rad")).render(said) == "42 mm、0.218 rad"
     assert Text("en", SI)("jog.pace", tool=0.25, joint=math.radians(30.0)) == "0.250 m/s, 0.52 rad/s"
     assert Text("en", SI)("setup.pose", place=(0.01, -0.0205, 0.0), turns=(math.radians(90.0), 0.0, -0.0)) == (
         "0.010, -0.0205, 0.000 m, 1.57, 0.00, 0.00 rad"
@@ -65,15 +65,15 @@ def test_a_variable_says_its_unit_and_its_digits(value, spec, usual, si):
 
 
 def test_the_same_amounts_of_a_remark_are_said_in_either_unit():
-    amount = Amount(2.31, 2.175, "rad/s")
+    amount = ComparedValue(2.31, 2.175, "rad/s")
     assert amount.explain("en") == "2.31 rad/s"
     assert amount.explain("en", Units()) == "132.4°/s"
-    assert Amount(0.35, 0.35, "N m").explain("en", Units()) == "0.35 N·m"
+    assert ComparedValue(0.35, 0.35, "N m").explain("en", Units()) == "0.35 N·m"
 
 
 def test_a_sentence_inside_a_sentence_is_converted_once():
     said = message("notice.arrived_short", short=message("reach.short", distance=0.042, turn=math.radians(12.5)))
-    assert "0.042 m and 0.218 rad short" in Text("en", SI).say(said)
+    assert "0.042 m and 0.218 rad short" in Text("en", SI).render(said)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_number_counts_in_the_unit_typed_behind_it(typed, unit, value):
 def test_a_number_out_of_range_is_answered_in_the_units_of_the_page():
     problem = parse_number("9 rad", -170.0, 170.0, "deg").problem
     assert problem is not None
-    assert Text("en", SI).say(problem) == "9 rad is outside -2.97 rad to 2.97 rad."
+    assert Text("en", SI).render(problem) == "9 rad is outside -2.97 rad to 2.97 rad."
 
 
 def test_what_is_typed_without_a_unit_counts_in_that_of_the_page():
@@ -112,15 +112,15 @@ def test_other_units_stay():
 
 
 def test_a_bound_that_means_nothing_at_all_is_no_computer_number():
-    assert Units().numbers("rad", 0.0, 1e-9) == ("0", "5.7·10⁻⁸")
-    assert Units().numbers("m", -2.0e-9, 1e-9) == ("-2.0·10⁻⁶", "10⁻⁶")
-    assert Units().numbers("m", 0.1234, 0.5) == ("123.4", "500")
+    assert Units().format_numbers("rad", 0.0, 1e-9) == ("0", "5.7·10⁻⁸")
+    assert Units().format_numbers("m", -2.0e-9, 1e-9) == ("-2.0·10⁻⁶", "10⁻⁶")
+    assert Units().format_numbers("m", 0.1234, 0.5) == ("123.4", "500")
 
 
 def test_two_numbers_that_differ_look_different():
     for units in (SI, Units()):
-        first, second = units.numbers("rad/s", 2.17501, 2.175)
+        first, second = units.format_numbers("rad/s", 2.17501, 2.175)
         assert first != second
-    assert Units().numbers("rad/s^3", 5000.0, 5000.0) == ("286479", "286479")
+    assert Units().format_numbers("rad/s^3", 5000.0, 5000.0) == ("286479", "286479")
     assert Units().with_unit("286479", "rad/s^3") == "286479°/s³"
     assert SI.with_unit("0.02", "m") == "0.02 m"

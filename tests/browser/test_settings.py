@@ -33,8 +33,8 @@ def test_a_warning_stays_beside_later_good_news_and_keeps_its_colour(page):
             page.tab.evaluate(f"Date.now = () => {1e12 + 2000 * at}")
             store.say(tone, news)
             store.changed.set()
-            page.wait(lambda news=news: text.say(news) in page.toast(), "the notice")
-        assert text.say(said[0]) in page.toast()
+            page.wait(lambda news=news: text.render(news) in page.toast(), "the notice")
+        assert text.render(said[0]) in page.toast()
         assert "rl-warn" in page.tab.locator("#rl-toast.rl-shown").get_attribute("class")
     finally:
         page.tab.evaluate("Date.now = () => Math.floor(performance.timeOrigin + performance.now())")

@@ -7,7 +7,7 @@ import pytest
 from rcilab.conformance.check import check
 from rcilab.conformance.html import COLORS
 from rcilab.conformance.report import Report
-from rcilab.i18n.rounding import amount
+from rcilab.i18n.rounding import format_pair
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint
 
@@ -97,7 +97,7 @@ def test_the_table_is_green_amber_or_red():
     ],
 )
 def test_value_and_bound_never_look_alike_when_they_differ(value, bound, texts):
-    assert amount(value, bound) == texts
+    assert format_pair(value, bound) == texts
 
 
 def test_a_violation_shows_itself_as_its_sentence_and_help_names_the_fields():

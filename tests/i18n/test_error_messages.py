@@ -15,9 +15,9 @@ import rcilab
 from rcilab.control_process.messages import as_sendable
 from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
 from rcilab.i18n.catalogue import load_catalogue
-from rcilab.i18n.error_messages import _ADVISING, tell, tell_note
+from rcilab.i18n.error_messages import _WITH_ADVICE, describe_error, describe_note
 from rcilab.i18n.locale import LANGUAGES
-from rcilab.i18n.translator import Finished, Message, Remark, Text
+from rcilab.i18n.translator import LiteralText, Message, Remark, Text
 from rcilab.makers.rokae.wire import GuideStatus, RecoveryStatus, SettingStatus, StartStatus, StopStatus
 
 
@@ -50,10 +50,10 @@ def test_what_a_waypoint_asks_for_is_not_said_of_a_target():
     place = "900, 0, 300"
     for language, target, waypoint in (("en", "target", "waypoint"), ("zh", "目标", "路点")):
         text = Text(language, "rcilab.app")
-        said = {"": text.say(tell(reason))}
+        said = {"": text.render(describe_error(reason))}
         for code, facts in (("waypoint", {}), ("way", {"place": place}), ("blend", {"place": place})):
             error = PlanningError("waypoint 2").coded(code, number=2, kind="line", reason=reason, **facts)
-            said[code] = text.say(tell(error))
+            said[code] = text.render(describe_error(error))
         assert target in said[""]
         assert all(waypoint in said[code] and target not in said[code] for code in ("waypoint", "way", "blend"))
 
@@ -63,7 +63,7 @@ def test_all_that_advises_has_its_words_for_programs_too(about):
     for language in LANGUAGES:
         words = load_catalogue("rcilab.i18n", language)
         found = {key.removeprefix(f"{about}.") for key in words if key.startswith(f"{about}.")}
-        assert found == _ADVISING
+        assert found == _WITH_ADVICE
         for code in found:
             assert places(words[f"{about}.{code}"]) == places(words[f"error.{code}"])
 
@@ -73,7 +73,7 @@ def test_every_refusal_has_words(kind):
     words = load_catalogue("rcilab.i18n", "zh")
     for status in kind:
         if status:
-            said = tell(CommandRejectedError("StartMove", status))
+            said = describe_error(CommandRejectedError("StartMove", status))
             assert isinstance(said, Message)
             assert isinstance(status_said := said.values["status"], Message)
             assert status_said.code in words
@@ -86,24 +86,24 @@ def test_the_english_sentence_stays_and_facts_come_along():
     )
     assert str(error) == "waypoint 2: the arm is moving"
     for same in (error, pickle.loads(pickle.dumps(as_sendable(error))), pickle.loads(pickle.dumps(error))):
-        said = tell(same)
+        said = describe_error(same)
         assert isinstance(said, Message)
         assert (said.code, said.values["number"]) == ("error.waypoint", 2)
-        assert said.values["reason"] == tell(inner)
-        assert Text("zh", "rcilab.i18n").say(said) == "路点 2（直线）：机械臂正在运动：请先停止，或等待到达"
-    assert tell(RcilabError("nobody named this")) == Finished("nobody named this")
+        assert said.values["reason"] == describe_error(inner)
+        assert Text("zh", "rcilab.i18n").render(said) == "路点 2（直线）：机械臂正在运动：请先停止，或等待到达"
+    assert describe_error(RcilabError("nobody named this")) == LiteralText("nobody named this")
 
 
 def test_a_note_keeps_its_words_in_a_file_of_its_own():
     note = Remark("line 2: blend shortened", "blend", number=2, asked=0.05, radius=0.01)
     back = pickle.loads(pickle.dumps(note))
-    said = tell_note(back)
+    said = describe_note(back)
     assert isinstance(said, Message)
     assert said.values["radius"] == pytest.approx(0.01)
     assert set(said.values) == {
         name for _, name, _, _ in Formatter().parse(load_catalogue("rcilab.i18n", "en")[said.code]) if name
     }
-    assert tell_note("plain") == Finished("plain")
+    assert describe_note("plain") == LiteralText("plain")
 
 
 def test_many_remarks_in_one_line_grow_with_their_number_and_are_said_in_every_language():
@@ -116,7 +116,7 @@ def test_many_remarks_in_one_line_grow_with_their_number_and_are_said_in_every_l
     assert back == whole
     assert back.parts == whole.parts
     for language in ("en", "zh"):
-        said = Text(language, "rcilab.i18n").say(tell_note(whole))
+        said = Text(language, "rcilab.i18n").render(describe_note(whole))
         assert said.count("40") == 1
         assert said.endswith("and so on")
     assert Remark.all([]) == ""

@@ -56,7 +56,7 @@ def test_everything_else_is_answered_with_a_sentence(typed, code):
     assert parsed.problem is not None
     assert parsed.problem.code == code
     for language in ("en", "zh"):
-        assert "{" not in Text(language).say(parsed.problem).replace(typed, "")
+        assert "{" not in Text(language).render(parsed.problem).replace(typed, "")
 
 
 @given(st.text(max_size=200))

@@ -122,8 +122,8 @@ def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: 
     for feature in set(FEATURES) - there:
         said = tell_lack(model, feature)
         assert said is not None
-        assert model.name in Text("zh").say(said)
-        assert Text("en").say(said) != Text("zh").say(said)
+        assert model.name in Text("zh").render(said)
+        assert Text("en").render(said) != Text("zh").render(said)
 
 
 def test_an_arm_that_is_only_planned_says_what_can_be_done_with_it():
@@ -149,7 +149,7 @@ def test_a_controller_without_a_feature_is_named_with_it(monkeypatch: pytest.Mon
             require_feature(model, feature)
         said = tell_lack(model, feature)
         assert said is not None
-        assert name in Text("en").say(said)
+        assert name in Text("en").render(said)
     assert require_feature(model, "joint_position") is model
     for has, error in (({"drives": False}, "no driver"), ({"simulates": False}, "no virtual controller")):
         monkeypatch.setattr(type(maker), "capabilities", replace(lacking, **has))

@@ -9,7 +9,7 @@ from rcilab import SafetyBox, check, load_model, plan_recovery
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import PlanningError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Text
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.bounds import limit_touched
@@ -26,7 +26,7 @@ def beyond(model, degrees, joint=0):
 
 def in_both(error):
     """Returns the words of an error, English and Chinese."""
-    return "\n".join(Text(language, "rcilab.app").say(tell(error)) for language in ("en", "zh"))
+    return "\n".join(Text(language, "rcilab.app").render(describe_error(error)) for language in ("en", "zh"))
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -246,7 +246,7 @@ def test_an_address_is_named_once_more_and_preview_connects_to_nothing(idle):
     wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question again")
     ask(ChooseDestination(where="address", address="999.1.1.1"))
     wait(lambda: told(idle) == "address.bad", "the complaint")
-    assert "is not a valid controller address" in Text("en").say(idle.store.state.notice.text)
+    assert "is not a valid controller address" in Text("en").render(idle.store.state.notice.text)
     assert idle.store.state.typed_address == "", "the question was about another address"
     ask(ChooseDestination(where="address", address="rci://127.0.0.1:9"))
     wait(lambda: idle.store.state.typed_address == "rci://127.0.0.1:9", "the question again")

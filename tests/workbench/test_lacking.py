@@ -75,7 +75,9 @@ def test_the_parts_that_are_lacking_are_off_on_the_setup_tab_and_the_others_are_
         assert {disabled(field._handle) for field in panel._fields[part]} == {is_off}
         assert disabled(panel._seen[part].handle) is is_off
         lack = tell_lack_of_part(MODEL, part)
-        assert panel._lacks[part]._shown == ("" if lack is None else f'<p class="rl-note rl-why">{text.say(lack)}</p>')
+        assert panel._lacks[part]._shown == (
+            "" if lack is None else f'<p class="rl-note rl-why">{text.render(lack)}</p>'
+        )
     assert disabled(panel._active.handle)
     assert disabled(panel._axes.handle)
     table = SetupPanel(text, lambda request: None)._table_html(store.state, READY)
@@ -104,7 +106,7 @@ def test_soft_limits_mode_parameters_and_signals_are_off_one_by_one(lacking, sto
     for html, feature in zip(shown, ("joints", "control", "signals", "reboot"), strict=True):
         lack = tell_lack(MODEL, feature)  # type: ignore[arg-type]
         assert lack is not None
-        assert text.say(lack) in html._shown
+        assert text.render(lack) in html._shown
 
 
 def test_the_signals_are_those_of_the_maker(lacking) -> None:

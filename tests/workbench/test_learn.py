@@ -176,7 +176,7 @@ def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.store.update(last_run=run_that(None))
     assert bench.step() == 5
     assert bench.state.notice is not None
-    assert Text("en").say(bench.state.notice.text) == "✓ Done. That was it."
+    assert Text("en").render(bench.state.notice.text) == "✓ Done. That was it."
     assert "That was it" in steps_html(bench.state.learn.lesson, Text("en"))
     bench.press("leave")
     assert bench.state.learn.lesson is None

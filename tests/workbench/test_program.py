@@ -199,7 +199,7 @@ def test_the_plan_of_a_program_is_the_pages_plan_with_a_certificate_and_names_it
     plan.report.certificate.verify(plan.motion, MODEL, HOME)
     assert square.program.answer is None
     assert [number_at(plan, t) for t in (0.0, time_at(plan, 1) + 1e-6, plan.motion.duration)] == [1, 2, 3]
-    said = Text("en").say(tell_place(plan, plan.motion.duration))
+    said = Text("en").render(tell_place(plan, plan.motion.duration))
     assert said == "to waypoint 3 of 3, MoveL"
     second = square.program.draft.steps[1].key
     square.edit("select", key=second)
@@ -264,7 +264,7 @@ def test_an_error_names_the_waypoint_and_marks_it(square):
     before = square.state.plan
     square.plan()
     assert square.program.failed == key
-    assert "waypoint 2 (line)" in Text("en").say(square.program.answer)
+    assert "waypoint 2 (line)" in Text("en").render(square.program.answer)
     assert square.state.plan is before
     assert "rl-failed" in list_html(square.state, square.program.draft, None, Text("en"))
 
@@ -303,14 +303,14 @@ def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_
     before = square.program.draft
     text = SQUARE.to_json().replace('"speed": 0.8', '"speed": 8', 1)
     square.actions.load(LoadProgram(name="bad.json", content=text.encode()))
-    problem = Text("en").say(square.state.problems["program.0.file"])
+    problem = Text("en").render(square.state.problems["program.0.file"])
     assert "bad.json, line 9" in problem
     assert "waypoint 2" in problem
     assert square.told == "program.not_loaded"
-    assert problem in Text("en").say(square.state.notice.text)
+    assert problem in Text("en").render(square.state.notice.text)
     far = SQUARE.to_json().replace(str(list(SQUARE.waypoints[1].position)), "[55.0, 10.0, 4.0]")
     square.actions.load(LoadProgram(name="far.json", content=far.encode()))
-    problem = Text("en").say(square.state.problems["program.0.file"])
+    problem = Text("en").render(square.state.problems["program.0.file"])
     assert "(55.0, 10.0, 4.0) is farther than 10 m" in problem, "one message, one unit"
     assert "mm" not in problem
     for content in (b"", b"\xff\xfe", b"[" * 1000):
@@ -390,7 +390,7 @@ def test_a_program_that_plans_no_longer_is_never_shown_as_passed(square):
     assert square.program.tone == "bad"
     changed = outdated(square.state)
     assert changed.code == "ready.program_fails"
-    assert text.say(square.program.answer) in text.say(changed)
+    assert text.render(square.program.answer) in text.render(changed)
     assert text("check.passed") not in planned_html(square.state, STANDING, text)
     status = SimpleNamespace(
         phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
@@ -492,7 +492,7 @@ def test_a_program_longer_than_any_motion_may_be_is_told_before_it_is_sampled(sq
     square.type("dwell", "3600")
     square.type("rounds", "100")
     square.plan()
-    assert "300 s are the most: take fewer rounds" in Text("en").say(square.program.answer)
+    assert "300 s are the most: take fewer rounds" in Text("en").render(square.program.answer)
     assert square.state.busy is None
 
 

@@ -115,7 +115,7 @@ def test_a_forbidden_arm_angle_is_left_for_the_nearest_free_one_and_told_why(ben
     assert goal.reach.tone != "bad"
     assert goal.psi is not None
     assert goal.psi < 2.0
-    said = Text(language).say(goal.snapped)
+    said = Text(language).render(goal.snapped)
     assert "143" in said
     assert "6" in said
     free, why = nearest_free(MODEL, goal.target, 0.4)

@@ -89,8 +89,8 @@ def test_a_typed_tool_is_what_the_controller_reports_and_what_the_goal_is_solved
         lambda: (T := bench.session.status().T_flange_tool) is not None and T.is_close(wanted(bench).tool, 1e-9),
         "the controller to report the tool",
     )
-    held = Text("en").say(describe_held(bench.session.status(), "tool"))
-    assert held == Text("en").say(describe_part(wanted(bench), "tool")) == "0, 0, 140 mm, 0, -0.2, 0°"
+    held = Text("en").render(describe_held(bench.session.status(), "tool"))
+    assert held == Text("en").render(describe_part(wanted(bench), "tool")) == "0, 0, 140 mm, 0, -0.2, 0°"
 
 
 def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(bench, ask):
@@ -104,7 +104,7 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert not np.allclose(state.plan.path, plan.path)
     reason = obstacle(state, status)
     assert reason.code == "ready.stale"
-    assert "tool, load" in Text("en").say(reason)
+    assert "tool, load" in Text("en").render(reason)
     for language in ("en", "zh"):
         assert Text(language)("check.outdated") in planned_html(state, status, Text(language))
     ask(RobotCommand(what="execute"))
@@ -131,7 +131,7 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert not state.plan.report.ok
     assert "cartesian.position" in {violation.condition.id for violation in state.plan.report.violations}
     assert obstacle(state, bench.session.status()).code == "ready.violations"
-    assert "on, 120 × 120 × 120 mm" == Text("en").say(describe_held(bench.session.status(), "box"))
+    assert "on, 120 × 120 × 120 mm" == Text("en").render(describe_held(bench.session.status(), "box"))
     target = next(panel for panel in bench.renderer._panels if isinstance(panel, TargetPanel))
     wait(lambda: "broken: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
     wait(lambda: bench.renderer._stage._ribbon._beads > 0, "a bead where it is broken")
@@ -139,7 +139,7 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     wait(lambda: bench.renderer._stage._ribbon._beads == 0, "the bead to go")
     gone = outdated(bench.store.state)
     assert gone is not None
-    assert "safety box" in Text("en").say(gone)  # What broke the box is no verdict on an arm without one.
+    assert "safety box" in Text("en").render(gone)  # What broke the box is no verdict on an arm without one.
     ask(PlanGoal())
     assert outdated(bench.store.state) is None
     wait(lambda: settled(bench), "the controller to have switched the box off")
@@ -168,7 +168,7 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
         "ready.outside",
         {"distance": pytest.approx(0.074, abs=5e-5), "face": "+x"},
     )
-    assert "74.0 mm" in Text("zh").say(reason)
+    assert "74.0 mm" in Text("zh").render(reason)
     ask(SetSetup(name="active", value=False))
     wait(lambda: "Outside" not in panel._verdict._shown, "Setup to take it back")
 
@@ -322,10 +322,10 @@ def test_a_foreign_robot_is_told_nothing_before_a_second_yes(bench, ask):
     status = SupervisorStatus(phase="idle", target=foreign.target)
     reason = setup_obstacle(foreign, status)
     assert reason.code == "ready.setup_unsent"
-    assert "192.168.0.160" in Text("zh").say(reason)
+    assert "192.168.0.160" in Text("zh").render(reason)
     refused = CommandRejectedError("SetLoad", rci.SettingStatus.INVALID_ARGUMENT, "")
     foreign = replace(foreign, setup=replace(setup, refusal=Message("notice.plain", {"text": str(refused)})))
-    assert "SetLoad" in Text("en").say(setup_obstacle(foreign, status))
+    assert "SetLoad" in Text("en").render(setup_obstacle(foreign, status))
 
 
 def test_the_check_tab_says_that_its_report_is_out_of_date(bench, ask):
@@ -399,5 +399,5 @@ def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
     assert told(bench) == "setup.back"
     wait(lambda: settled(bench), "the controller to have it again")
     wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
-    said = Text("en").say(bench.store.state.notice.text)
+    said = Text("en").render(bench.store.state.notice.text)
     assert said == "The controller was connected again and sent the configuration again: safety box, tool, load."

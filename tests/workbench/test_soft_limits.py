@@ -48,7 +48,7 @@ def test_a_plan_that_was_checked_inside_other_limits_is_out_of_date(bench: Workb
     lower[0] = here[0] - 0.8
     changed = outdated(replace(state(), model=state().model.with_joint_limits(lower, limits.upper)))
     assert changed is not None
-    assert "soft joint limits" in Text("en").say(changed)
+    assert "soft joint limits" in Text("en").render(changed)
 
 
 def test_a_limit_outside_the_arm_or_past_the_other_end_is_refused_beside_the_field(bench: Workbench) -> None:

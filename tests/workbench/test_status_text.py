@@ -54,7 +54,7 @@ def address_error() -> RcilabError:
 def test_errors_say_what_to_press_and_name_no_call(error):
     for target in ("virtual", "rci://192.168.0.160:1337"):
         where = status(phase="lost", code="lost.silent", target=target)
-        english, chinese = (Text(language).say(tell_error(error, where)) for language in ("en", "zh"))
+        english, chinese = (Text(language).render(tell_error(error, where)) for language in ("en", "zh"))
         assert not any(call in english for call in CALLS)
         assert str(error) not in chinese
         assert ("cable" in english) == (target != "virtual" and isinstance(error, ConnectionLostError))
@@ -62,7 +62,7 @@ def test_errors_say_what_to_press_and_name_no_call(error):
 
 def test_an_emergency_stop_in_mid_motion_is_named_and_no_error_bit():
     error = ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop")
-    said = Text("en").say(tell_error(error, status()))
+    said = Text("en").render(tell_error(error, status()))
     assert "an emergency stop is pressed: release it first" in said
     assert "Instability" not in said
 
@@ -72,7 +72,7 @@ def test_states_and_incidents_are_told_from_the_catalogues(code):
     where = status(phase=code.partition(".")[0], code=code, message=MESSAGES[code], target="rci://192.168.0.160:1337")
     for said in (tell_status(where), tell_incident(code, MESSAGES[code], where)):
         for language in ("en", "zh"):
-            sentence = Text(language).say(said)
+            sentence = Text(language).render(said)
             assert MESSAGES[code] not in sentence
             assert not any(call in sentence for call in CALLS)
 
@@ -177,7 +177,7 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
     assert reason is not None
     bar = status_values(state, died, Text("en"), 1.0)
     assert any(chip["value"] == "virtual controller died" for chip in bar["chips"])
-    assert Text("en").say(reason).startswith("The virtual controller has died")
+    assert Text("en").render(reason).startswith("The virtual controller has died")
 
 
 def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():
@@ -188,7 +188,7 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
         assert chips["success"] == bar
         assert f"<td>{table}" in health_html(state, now, Text("en"))
     rested = status(success_rate=1.0)
-    assert Text("en").say(tell_success(rested)) == "—", "no motion yet"
+    assert Text("en").render(tell_success(rested)) == "—", "no motion yet"
 
 
 def initial_state():

@@ -58,10 +58,10 @@ def test_a_pressed_stop_does_not_promise_that_its_release_clears_the_bit(languag
 def test_after_the_release_the_way_out_is_the_power(language, way_out) -> None:
     released = SupervisorStatus(phase="fault", code="fault.released", faults=FAULTS, robot_mode=RobotMode.OTHER)
     text = Text(language)
-    assert way_out in text.say(tell_status(released))
+    assert way_out in text.render(tell_status(released))
     refused = arm_obstacle("fault", False, is_released=True)
     assert refused is not None
-    assert way_out in text.say(refused)
+    assert way_out in text.render(refused)
     assert text("fault.was_stop") in html.unescape(faults_html(released, text, None))
 
 

@@ -84,7 +84,7 @@ def test_a_killed_process_is_noticed_told_and_replaced(bench, who, code):
     assert time.monotonic() - killed < 2.0  # The machine may be busy; the supervisor's own tests hold it to 0.5 s.
     wait(lambda: told(bench) == code, "to be told")
     for language, cable in (("en", "cable"), ("zh", "网线")):
-        assert cable not in Text(language).say(bench.store.state.notice.text)
+        assert cable not in Text(language).render(bench.store.state.notice.text)
     assert np.array_equal(bench.store.state.goal.q, goal), "what the operator has set is not lost"
     wait(lambda: bench.session.status().phase == "idle", "the process to be replaced")
     over = code.replace("incident.", "incident.over.")
@@ -101,7 +101,7 @@ def test_a_controller_killed_while_the_arm_rests_is_named_on_the_page_with_what_
         ("en", ("virtual controller", "wake-up pose", "motor power")),
         ("zh", ("虚拟控制器", "开机位姿", "电机")),
     ):
-        said = Text(language).say(bench.store.state.notice.text)
+        said = Text(language).render(bench.store.state.notice.text)
         assert all(word in said for word in words), said
     assert bench.session.status().worker_pid == before.worker_pid
     wait(lambda: is_ready(bench), "motor power")  # The words say that it comes back.
@@ -146,7 +146,7 @@ def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     assert status.robot_mode is None, "nobody says so any more"
     assert (bench.store.state.goal, bench.store.state.plan) == (goal, plan), "goal and plan are kept"
     assert obstacle(bench.store.state, status).code == "ready.lost"
-    assert "无法连接" in Text("zh").say(tell_status(status))
+    assert "无法连接" in Text("zh").render(tell_status(status))
     wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
     bench.dispatcher.ask(RobotCommand(what="power_on"))
     wait(lambda: told(bench) == "ready.lost", "to be told what to press")
@@ -174,7 +174,7 @@ def test_a_foreign_robot_moves_only_after_a_second_yes_that_knows_what_will_move
             ask(RobotCommand(what="confirm"))
             ask(RobotCommand(what="execute"))
             wait(lambda: describe_move(bench.store.state) is not None, "the second question")
-            question = Text("en").say(describe_move(bench.store.state))
+            question = Text("en").render(describe_move(bench.store.state))
             assert address in question
             assert "Joints: 1: " in question
             ask(MoveJoint(joint=0, angle=start + 0.2))

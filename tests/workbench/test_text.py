@@ -79,7 +79,7 @@ def test_the_room_of_a_maker_is_the_only_one_that_names_its_faults():
 
 
 def test_messages_inside_messages_are_translated_too():
-    said = Text("zh").say(message("notice.refused", what=message("drive.execute"), error="x"))
+    said = Text("zh").render(message("notice.refused", what=message("drive.execute"), error="x"))
     assert said == "执行未成功：x。"
 
 

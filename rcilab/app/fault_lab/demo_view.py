@@ -11,8 +11,8 @@ import numpy as np
 
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array
-from rcilab.i18n.error_messages import tell_note
-from rcilab.i18n.shown import unit_name, with_unit
+from rcilab.i18n.condition_values import unit_name, with_unit
+from rcilab.i18n.error_messages import describe_note
 
 if TYPE_CHECKING:
     from rcilab.app.fault_lab.fault_demo import FaultDemo
@@ -26,7 +26,7 @@ def head_html(exhibit: FaultDemo, text: Text) -> str:
     row = exhibit.condition
     others = [fault.manual_name for fault in exhibit.reported if fault is not exhibit.fault]
     also = f" {text('learn.also', faults=', '.join(others))}" if others else ""
-    value, bound = text.units.numbers(row.unit, exhibit.value, exhibit.bound)
+    value, bound = text.units.format_numbers(row.unit, exhibit.value, exhibit.bound)
     unit = unit_name(row.unit, text)
     facts = text(
         "learn.number", value=value, bound=with_unit(bound, row.unit, text),
@@ -61,7 +61,7 @@ def body_html(exhibit: FaultDemo, text: Text) -> str:
         ),
         *((("learn.manual", escape(text(manual, number=exhibit.fault.value))),) if text.has(manual) else ()),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
-        ("learn.said", f"<code>{escape(text.tell(tell_note(exhibit.said)))}</code>"),
+        ("learn.said", f"<code>{escape(text.render(describe_note(exhibit.said)))}</code>"),
     )
     table = "".join(f"<tr><th>{escape(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-exhibit">{table}</table>'

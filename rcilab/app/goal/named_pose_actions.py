@@ -12,8 +12,8 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
 from rcilab.app.text import message
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.i18n.error_messages import tell
-from rcilab.i18n.translator import Finished
+from rcilab.i18n.error_messages import describe_error
+from rcilab.i18n.translator import LiteralText
 from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
 
 
@@ -104,7 +104,7 @@ class NamedPoseActions:
             act()
         except RcilabError as error:
             plain = error.requirement if isinstance(error, InvalidValueError) else str(error)
-            reason = tell(error) if error.code else Finished(plain)
+            reason = describe_error(error) if error.code else LiteralText(plain)
             self._store.say("bad", message("poses.file", file=self._book.file, reason=reason))
             if isinstance(error, InvalidValueError) and error.name == "pose":
                 self._try(self._show)  # Another program has deleted it.

@@ -22,7 +22,7 @@ from rcilab.app.text import Message, message
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 
@@ -111,7 +111,7 @@ class ProgramActions:
         try:
             program = Program.from_json(request.content, request.name[:LONGEST_NAME] or "program")
         except (InvalidValueError, VersionMismatchError) as error:
-            self._refuse_file(message("program.file_bad", error=tell(error)))
+            self._refuse_file(message("program.file_bad", error=describe_error(error)))
             return
         model = self._store.state.model.name
         if program.model != model:
@@ -188,7 +188,7 @@ class ProgramActions:
             number = result.waypoint if isinstance(result, PlanningError) else None
             failed = None if number is None else steps[number - 1].key
             self._shelves.set(
-                tone="bad", answer=message("plan.failed", error=tell(result)), failed=failed, planned=None
+                tone="bad", answer=message("plan.failed", error=describe_error(result)), failed=failed, planned=None
             )
             return
         tone, answer, failed = "good", [], None

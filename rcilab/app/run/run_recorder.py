@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rcilab.app.run.recording import Recording
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError
-from rcilab.i18n.error_messages import tell
+from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import message
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run
@@ -108,7 +108,11 @@ class RunRecorder:
         self._file = ""
         self._store.say(
             "warn",
-            message("record.unwritable", file=str(error.value), why=tell(error) if error.code else error.requirement),
+            message(
+                "record.unwritable",
+                file=str(error.value),
+                why=describe_error(error) if error.code else error.requirement,
+            ),
         )
 
 

@@ -62,10 +62,10 @@ class BranchesPanel:
     ) -> str:
         least = margin(state.model, q)
         chosen = float(np.abs(np.angle(np.exp(1j * (q - state.goal.q)))).max()) < 1e-6
-        left, away = (self._text.units.angle_of(a, 0) for a in (least.angle, float(np.abs(q - here).max())))
+        left, away = (self._text.units.format_angle(a, 0) for a in (least.angle, float(np.abs(q - here).max())))
         sign = "▲ " if least.angle < NEAR_LIMIT else ""
         cells = (f"{number}", f"{sign}{left}", f"J{least.joint}", away)
-        angles = " · ".join(f"J{j + 1} {self._text.units.angle_of(float(q[j]), 0)}" for j in joints)
+        angles = " · ".join(f"J{j + 1} {self._text.units.format_angle(float(q[j]), 0)}" for j in joints)
         said = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
         said += f": {angles}" if angles else ""
         return (

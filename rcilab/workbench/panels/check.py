@@ -10,7 +10,7 @@ from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Message, Text
-from rcilab.i18n.translator import follow
+from rcilab.i18n.translator import with_space
 from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
@@ -79,7 +79,7 @@ class CheckPanel:
             return
         self._drawn = wanted
         if plan is None:
-            reason = self._text.say(state.no_plan) if state.no_plan else self._text("check.nothing")
+            reason = self._text.render(state.no_plan) if state.no_plan else self._text("check.nothing")
             self._verdict.show(f'<p class="rl-note">{esc(reason)}</p>')
             self._answer.show("")
             self._table.show("")
@@ -92,7 +92,7 @@ class CheckPanel:
         text, report = self._text, plan.report
         unheeded = count_unheeded(report)
         if changed is not None:
-            headline = ("warn", "▲ ", "check.outdated", text.say(changed))
+            headline = ("warn", "▲ ", "check.outdated", text.render(changed))
         elif report.ok and not is_current:
             headline = ("warn", "▲ ", "check.unconnected", text("check.unconnected_long"))
         elif report.ok:
@@ -104,8 +104,8 @@ class CheckPanel:
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
         if aside is not None:
-            tone, rest = "warn" if report.ok else tone, f"{rest} {text.say(aside)}"
-        lead, rest = follow(sign + text(word), rest)
+            tone, rest = "warn" if report.ok else tone, f"{rest} {text.render(aside)}"
+        lead, rest = with_space(sign + text(word), rest)
         return (
             f'<p class="rl-verdict rl-{tone} rl-big"><b>{esc(lead)}</b>{esc(rest)}</p>'
             f'<p class="rl-note">{esc(note)}</p>'
@@ -115,7 +115,7 @@ class CheckPanel:
         """Returns what came of the slow-down, and the report in words, as far as they are about this plan."""
         check, said = state.check, ""
         if check.answer is not None and check.about is plan.report:
-            answer = esc(self._text.say(check.answer))
+            answer = esc(self._text.render(check.answer))
             if check.found is not None:
                 answer += f" {esc(check.found.explain(self._text.language))}"
             said += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_formula, explain_place, explain_source
-from rcilab.i18n.shown import value_against_bound
+from rcilab.i18n.condition_values import value_against_bound
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:

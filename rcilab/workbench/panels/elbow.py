@@ -62,7 +62,7 @@ class ElbowPanel:
                             else ring_html(elbow, self._text, is_nearest=is_nearest))  # fmt: skip
         said = problems_html(state, self._text, [("psi", "ψ")])
         if goal.snapped is not None:
-            said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.say(goal.snapped))}</p>'
+            said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
         self._said.show(said)
 
 
@@ -152,11 +152,11 @@ def _range(start: float, end: float, text: Text) -> str:
     ends = (-math.pi, math.pi)
     if end - start < math.tau - 1e-9:
         ends = (math.remainder(start, math.tau), math.remainder(end, math.tau))
-    return " … ".join(text.units.angle_of(angle, 0) for angle in ends)
+    return " … ".join(text.units.format_angle(angle, 0) for angle in ends)
 
 
 def _title(kind: str, joints: tuple[int, ...], text: Text) -> str:
-    return text.say(say_why(joints)) if joints else text(f"elbow.kind.{kind}")
+    return text.render(say_why(joints)) if joints else text(f"elbow.kind.{kind}")
 
 
 def _css(color: Any) -> str:

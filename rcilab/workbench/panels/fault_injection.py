@@ -10,7 +10,7 @@ from rcilab.app.run.world_state import NETWORK_LAB
 from rcilab.app.status_text import tell_success
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.sim.api import DIRECTIONS
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -93,13 +93,13 @@ def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     rows = [
         ("client_rate", f"{status.rate_hz:.0f} Hz"),
         ("client_lost", f"{status.lost_cycles}"),
-        ("client_success", text.say(tell_success(status))),
+        ("client_success", text.render(tell_success(status))),
         ("controller_lost", "—" if world is None else f"{world.lost}"),
         ("controller_ignored", "—" if world is None else f"{world.ignored}"),
         ("controller_faults", faults),
     ]
     if world is not None and world.reason and status.faults:
-        rows.append(("controller_reason", text.tell(tell_note(world.reason))))
+        rows.append(("controller_reason", text.render(describe_note(world.reason))))
     return f'<table class="rl-table rl-facts-table">{"".join(_row(*row, text) for row in rows)}</table>'
 
 

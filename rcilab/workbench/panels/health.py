@@ -51,7 +51,7 @@ def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("mode", mode),
         ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
         ("power", power),
-        ("success", text.say(tell_success(status))),
+        ("success", text.render(tell_success(status))),
         ("in_row", "—" if world is None else f"{world.lost_in_row}"),
         ("rate", f"{status.rate_hz:.0f} Hz"),
         ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),

@@ -14,7 +14,7 @@ from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, STEPS, HoldJog
 from rcilab.app.request import Request
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
-from rcilab.i18n.translator import follow
+from rcilab.i18n.translator import with_space
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
     left = max(min(angle - low, high - angle), 0.0)
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
-    said = sign + text("jog.left", angle=text.units.angle_of(left, 0 if tone == "good" else 1))
+    said = sign + text("jog.left", angle=text.units.format_angle(left, 0 if tone == "good" else 1))
     ends = [text.units.format(bound, "rad.0f#") for bound in (low, high)]
     return (
         f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
@@ -152,13 +152,13 @@ def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     said = reason or state.jog.said
     if said is None:
         return reach_html(state, text)
-    return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.say(said))}</p>'
+    return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.render(said))}</p>'
 
 
 def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> str:
     """Returns what is wrong with typed numbers, one line a field."""
     return "".join(
-        f'<p class="rl-problem" role="alert"><b>{esc(label)}</b> {esc(text.say(state.problems[field]))}</p>'
+        f'<p class="rl-problem" role="alert"><b>{esc(label)}</b> {esc(text.render(state.problems[field]))}</p>'
         for field, label in fields
         if field in state.problems
     )
@@ -167,7 +167,7 @@ def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> 
 def reach_html(state: UiState, text: Text) -> str:
     """Returns what the inverse says about the goal, with its tone as a word and as a sign."""
     reach = state.goal.reach
-    lead, reason = follow(text("reach.tone." + reach.tone), text.say(reach.reason))
+    lead, reason = with_space(text("reach.tone." + reach.tone), text.render(reach.reason))
     return f'<p class="rl-verdict rl-{reach.tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'
 
 

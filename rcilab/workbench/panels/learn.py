@@ -53,7 +53,7 @@ class LearnPanel:
             said = text("learn.provoking", fault=learn.provoking.manual_name)
             note = f'<p class="rl-verdict rl-warn" role="status">{esc(said)}</p>'
         if learn.problem is not None:
-            note += f'<p class="rl-problem" role="alert">{esc(text.say(learn.problem))}</p>'
+            note += f'<p class="rl-problem" role="alert">{esc(text.render(learn.problem))}</p>'
         self._head.show("" if away else note)
         for folder in self._folders:
             if folder.visible == away:

@@ -62,7 +62,7 @@ class ModePanel:
             folder = gui.add_folder(name_group(text, group), visible=visible, expand_by_default=group.is_first)
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
-                names = [text.say(parameter.label) for parameter in group.parameters]
+                names = [text.render(parameter.label) for parameter in group.parameters]
                 fields = [self._build_field(gui, group, index, name) for index, name in enumerate(names)]
                 self._labels[group.name] = [(field.field, name) for field, name in zip(fields, names, strict=True)]
                 self._fields[group.name], self._problems[group.name] = fields, Html(gui)
@@ -74,7 +74,7 @@ class ModePanel:
         self._mode.show(self._names[drive.mode])
         self._mode.handle.disabled = is_moving(status) or is_only_planned(state.model)
         lack = tell_lack(state.model, drive.mode)
-        said = text(f"mode.{drive.mode}_note") if lack is None else text.say(lack)
+        said = text(f"mode.{drive.mode}_note") if lack is None else text.render(lack)
         self._note.show(f'<p class="rl-note">{esc(said)}</p>')
         for group in self._groups:
             folder, visible = self._folders[group.name], drive.mode in group.modes
@@ -98,7 +98,7 @@ class ModePanel:
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns what the controller has of the parameters of this mode: as it acknowledged them."""
     if state.drive.refusal is not None:
-        why = text.say(message("ready.control_refused", error=state.drive.refusal))
+        why = text.render(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'
     groups, is_known = parameters_of(state.model), state.target == "virtual"
     rows = "".join(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
-from rcilab.i18n.translator import Finished
+from rcilab.i18n.translator import LiteralText
 from rcilab.recording.html_facts import tell_stop
 from rcilab.workbench.widgets import esc
 
@@ -64,7 +64,7 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
     is_said = run.stopped is None or run.faults or run.is_safety_stop
-    reason = "" if is_said else text.tell(Finished(_tell_stop(run, text)))
+    reason = "" if is_said else text.render(LiteralText(_tell_stop(run, text)))
     why = reason and f"<br><small>{esc(reason)}</small>"
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
 

@@ -114,11 +114,11 @@ class ProgramPanel:
         elif plan is not None:
             where = tell_place(plan, t)
             said += planned_html(state, status, text)
-            said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.say(where))}</p>'
+            said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.render(where))}</p>'
         elif count and not planning and program.answer is None:
             said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
         if program.answer is not None:
-            said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.say(program.answer))}</p>'
+            said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.render(program.answer))}</p>'
         self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
 
         if program.notes is not self._noted:

@@ -10,7 +10,7 @@ from rcilab.app.program.program_draft import Draft, Note, target_of
 from rcilab.app.program.waypoint_fields import arm_angle_of
 from rcilab.app.text import Text
 from rcilab.core.errors import RcilabError
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.motion.waypoint import Waypoint
 from rcilab.workbench.widgets import esc
 
@@ -80,7 +80,7 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
 @lru_cache(maxsize=4)
 def _sentences(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
     """Returns remarks as HTML, once: a program may have a thousand, and its rows are drawn anew at every step."""
-    return tuple(esc(text.tell(tell_note(note.remark))) for note in notes)
+    return tuple(esc(text.render(describe_note(note.remark))) for note in notes)
 
 
 def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
@@ -101,7 +101,7 @@ def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:
         _where(waypoint, arm, text),
         f"{100.0 * waypoint.speed:.3g}",
         "–" if waypoint.blend == 0.0 else text.units.format(waypoint.blend, "m.3g#"),
-        "–" if psi is None else text.units.angle_of(psi, 0).removesuffix(" rad"),
+        "–" if psi is None else text.units.format_angle(psi, 0).removesuffix(" rad"),
         "–" if waypoint.dwell == 0.0 else f"{waypoint.dwell:.3g}",
     )
 
@@ -114,7 +114,7 @@ def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
     if target is not None:
         return _lengths(tuple(target.position.tolist()), text)
     if waypoint.type == "circle":
-        return text.units.angle_of(math.tau if waypoint.angle is None else waypoint.angle, 0)
+        return text.units.format_angle(math.tau if waypoint.angle is None else waypoint.angle, 0)
     return "ψ"
 
 

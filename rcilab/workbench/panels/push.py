@@ -20,7 +20,7 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.push_actions import HoldPush, SetPush
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class PushPanel:
         elif reason is None and not soft:
             said = text("push.stiff")
         else:
-            said = text("push.free") if reason is None else text.say(reason)
+            said = text("push.free") if reason is None else text.render(reason)
         if can_grab(state, status):
             said += " " + text("push.drag")
         self._note.show(f'<p class="rl-note">{esc(said)}</p>')
@@ -115,8 +115,8 @@ def felt_html(status: SupervisorStatus, text: Text) -> str:
     """Returns what the controller believes presses on the arm."""
     if status.tau_ext is None:
         return ""
-    force = " / ".join(fixed(float(number), 0) for number in status.tau_ext[:3])
-    moment = " / ".join(fixed(float(number), 1) for number in status.tau_ext[3:])
+    force = " / ".join(format_fixed(float(number), 0) for number in status.tau_ext[:3])
+    moment = " / ".join(format_fixed(float(number), 1) for number in status.tau_ext[3:])
     return (
         f'<table class="rl-table rl-facts-table"><tr><th>{esc(text("push.felt"))}</th>'
         f"<td>{force} N<br>{moment} N·m</td></tr></table>"

@@ -113,7 +113,7 @@ class RunPanel:
         self._planned.show(planned_html(state, status, text) if is_plan_current(state, status) else "")
         self._execute.disabled = reason is not None
         question = None if reason is not None else describe_move(state)
-        said = "" if question is None else esc(text.say(question))
+        said = "" if question is None else esc(text.render(question))
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None

@@ -89,9 +89,9 @@ class SetupPanel:
         if obstacle is not None:
             tone = "bad" if setup.refusal is not None else "warn"
             word = "setup.refused" if setup.refusal is not None else "setup.pending"
-            return _verdict(tone, text(word), text.say(obstacle))
+            return _verdict(tone, text(word), text.render(obstacle))
         if differing is not None:
-            return _verdict("warn", text("setup.differs"), text("setup.differs_long", tool=text.say(differing)))
+            return _verdict("warn", text("setup.differs"), text("setup.differs_long", tool=text.render(differing)))
         if not setup.touched:
             return f'<p class="rl-note">{esc(text("setup.untouched"))}</p>'
         return _verdict("good", text("setup.given"), text("setup.given_long"))
@@ -102,7 +102,7 @@ class SetupPanel:
         if status.q_c is None or box is None or not box.active:
             return ""
         outside = tool_outside(state, state.model.forward(status.q_c).position)
-        return "" if outside is None else _verdict("bad", self._text("setup.arm_outside"), self._text.say(outside))
+        return "" if outside is None else _verdict("bad", self._text("setup.arm_outside"), self._text.render(outside))
 
     def _table_html(self, state: UiState, status: SupervisorStatus) -> str:
         text, pending = self._text, pending_parts(state, status)
@@ -110,7 +110,9 @@ class SetupPanel:
         for part in LISTED:
             lack = tell_lack_of_part(state.model, part)
             here = self._said(state.setup.wanted, part) if lack is None else "—"
-            held = text("setup.held", held=text.say(describe_held(status, part))) if lack is None else text.say(lack)
+            held = (
+                text("setup.held", held=text.render(describe_held(status, part))) if lack is None else text.render(lack)
+            )
             mark = ' class="rl-differs"' if part in pending else ""
             rows.append(
                 f"<tr{mark}><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(here)}"
@@ -119,7 +121,7 @@ class SetupPanel:
         return f'<table class="rl-table rl-facts-table rl-setup">{"".join(rows)}</table>'
 
     def _said(self, setup: Any, part: str) -> str:
-        return self._text.say(describe_part(setup, part))
+        return self._text.render(describe_part(setup, part))
 
 
 def _press(what: Any):  # type: ignore[no-untyped-def]

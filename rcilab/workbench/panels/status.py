@@ -49,7 +49,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "question": _question(state, text),
     }
     values["notices"] = [
-        {"serial": notice.serial, "tone": notice.tone, "text": text.say(notice.text), "page": notice.page}
+        {"serial": notice.serial, "tone": notice.tone, "text": text.render(notice.text), "page": notice.page}
         for notice in state.notices
     ]
     return values
@@ -61,7 +61,7 @@ def _target_name(state: UiState, text: Text) -> str:
 
 def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[str, Any]]:
     phase = text(phase_code(status))
-    doing = text.say(state.busy) if state.busy is not None else phase
+    doing = text.render(state.busy) if state.busy is not None else phase
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
@@ -74,7 +74,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
             "phase",
             doing,
             "warn" if status.is_pressed else _TONES.get(status.code, _TONES.get(status.phase, "bad")),
-            hint=text.say(tell_status(status)),
+            hint=text.render(tell_status(status)),
         ),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),

@@ -10,7 +10,7 @@ from rcilab.app.check.freshness import beside_program, outdated
 from rcilab.app.goal.goal_actions import POSE_FIELDS, QUATERNION
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
-from rcilab.i18n.rounding import fixed
+from rcilab.i18n.rounding import format_fixed
 from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
@@ -61,7 +61,7 @@ class TargetPanel:
 def quaternion_text(wxyz: np.ndarray) -> str:
     """Returns the four numbers of an orientation for a field, w not below 0."""
     sign = -1.0 if wxyz[0] < 0.0 else 1.0
-    return " ".join(fixed(sign * float(number), 4) for number in wxyz)
+    return " ".join(format_fixed(sign * float(number), 4) for number in wxyz)
 
 
 def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
@@ -70,19 +70,19 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     While nothing is connected a plan gets no verdict: the next arm may stand elsewhere.
     """
     if state.plan is None:
-        return f'<p class="rl-note">{esc(text.say(state.no_plan)) if state.no_plan else ""}</p>'
+        return f'<p class="rl-note">{esc(text.render(state.no_plan)) if state.no_plan else ""}</p>'
     if not is_plan_current(state, status):
         return ""
     changed = outdated(state)
     if changed is not None:
-        return f'<p class="rl-verdict rl-warn"><b>▲ {esc(text("check.outdated"))}</b> {esc(text.say(changed))}</p>'
+        return f'<p class="rl-verdict rl-warn"><b>▲ {esc(text("check.outdated"))}</b> {esc(text.render(changed))}</p>'
     plan, report = state.plan, state.plan.report
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
     code = code if plan.program is None else "program.planned"
     said = text(code, duration=f"{plan.motion.duration:.3f}")
     if plan.short is not None:
-        said += ". " + text("target.leads_short", short=text.say(plan.short))
+        said += ". " + text("target.leads_short", short=text.render(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
         worst, more = report.violations[0].condition.id, report.broken_conditions - 1
@@ -92,7 +92,7 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         said += " · " + text("target.unheeded", count=unheeded)
     aside = beside_program(state)
     if aside is not None:
-        tone, said = "warn" if report.ok else tone, said + ". " + text.say(aside)
+        tone, said = "warn" if report.ok else tone, said + ". " + text.render(aside)
     if plan.note is not None:
-        said += (" " if report.ok else ". ") + text.say(plan.note)
+        said += (" " if report.ok else ". ") + text.render(plan.note)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'

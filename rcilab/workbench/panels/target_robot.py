@@ -94,7 +94,7 @@ class TargetRobotPanel:
         note = connection_note(state, status)
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'
-            + ("" if note is None else f'<p class="rl-note">{esc(text.say(note))}</p>')
+            + ("" if note is None else f'<p class="rl-note">{esc(text.render(note))}</p>')
         )
 
     def _pick(self, name: str, page: int | None) -> Request | None:

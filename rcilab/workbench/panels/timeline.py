@@ -95,7 +95,7 @@ class TimelinePanel:
             elif why is None or why.code == "plan.here":
                 said = text("timeline.jog" if state.jog.robot else "timeline.nothing")
             else:
-                said = text.say(why)
+                said = text.render(why)
             return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")
@@ -106,7 +106,7 @@ class TimelinePanel:
             if status.q is None:
                 kinds = text(f"timeline.replayed{wanted}")
         where = tell_place(state.plan, t)
-        kinds = kinds if where is None else text.say(where)
+        kinds = kinds if where is None else text.render(where)
         if state.plan.short is not None and state.recording is None:
             kinds = text("timeline.short")
         kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"

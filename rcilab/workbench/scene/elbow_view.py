@@ -79,7 +79,7 @@ class ElbowSceneView:
         if self._label.visible != (elbow is not None):
             self._label.visible = elbow is not None
         if elbow is not None:
-            said = "ψ " + text.units.angle_of(elbow.psi, 0) if snapped is None else "▲ " + text.say(snapped)
+            said = "ψ " + text.units.format_angle(elbow.psi, 0) if snapped is None else "▲ " + text.render(snapped)
             if said != self._label.text:
                 self._label.text = said
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rcilab.app.goal.goal_actions import MoveTarget
 from rcilab.app.text import Text
-from rcilab.i18n.translator import follow
+from rcilab.i18n.translator import with_space
 from rcilab.workbench.scene.configuration_view import hides_target
 from rcilab.workbench.widgets import HAND_AWAY, Ask
 
@@ -97,8 +97,8 @@ class GoalView:
         if goal.reach.tone != self._tone:
             self._tone = goal.reach.tone
             self._mark.color = TONE_COLORS[self._tone]
-        tone, reason = goal.reach.tone, text.say(goal.reach.reason)
-        said = text("reach.label") if tone == "good" else "".join(follow(text("reach.tone." + tone), reason))
+        tone, reason = goal.reach.tone, text.render(goal.reach.reason)
+        said = text("reach.label") if tone == "good" else "".join(with_space(text("reach.tone." + tone), reason))
         said = text("target.handles", verdict=said)
         if said != self._said:
             self._said = said
