@@ -211,9 +211,11 @@ class ControlError(RecordedError):
 
     Attributes:
         faults: The faults that were set, in wire order.
+        finding: Joint, value and bound that the cycles show, an `i18n.translator.Remark`; "" if not known.
         stop: The cycles after `record`, in which the controller stopped the arm; None if they were not received.
     """
 
+    finding: str = ""
     stop: Any = None
 
     def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:

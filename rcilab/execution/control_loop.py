@@ -402,7 +402,7 @@ class ControlLoop:
         if pressed is None and lacks_commands and len(state.faults) == 1 and not self._has_power():
             return self._cut_off()
         record = self._log.recorder.last(RECORD_CYCLES)
-        message = self._driver.describe_faults(
+        report = self._driver.describe_faults(
             state.faults,
             record,
             t,
@@ -414,7 +414,8 @@ class ControlLoop:
             box=self._box,
             collision_thresholds=self._thresholds,
         )
-        error = ControlError(message, state.faults, record)
+        error = ControlError(report.sentence, state.faults, record)
+        error.finding = report.finding
         return error if pressed is None else error.coded("safety_stop", status=pressed.code)
 
     def _not_arrived(self, state: RobotState, command: Command) -> ControlError:

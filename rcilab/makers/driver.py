@@ -17,6 +17,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, RobotState
+from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.maker import Maker, all_makers
 from rcilab.robots import DhRow
@@ -90,6 +91,16 @@ class SafetyStopReason:
     """Names it for catalogues: `status.CODE`."""
     sentence: str
     """What it is and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class FaultReport:
+    """What is known of the faults that ended a motion."""
+
+    sentence: str
+    """All of it, with what to do in Python."""
+    finding: Remark
+    """Joint, value and bound, for user interfaces; empty when not known."""
 
 
 class RequestLock(Protocol):
@@ -269,8 +280,8 @@ class StreamingDriver(Driver, Protocol):
         pressed: str = "",
         box: SafetyBox | None = None,
         collision_thresholds: JointVector | None = None,
-    ) -> str:
-        """Returns the message of the error that a motion with these faults ends with.
+    ) -> FaultReport:
+        """Returns what the error says that a motion with these faults ends with.
 
         Args:
             faults: What the controller reported.

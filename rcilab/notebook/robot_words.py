@@ -9,6 +9,7 @@ from rcilab.app.session_connection import BusyError
 from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import SAFETY_STOP, ControlError, ModelError, RcilabError
+from rcilab.i18n.error_messages import tell_note
 from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
@@ -77,7 +78,9 @@ def outcome_html(
     if error is not None:
         faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
         if faults:
-            return verdict("bad", "✗", text("run.faulted", faults=faults))
+            finding = error.finding if isinstance(error, ControlError) else ""
+            found = f" {text.tell(tell_note(finding))}" if finding else ""
+            return verdict("bad", "✗", text("run.faulted", faults=faults) + found)
         if outcome.what == "execute":
             return stopped
         why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))

@@ -39,5 +39,7 @@ class Recording:
     """Where it is on disk; "" where it is not."""
     is_left_alone: bool = False
     """Whether it was stopped because no page answered."""
+    finding: str = ""
+    """What the last cycles show of the fault, joint, value and bound; "" where it is not known."""
     moment: float | None = None
     """When a fault was reported, as in `t`, [s]; None for a motion without one."""

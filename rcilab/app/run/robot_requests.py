@@ -116,7 +116,9 @@ class RobotRequests:
         is_stopped = isinstance(error, ControlError) and not error.faults
         is_left_alone = is_stopped and self._connection.status().code == "idle.operator"
         stopped = None if error is None else describe_end(error)
-        self._recorder.finish(stopped, self._paced(), is_left_alone=is_left_alone, run=self._connection.take_run())
+        finding = error.finding if isinstance(error, ControlError) else ""
+        run = self._connection.take_run()
+        self._recorder.finish(stopped, self._paced(), is_left_alone=is_left_alone, finding=finding, run=run)
         last = self._store.state.last_run
         return Outcome(what=what, error=error, run=None if last is None else last.run, is_left_alone=is_left_alone)
 

@@ -65,6 +65,7 @@ class RunRecorder:
         paced: SpeedScaledMotion | None = None,
         *,
         is_left_alone: bool = False,
+        finding: str = "",
         run: Run | None = None,
     ) -> None:
         """Ends the recording; from here on it can be exported.
@@ -73,6 +74,7 @@ class RunRecorder:
             stopped: Why the motion did not reach its end; None: it did.
             paced: How the plan was run, where its speed override was changed.
             is_left_alone: Whether that is because no page answered.
+            finding: What its last cycles show of the fault that ended it.
             run: As the robot has recorded it itself; None: it is made of the cycles that were added.
         """
         if self._live is None:
@@ -85,7 +87,8 @@ class RunRecorder:
             self._complain(error)
             run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
         if run is not None:
-            recording = replace(whole_recording(run, self._file, paced), is_left_alone=is_left_alone)
+            recording = whole_recording(run, self._file, paced, finding)
+            recording = replace(recording, is_left_alone=is_left_alone)
             self._store.update(recording=recording, last_run=recording)
 
     def _open(self, state: AppState, plan: Plan, setup: Setup) -> RunFile | None:
@@ -129,7 +132,7 @@ def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion 
     )
 
 
-def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = None) -> Recording:
+def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = None, finding: str = "") -> Recording:
     """Returns a finished run for plots, table and export."""
     faulty = np.flatnonzero(run.cycles["faults"])
     return Recording(
@@ -143,5 +146,6 @@ def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = 
         paced=paced,
         tracking=run.tracking,
         file=file,
+        finding=finding,
         moment=float(run.t[faulty[0]]) if len(faulty) else None,
     )

@@ -21,6 +21,8 @@ from rcilab.core.rotation import as_rotation9
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode
+from rcilab.i18n.translator import Remark
+from rcilab.makers.driver import FaultReport
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS, RCI_TOOL_CONDITIONS, RCI_TORQUE_CONDITIONS
 from rcilab.makers.rokae.driver.measured_report import YIELDING_MODES, describe_measured, describe_passed_face
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
@@ -49,8 +51,8 @@ def describe_faults(
     pressed: str = "",
     box: SafetyBox | None = None,
     collision_thresholds: JointVector | None = None,
-) -> str:
-    """Returns the message of the error that a motion ends with.
+) -> FaultReport:
+    """Returns what the error says that a motion ends with.
 
     Args:
         faults: What the controller reported, in wire order.
@@ -69,19 +71,22 @@ def describe_faults(
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
     if pressed:
         bits = name_faults(faults)
-        return f"the controller stopped the motion {when}: {pressed} (reported as {bits}); error.run holds the motion"
+        sentence = f"the controller stopped the motion {when}: {pressed} (reported as {bits})"
+        return FaultReport(f"{sentence}; error.run holds the motion", Remark(""))
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
     commanded, is_broken = _describe_commanded(faults, record, limits)
     measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
     followed = _describe_followed(faults, record, limits) if np.isfinite(record["command_pose"]).any() else ""
     passed = describe_passed_face(faults, record, box)
-    parts += [said for said in (commanded, followed, *measured, passed) if said]
+    found = [said for said in (commanded, followed, *measured, passed) if said]
+    parts += found
     if faults:
         parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
     clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
     parts.append(f"{clears}error.run holds the motion")
-    return "; ".join(parts)
+    finding = Remark.all(said for said in found if isinstance(said, Remark))
+    return FaultReport("; ".join(parts), finding)
 
 
 def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
@@ -110,10 +115,16 @@ def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limi
         if fault in faults and len(q) > order:
             values = np.diff(q, order, axis=0) / CYCLE_TIME**order
             place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
-            number, bound = place[1] + 1, bounds[place[1]]
-            return (
-                f"of the joints that follow from the poses joint {number} came nearest, with a commanded {name} of "
-                f"{values[place]:.4g} {unit} before the pose that broke its bound ({bound:g} {unit})"
+            joint, value, bound = int(place[1]) + 1, float(values[place]), float(bounds[place[1]])
+            return Remark(
+                f"of the joints that follow from the poses joint {joint} came nearest, with a commanded {name} of "
+                f"{value:.4g} {unit} before the pose that broke its bound ({bound:g} {unit})",
+                "nearest",
+                condition=f"joint.{name}",
+                joint=joint,
+                value=value,
+                bound=bound,
+                unit=unit,
             )
     return ""
 
@@ -145,7 +156,9 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
             is_broken = is_broken or bool(violations)
             for violation in violations:
                 if violation.condition.fault in faults:
-                    return f"{violation.text} in the command at t = {rows['t'][place - first]:.3f} s", True
+                    remark = violation.remark
+                    sentence = f"{remark} in the command at t = {rows['t'][place - first]:.3f} s"
+                    return Remark(sentence, remark.code, **remark.facts), True
         return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_broken
     return "", is_broken
 

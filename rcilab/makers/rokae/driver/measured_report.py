@@ -17,6 +17,7 @@ from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.core.state import ControllerMode
+from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.conditions import RCI_MEASURED_CONDITIONS
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 
@@ -60,16 +61,36 @@ def describe_measured(
     if not len(record):
         return
     measured = _judge(record, model, limits, mode)
-    said = {violation.condition.fault: violation.text for violation in measured.violations}
+    said = {violation.condition.fault: violation.remark for violation in measured.violations}
     joint = limits.joint
-    for fault, values, bounds, unit in (
-        (Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION, record["dq"], joint.velocity, "rad/s"),
-        (Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION, measured.ddq, joint.acceleration, "rad/s^2"),
+    for fault, condition, values, bounds, unit in (
+        (
+            Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION,
+            "measured.joint.velocity",
+            record["dq"],
+            joint.velocity,
+            "rad/s",
+        ),
+        (
+            Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION,
+            "measured.joint.acceleration",
+            measured.ddq,
+            joint.acceleration,
+            "rad/s^2",
+        ),
     ):
         if fault in faults and fault not in said:
             place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
-            number, bound = place[1] + 1, bounds[place[1]]
-            said[fault] = f"joint {number} was measured at {values[place]:.3g} {unit} (commands: {bound:g} {unit})"
+            number, value, bound = int(place[1]) + 1, float(values[place]), float(bounds[place[1]])
+            said[fault] = Remark(
+                f"joint {number} was measured at {value:.3g} {unit} (commands: {bound:g} {unit})",
+                "nearest",
+                condition=condition,
+                joint=number,
+                value=value,
+                bound=bound,
+                unit=unit,
+            )
     yield from (text for fault, text in said.items() if fault in faults and fault not in RANGE_FAULTS)
     if RANGE_FAULTS & faults:
         yield _describe_range(faults, record, limits)
@@ -77,7 +98,8 @@ def describe_measured(
         yield _describe_collision(record, model, limits, collision_thresholds)
     rate = float(record["success_rate"][-1])
     if Fault.INSTABILITY_DETECTION in faults and rate < 1.0:
-        yield f"{100.0 * (1.0 - rate):.2g} % of the last second's commands did not arrive in time"
+        share = f"{100.0 * (1.0 - rate):.2g}"
+        yield Remark(f"{share} % of the last second's commands did not arrive in time", "late_commands", share=share)
 
 
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
@@ -97,7 +119,9 @@ def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box:
     if not passed:
         return ""
     _, face, beyond = max(passed)
-    return f"the tool came {1e3 * max(beyond, 0.0):.1f} mm past the {face} face of the safety box"
+    away = max(beyond, 0.0)
+    sentence = f"the tool came {1e3 * away:.1f} mm past the {face} face of the safety box"
+    return Remark(sentence, "past_face", away=away, face=face)
 
 
 def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
@@ -134,7 +158,16 @@ def _describe_range(faults: set[Fault], record: NDArray[np.void], limits: Limits
         return "every joint was inside the limits of this model: the controller has narrower ones (set_joint_limit)"
     low, high = math.degrees(joint.lower[place[1]]), math.degrees(joint.upper[place[1]])
     was = "measured" if is_measured else "commanded"
-    return f"joint {place[1] + 1} was {was} at {math.degrees(q[place]):.2f} deg (from {low:.2f} to {high:.2f} deg)"
+    number, value = int(place[1]) + 1, float(q[place])
+    return Remark(
+        f"joint {number} was {was} at {math.degrees(value):.2f} deg (from {low:.2f} to {high:.2f} deg)",
+        "joint_range",
+        condition="measured.joint.position" if is_measured else "joint.position",
+        joint=number,
+        value=value,
+        low=float(joint.lower[place[1]]),
+        high=float(joint.upper[place[1]]),
+    )
 
 
 def _describe_collision(
@@ -148,7 +181,12 @@ def _describe_collision(
     bound = f"its threshold is {known[joint]:g} N m"
     if thresholds is None:
         bound = f"its threshold is at most {known[joint]:g} N m, set_collision_behavior sets it"
-    return (
+    return Remark(
         f"{np.linalg.norm(wrench[:3]):.3g} N were felt at the tool, which is {outside[joint]:.3g} N m on joint "
-        f"{joint + 1} ({bound})"
+        f"{joint + 1} ({bound})",
+        "collision",
+        joint=joint + 1,
+        value=float(outside[joint]),
+        bound=float(known[joint]),
+        unit="N m",
     )
