@@ -9,7 +9,7 @@ from rcilab.app.session_connection import BusyError
 from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import SAFETY_STOP, ControlError, ModelError, RcilabError
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
@@ -79,7 +79,7 @@ def outcome_html(
         faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))
         if faults:
             finding = error.finding if isinstance(error, ControlError) else ""
-            found = f" {text.tell(tell_note(finding))}" if finding else ""
+            found = f" {text.render(describe_note(finding))}" if finding else ""
             return verdict("bad", "✗", text("run.faulted", faults=faults) + found)
         if outcome.what == "execute":
             return stopped

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import LiteralText
 from rcilab.recording.html_facts import tell_stop
 from rcilab.workbench.widgets import esc
@@ -50,7 +50,7 @@ def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if elsewhere:
         return f'<p class="rl-note">{esc(text("record.last_on", where=elsewhere))} {esc(ended)} {esc(facts)}</p>'
     last = "" if recording is state.recording else esc(text("record.last")) + " "
-    finding = recording.finding and f"<br>{esc(text.tell(tell_note(recording.finding)))}"
+    finding = recording.finding and f"<br>{esc(text.render(describe_note(recording.finding)))}"
     return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}{finding}</p>'
 
 

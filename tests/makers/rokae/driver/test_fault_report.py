@@ -20,7 +20,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode
 from rcilab.i18n import translator
-from rcilab.i18n.error_messages import tell_note
+from rcilab.i18n.error_messages import describe_note
 from rcilab.makers.rokae.driver.fault_report import describe_faults
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -91,8 +91,8 @@ def error_of(change, fault: Fault) -> ControlError:
 @pytest.mark.parametrize(("change", "fault", "said"), EXAMPLES)
 def test_page_and_notebook_say_joint_value_and_bound_of_a_fault(change, fault, said):
     error = pickle.loads(pickle.dumps(as_sendable(error_of(change, fault))))
-    assert said in Text("en").tell(tell_note(error.finding))
-    assert "remark." not in Text("zh").tell(tell_note(error.finding))
+    assert said in Text("en").render(describe_note(error.finding))
+    assert "remark." not in Text("zh").render(describe_note(error.finding))
     rows = cycles()
     rows["faults"][-1] = 1 << fault
     run = build_run(rows, plan=None, stopped=str(error), model=MODEL)
@@ -100,6 +100,6 @@ def test_page_and_notebook_say_joint_value_and_bound_of_a_fault(change, fault, s
     page = outcome_html(state, SupervisorStatus(phase="fault", code="fault", faults=(fault,)), Text("en"))
     text = translator.Text("en", "rcilab.notebook")
     notebook = notebook_outcome(Outcome(what="execute", error=error), MODEL, None, text)
-    finding = text.tell(tell_note(error.finding))
+    finding = text.render(describe_note(error.finding))
     assert said.replace("'", "&#x27;") in page
     assert finding.replace("'", "&#x27;") in notebook
