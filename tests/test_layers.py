@@ -68,7 +68,7 @@ LATE_FILES = re.compile(r"rcilab\.makers\.\w+\.maker")
 """A maker is cheap to import: its codec, controller and driver are loaded by the methods that need them."""
 NAMES_A_MAKER = {"rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI"}
 """Modules outside `makers` that import a maker's folder, and why."""
-LATE_LEFT = {"app": 8, "execution": 3, "notebook": 7}
+LATE_LEFT = {"app": 8, "notebook": 7}
 """Function-level imports of rcilab that are still to go, a part: a smaller number here with each that goes."""
 CIRCLES_LEFT: set[tuple[str, ...]] = set()
 """Import circles that are still to go; one that has gone goes from here too."""

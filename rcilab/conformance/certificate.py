@@ -153,44 +153,16 @@ def issue_certificate(
     return Certificate(tuple(parts.items()), tuple(start.q.tolist()))
 
 
-def verify_certificate(
-    certificate: Certificate | None,
-    motion: Motion,
-    model: RobotModel,
-    start_q: ArrayLike | StartState,
-    box: SafetyBox | None = None,
-    distance: ClearanceLimit | None = None,
-    mode: Mode = "joint_position",
-) -> None:
-    """Makes sure that there is a certificate for this motion; every hand-off calls this first.
-
-    Arguments as in `Certificate.verify`.
+def require_certificate(certificate: object) -> None:
+    """Requires a certificate, or None; a report in its place is an easy slip.
 
     Raises:
-        CertificateError: It is missing or stale.
-        InvalidValueError: It is something else, such as the report.
+        InvalidValueError: It is something else; the message says what to pass.
     """
-    if certificate is None:
-        raise CertificateError(
-            "the motion has no certificate: run rcilab.check(motion, model) and hand over report.certificate, "
-            "which exists when the report is ok",
-            ("certificate",),
-        )
-    require_certificate(certificate)
-    certificate.verify(motion, model, start_q, box, distance, mode)
-
-
-def require_certificate(certificate: object) -> Certificate:
-    """Returns `certificate` if it is one; a report in its place is an easy slip.
-
-    Raises:
-        InvalidValueError: It is something else.
-    """
-    if isinstance(certificate, Certificate):
-        return certificate
     if hasattr(certificate, "certificate"):
         raise InvalidValueError("certificate", Unquoted("pass report.certificate,"), "not the report")
-    raise InvalidValueError("certificate", certificate, "is not a certificate; pass check(motion, model).certificate")
+    if certificate is not None and not isinstance(certificate, Certificate):
+        raise InvalidValueError("certificate", certificate, "must be a Certificate; pass report.certificate")
 
 
 def _start_fingerprint(start: StartState) -> str:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.control_process.layout import MOTION_ROWS, MOTION_TIME, OPERATOR_TIMEOUT
 from rcilab.control_process.status import SupervisorStatus
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import CertificateError, UsageError
 from rcilab.core.state import Mode, require_mode
-from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
+from rcilab.execution.start_pose_check import describe_start_mismatch
+from rcilab.motion import Motion, require_motion
 
 if TYPE_CHECKING:
-    from rcilab.conformance.certificate import Certificate
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
-    from rcilab.motion import Motion
 
 
 def require_admissible(
@@ -44,7 +44,8 @@ def require_admissible(
         CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
         UsageError: The arm is moving, no controller is connected, no operator is present, or the motion is too long.
     """
-    require_motion(motion, certificate)
+    require_motion(motion)
+    require_certificate(certificate)
     require_mode(mode)
     q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
     if certificate is None:

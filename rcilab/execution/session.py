@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.speed_scaling_check import plan_start
 from rcilab.core.arrays import as_number, described
@@ -27,22 +28,20 @@ from rcilab.execution.motion_runner import MotionRunner, RunListener
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.speed_override import SpeedOverride, StreamRows
-from rcilab.execution.start_pose_check import describe_start_mismatch, require_motion
+from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
 from rcilab.makers.maker import require_driver, require_feature, require_parts
 from rcilab.model.robot_model import load_model, require_model
-from rcilab.motion import plan_joint
+from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.speed_scaling import require_speed_override
 from rcilab.recording.run import Run
 
 if TYPE_CHECKING:
-    from rcilab.conformance.certificate import Certificate
     from rcilab.model.robot_model import RobotModel
-    from rcilab.motion import Motion
     from rcilab.motion.path import Path
 
 _sessions: weakref.WeakSet[RobotSession] = weakref.WeakSet()
@@ -382,7 +381,8 @@ class RobotSession(Closeable):
             ControlError: The controller stopped it; see `.faults` and `.run`, and call `recover()`.
             ConnectionLostError: The connection to the controller is lost.
         """
-        require_motion(motion, certificate)
+        require_motion(motion)
+        require_certificate(certificate)
         require_feature(self.model, require_mode(mode))
         require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):

@@ -1,4 +1,4 @@
-"""Checks before a motion is sent: its type, its certificate, and its start position."""
+"""Whether a motion starts where the arm is."""
 
 from __future__ import annotations
 
@@ -8,25 +8,6 @@ import numpy as np
 
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.core.arrays import JointVector
-from rcilab.core.errors import InvalidValueError
-
-
-def require_motion(motion: object, certificate: object) -> None:
-    """Requires a motion, and a certificate or None.
-
-    Raises:
-        InvalidValueError: It is something else, such as a report; the message says what to pass.
-    """
-    from rcilab.conformance.certificate import Certificate
-    from rcilab.conformance.report import Report
-    from rcilab.motion import Motion
-
-    if not isinstance(motion, Motion):
-        raise InvalidValueError("motion", motion, "must be a motion; use plan_joint or Motion.from_cycles")
-    if isinstance(certificate, Report):
-        raise InvalidValueError("certificate", "report", "is not the proof: pass report.certificate, not the report")
-    if certificate is not None and not isinstance(certificate, Certificate):
-        raise InvalidValueError("certificate", certificate, "is not one; pass check(motion, model).certificate")
 
 
 def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:

@@ -3,7 +3,7 @@ import pickle
 import numpy as np
 import pytest
 
-from rcilab.conformance.certificate import verify_certificate
+from rcilab.conformance.certificate import require_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.start import StartState
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
@@ -68,7 +68,7 @@ def test_a_certificate_covers_the_safety_box_it_was_judged_with():
         covered.verify(MOTION, MODEL, START, SafetyBox(size=(4.0, 4.0, 3.0), T_base_box=Pose()))
     assert caught.value.changed == ("safety box",)
     with pytest.raises(CertificateError, match="safety box"):
-        verify_certificate(CERTIFICATE, MOTION, MODEL, START, box)
+        CERTIFICATE.verify(MOTION, MODEL, START, box)
 
 
 def test_a_box_that_bounds_nothing_needs_no_cover():
@@ -96,7 +96,7 @@ def test_a_certificate_covers_the_distances_it_was_judged_with():
 def test_where_nobody_looked_for_collisions_no_hand_off_takes_the_certificate(distance):
     quick = check(MOTION, MODEL, distance=None).certificate
     with pytest.raises(CertificateError, match="collisions were not checked: check the motion again") as caught:
-        verify_certificate(quick, MOTION, MODEL, START, distance=distance)
+        quick.verify(MOTION, MODEL, START, distance=distance)
     assert caught.value.changed == ("safety distance",)
 
 
@@ -104,12 +104,6 @@ def test_a_report_that_is_not_ok_has_no_certificate():
     report = check(Motion.from_cycles(MOTION.q[:500]), MODEL)
     assert not report.ok
     assert report.certificate is None
-
-
-def test_a_missing_certificate_is_refused_with_the_way_to_one():
-    with pytest.raises(CertificateError, match=r"run rcilab\.check"):
-        verify_certificate(None, MOTION, MODEL, START)
-    verify_certificate(CERTIFICATE, MOTION, MODEL, START)
 
 
 def test_it_travels_between_processes():
@@ -121,9 +115,11 @@ def test_it_travels_between_processes():
 
 def test_what_is_no_certificate_is_refused_in_words():
     with pytest.raises(InvalidValueError, match=r"certificate: pass report\.certificate, not the report"):
-        verify_certificate(check(MOTION, MODEL), MOTION, MODEL, START)
-    with pytest.raises(InvalidValueError, match="certificate: 'yes' is not a certificate"):
-        verify_certificate("yes", MOTION, MODEL, START)
+        require_certificate(check(MOTION, MODEL))
+    with pytest.raises(InvalidValueError, match="certificate must be a Certificate, got 'yes'; pass report"):
+        require_certificate("yes")
+    require_certificate(CERTIFICATE)
+    require_certificate(None)
     with pytest.raises(InvalidValueError, match=r"use load_model\('xMatePro7'\)"):
         CERTIFICATE.verify(MOTION, "xMatePro7", START)
     with pytest.raises(InvalidValueError, match=r"motion must be a motion.*, got None"):
