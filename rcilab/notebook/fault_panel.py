@@ -15,7 +15,7 @@ from rcilab.app.fault_lab.table import FaultTable
 from rcilab.app.status_text import tell_error, tell_remedy
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode, name_faults
-from rcilab.i18n.translator import Message, Text, message
+from rcilab.i18n.translator import Text, message
 from rcilab.notebook.exhibit_plot import draw_exhibit
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask
@@ -110,7 +110,7 @@ class FaultPanel(Part):
         said = self._failed
         if self._work.is_busy and fault is not None:
             said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
-        obstacle = self._obstacle(fault)
+        obstacle = self._faults.obstacle(fault)
         self.moment.layout.display = "none" if exhibit is None else None
         if exhibit is not None:
             details = _exhibit_html(exhibit, text)
@@ -120,14 +120,6 @@ class FaultPanel(Part):
             )
         write(self._shown_text, said + details)
         self.provoke.disabled = obstacle is not None or self._work.is_busy
-
-    def _obstacle(self, fault: FaultCode | None) -> Message | None:
-        """Returns why a fault cannot be provoked on this arm; None where it can."""
-        if fault is None or fault not in self._faults:
-            return message("learn.no_scenarios", model=self.model.name)
-        if self._faults[fault].needs_elbow and not self.model.redundancy:
-            return message("fault.no_elbow", model=self.model.name)
-        return None
 
     def _provoke(self) -> None:
         fault: FaultCode = self.fault.value

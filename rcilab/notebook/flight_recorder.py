@@ -45,10 +45,10 @@ def record_html(state: LabState, text: Text) -> str:
 
 
 def _last_rows(state: LabState) -> NDArray[Any] | None:
-    error, run = state.error, state.run
-    record = getattr(error, "record", None)
-    if record is None and run is not None and (error is not None or run.stopped):
-        record = run.cycles
+    outcome = state.outcome
+    if outcome is None or (outcome.error is None and (outcome.run is None or not outcome.run.stopped)):
+        return None
+    record = outcome.record
     if record is None or not len(record):
         return None
     rows = record[np.isfinite(record["t"])]

@@ -261,11 +261,10 @@ class RunPanel(Part):
     def _take_in(self, outcome: Outcome) -> None:
         if outcome.what == "limits":
             self.limits.take(outcome.error)
-        if outcome.what == "execute":
-            self.state.take_run(outcome.run, outcome.error)
+        if outcome.what in ("execute", "cell"):
+            self.state.take(outcome)
         said = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
-        if outcome.what == "cell" and outcome.run is not None:
-            self.state.take_cell_run(outcome.run, outcome.error)
+        if outcome.what == "cell":
             said += soft(self.text("run.of_cell"))
         write(self._outcome, said)
 
@@ -292,6 +291,7 @@ class RunPanel(Part):
         if reason is None and plan is not None:
             self.state.exhibit(None)
             self.state.look_at(None)
+            self.state.outcome = None
             write(self._outcome, "")
             self._running = plan.motion.duration
             try:
@@ -395,7 +395,8 @@ def _obstacle(state: LabState) -> Message | None:
         return message("ready.closed")
     if status.phase == "closed" and state.session is not None:
         return message("ready.session_closed")
-    was_stop = status.phase == "fault" and state.error is not None and state.error.code == SAFETY_STOP
+    error = None if state.outcome is None else state.outcome.error
+    was_stop = status.phase == "fault" and error is not None and error.code == SAFETY_STOP
     is_released = status.code == "fault.released" or was_stop
     resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed, is_released=is_released)
     if resting is not None or state.now.plan is None:

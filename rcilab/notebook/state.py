@@ -26,7 +26,7 @@ from rcilab.app.run.plan_readiness import ArmStatus
 from rcilab.app.state_store import StateStore
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.background_job import ProgressCallback
-from rcilab.core.errors import InvalidValueError, RcilabError
+from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode, require_mode
 from rcilab.i18n.translator import Message
@@ -35,6 +35,7 @@ from rcilab.model.robot_model import RobotModel, require_model
 if TYPE_CHECKING:
     from rcilab.app.exhibition import Exhibition
     from rcilab.app.robot_connection import RobotConnection
+    from rcilab.app.run.robot_requests import Outcome
     from rcilab.app.session_connection import SessionConnection
     from rcilab.control_process import SupervisorStatus
     from rcilab.execution.session import RobotSession
@@ -71,13 +72,9 @@ class LabState:
         """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
         self.exhibition: Exhibition | None = None
         """A fault, or what a cell did, looked at in place of the plan until the next plan, pose or execution."""
-        self.run: Run | None = None
-        """What came of the last execution."""
-        self.is_run_of_plan = True
-        """Whether it was one of the plan; a cell may have run something else."""
-        self._ran: Plan | None = None  # The plan as it was run, where its speed override was changed on the way.
-        self.error: RcilabError | None = None
-        """Why the last execution did not reach its end; None when it did."""
+        self.outcome: Outcome | None = None
+        """How the last execution ended, of the plan or of a cell; None: none yet, or one is in progress."""
+        self._as_run: Plan | None = None  # The plan as it was run, where its speed override was changed on the way.
         self._hearers: dict[Topic, list[Callable[[], None]]] = {}
 
     def hear(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
@@ -139,26 +136,37 @@ class LabState:
     @property
     def seen(self) -> Plan | None:
         """What timeline and curves show: the plan, as it was run if it was, or what is on show in its place."""
-        return self._ran or self.now.plan if self.exhibition is None else self.exhibition.plan
+        return self._played if self.exhibition is None else self.exhibition.plan
 
     @property
     def seen_arm(self) -> Plan | None:
         """Where the scene shows the arm at a moment."""
-        return self._ran or self.now.plan if self.exhibition is None else self.exhibition.scene
+        return self._played if self.exhibition is None else self.exhibition.scene
 
     @property
     def seen_run(self) -> Run | None:
         """What happened beside what is seen."""
         if self.exhibition is not None:
             return self.exhibition.run
-        return self.run if self.is_run_of_plan else None
+        recording = self.now.recording
+        return None if recording is None else recording.run
+
+    @property
+    def _played(self) -> Plan | None:
+        """The plan; as it was run, where its speed override was changed on the way."""
+        plan, run = self.now.plan, self.seen_run
+        if plan is None or run is None or run.plan is None or not run.paced:
+            return plan
+        if self._as_run is None or self._as_run.motion is not run.plan:
+            self._as_run = build_plan_view(self.model, run.plan, plan.report, plan.box)
+        return self._as_run
 
     def start_from(self, q: ArrayLike) -> None:
         """Sets where the arm is while no robot is connected, shape (n,), [rad]."""
         with self.lock:
             self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
-            self.store.update(plan=None, no_plan=None)
-            self.moment, self.exhibition, self._ran = None, None, None
+            self.store.update(plan=None, no_plan=None, recording=None)
+            self.moment, self.exhibition = None, None
             self.tell("plan", "moment", "goal")
 
     def pose(self, q: ArrayLike) -> None:
@@ -231,7 +239,7 @@ class LabState:
         """Shows a plan, or why none was found."""
         with self.lock:
             self.goals.show(made)
-            self.run, self.moment, self.exhibition, self._ran = None, None, None, None
+            self.moment, self.exhibition = None, None
             self.tell("plan", "moment")
 
     def limit_joints(self, lower: ArrayLike, upper: ArrayLike) -> None:
@@ -256,27 +264,17 @@ class LabState:
         if now is not own:
             self.limit_joints(own.lower, own.upper)
 
-    def take_run(self, run: Run | None, error: RcilabError | None = None) -> None:
-        """Shows what came of an execution beside its plan: the run, and why it did not reach its end."""
-        with self.lock:
-            self.run, self.error, self.is_run_of_plan, before = run, error, True, self._ran
-            self._ran = None
-            plan = self.now.plan
-            if run is not None and run.paced and run.plan is not None and plan is not None:
-                self._ran = build_plan_view(self.model, run.plan, plan.report, plan.box)
-            if self._ran is not before:  # Its times are others now.
-                self.moment = None
-                self.tell("plan", "moment")
-            self.tell("run")
-
-    def take_cell_run(self, run: Run, error: RcilabError | None = None) -> None:
-        """Shows what a cell did in place of the plan, which stays."""
+    def take(self, outcome: Outcome) -> None:
+        """Shows how an execution ended: that of the plan beside it, that of a cell in its place."""
         from rcilab.app.exhibition import exhibit_run
 
-        seen = exhibit_run(run, self.model)
         with self.lock:
-            self.run, self.error, self.is_run_of_plan, self._ran = run, error, False, None
-            self.exhibit(seen)
+            self.outcome, run = outcome, outcome.run
+            if outcome.what == "cell":
+                self.exhibit(None if run is None else exhibit_run(run, self.model))
+            elif run is not None and run.paced:  # The times of the plan are others now.
+                self.moment = None
+                self.tell("plan", "moment")
             self.tell("run")
 
     def halt(self) -> None:

@@ -90,10 +90,10 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
         panel.stop.click()
         run = cell.end()
         assert run.stopped == "on request"
-        wait_for(lambda: panel.state.run is not None, what="the recording")
+        wait_for(lambda: panel.state.outcome is not None, what="the recording")
         wait_for(lambda: "Stopped before its end" in panel._outcome.value, what="the outcome in words")
         assert "A cell moved the arm" in panel._outcome.value
-        assert panel.state.run is run
+        assert panel.state.outcome.run is run
         assert panel.state.now.plan is planned  # The person's own is still there.
         assert "rl-panels" in plot.html
         assert timeline.slider.max == round(1000.0 * run.plan.duration)
@@ -125,7 +125,7 @@ def test_a_callback_of_a_cell_is_shown_as_moving_without_an_end_that_nobody_know
     panel.stop.click()
     run = cell.end()
     assert run.stopped == "on request"
-    wait_for(lambda: panel.state.run is run, what="the recording")
+    wait_for(lambda: (ended := panel.state.outcome) is not None and ended.run is run, what="the recording")
     seen = panel.state.seen
     assert seen is not None
     np.testing.assert_allclose(seen.motion.q[0], run.command[0], atol=1e-9)
@@ -137,7 +137,7 @@ def test_a_fault_in_a_cell_is_told_and_its_last_cycles_are_kept(robot: RobotSess
         error = Cell(lambda: sway(robot, until=5.0, jump=0.1)).end()
         assert isinstance(error, ControlError)
         wait_for(lambda: "The controller stopped the arm" in panel._outcome.value, what="the outcome in words")
-        assert panel.state.error is error
+        assert panel.state.outcome.error is error
         assert "rl-panels" in faults._record.value
     robot.recover()
 

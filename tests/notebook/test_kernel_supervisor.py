@@ -45,7 +45,7 @@ panel.power_on.click()
 until(lambda: panel.state.status.powered)
 """
 MOVE = """
-panel.state.error = None
+panel.state.outcome = None
 sign = 1.0 if panel.state.here[0] < 0.0 else -1.0
 panel.state.store.update(speed=0.005)  # Minutes: an arrival is no stop.
 panel.state.pose(model.home + 0.5 * sign)
@@ -82,7 +82,7 @@ slow.on_click(lambda _: time.sleep(2.0))
 """
 CLICK: dict[str, Any] = {"method": "custom", "content": {"event": "click"}}
 STANDS = """
-until(lambda: panel.state.error is not None)
+until(lambda: panel.state.outcome is not None and panel.state.outcome.error is not None)
 panel.state.status.phase, panel.state.status.motion_time < panel.state.now.plan.motion.duration - 1.0
 """
 

@@ -47,7 +47,7 @@ def run_in(panel: RunPanel, mode: str, speed: float, way: float) -> Any:
     assert plan is not None
     assert plan.mode == mode
     panel.execute.click()
-    return wait_for(lambda: panel.state.run, 30.0, "the run")
+    return wait_for(lambda: panel.state.outcome, 30.0, "the run").run
 
 
 def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> None:

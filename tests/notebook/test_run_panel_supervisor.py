@@ -49,8 +49,8 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
         panel.state.make_plan()
         assert not panel.execute.disabled
         panel.execute.click()
-        wait_for(lambda: panel.state.run is not None, what="the run")
-        run = panel.state.run
+        wait_for(lambda: panel.state.outcome is not None, what="the run")
+        run = panel.state.outcome.run
         assert run is not None
         np.testing.assert_allclose(run.q[-1], jog.q, atol=1e-6)
         wait_for(lambda: "Arrived" in panel._outcome.value, what="the outcome in words")
@@ -61,7 +61,7 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
         panel.execute.click()
         wait_for(lambda: phase(panel) == "moving" and (panel.state.status.motion_time or 0.0) > 0.05, what="a motion")
         panel.stop.click()
-        wait_for(lambda: panel.state.error is not None, what="the end of the motion")
+        wait_for(lambda: panel.state.outcome is not None, what="the end of the motion")
         wait_for(lambda: "Stopped before its end" in panel._outcome.value, what="the outcome in words")
         status = panel.state.status
         assert status is not None
@@ -86,8 +86,8 @@ def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch)
         panel.execute.click()
         wait_for(lambda: phase(panel) == "moving", what="a motion")
         monkeypatch.setattr(heart, "_missed", PATIENCE)  # And is not any more.
-        wait_for(lambda: panel.state.run is not None, what="the run")
-        run = panel.state.run
+        wait_for(lambda: panel.state.outcome is not None, what="the run")
+        run = panel.state.outcome.run
         assert run is not None
         assert run.stopped == LEFT_ALONE
         wait_for(lambda: "page did not answer" in panel._outcome.value, what="why, in words")
@@ -102,7 +102,7 @@ def test_a_session_is_driven_in_its_own_words_and_left_open() -> None:
             panel.state.pose(PRO7.home + 0.05)
             panel.state.make_plan()
             panel.execute.click()
-            wait_for(lambda: panel.state.run is not None, what="the run")
+            wait_for(lambda: panel.state.outcome is not None, what="the run")
             with notebook.JogPanel(robot) as jog:
                 assert jog.state is panel.state
         np.testing.assert_allclose(robot.state.q_c, PRO7.home + 0.05, atol=1e-9)
@@ -149,8 +149,8 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         wait_for(
             lambda: not speed_override._way.value, what="the end of what is said of it"
         )  # Another thread writes it, a moment later.
-        wait_for(lambda: panel.state.run is not None, what="the run")
-        run = panel.state.run
+        wait_for(lambda: panel.state.outcome is not None, what="the run")
+        run = panel.state.outcome.run
         assert run is not None
         assert run.paced
         assert run.stop_time is not None

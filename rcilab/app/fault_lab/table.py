@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from rcilab.core.fault import FaultCode
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.maker import maker_of
 from rcilab.makers.scenario import GROUPS, FaultScenario, Group
 from rcilab.model.robot_model import RobotModel
@@ -18,6 +19,7 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
     """
 
     def __init__(self, model: RobotModel) -> None:
+        self._model = model
         maker = maker_of(model)
         scenarios = () if maker is None else maker.scenarios()
         self._scenarios = {scenario.fault: scenario for scenario in scenarios}
@@ -30,6 +32,14 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
 
     def __len__(self) -> int:
         return len(self._scenarios)
+
+    def obstacle(self, fault: FaultCode | None) -> Message | None:
+        """Returns why a fault, if there is one, cannot be provoked on this arm; None: it can."""
+        if fault is None or fault not in self:
+            return message("learn.no_scenarios", model=self._model.name)
+        if self[fault].needs_elbow and not self._model.redundancy:
+            return message("learn.no_elbow", model=self._model.name)
+        return None
 
     def group(self, group: Group) -> tuple[FaultScenario, ...]:
         """Returns the scenarios of a group, in the order to show them."""

@@ -102,14 +102,16 @@ class LearnActions:
 
     def _provoke(self, fault: int) -> None:
         model = self._store.state.model
-        scenario = next((scenario for known, scenario in FaultTable(model).items() if known == fault), None)
-        if scenario is None:
+        table = FaultTable(model)
+        chosen = next((known for known in table if known == fault), None)
+        if chosen is None:
             return
-        if scenario.needs_elbow and not model.redundancy:
-            self._set(problem=message("learn.no_elbow", model=model.name))
+        obstacle = table.obstacle(chosen)
+        if obstacle is not None:
+            self._set(problem=obstacle)
             return
-        self._work.start(scenario.fault, partial(self._arm.provoke, scenario.fault, model.name))
-        self._set(provoking=scenario.fault, progress=0.0, problem=None)
+        self._work.start(chosen, partial(self._arm.provoke, chosen, model.name))
+        self._set(provoking=chosen, progress=0.0, problem=None)
 
     def _finish(self, result: FaultDemo | RcilabError) -> None:
         if isinstance(result, RcilabError):

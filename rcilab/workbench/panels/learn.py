@@ -62,7 +62,7 @@ class LearnPanel:
         if busy:
             self._bar.value = round(100.0 * learn.progress, 1)
         for fault, button in self._buttons.items():
-            button.disabled = busy or (self._faults[fault].needs_elbow and not state.model.redundancy)
+            button.disabled = busy or self._faults.obstacle(fault) is not None
 
 
 def _provoke(fault: FaultCode):  # type: ignore[no-untyped-def]
