@@ -56,11 +56,6 @@ class LimitViolation(NamedTuple):
         return Remark(self.text, "passes", condition=row.id, **amounts)
 
 
-def describe_violations(violations: Iterable[LimitViolation]) -> Remark:
-    """Returns all of them in one line."""
-    return Remark.all(violation.remark for violation in violations)
-
-
 def faults_of(violations: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:
     """Returns the faults that they raise, by number and once each."""
     return tuple(sorted({row.fault for row, *_ in violations if row.fault is not None}))

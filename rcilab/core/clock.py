@@ -32,26 +32,3 @@ class SystemClock:
         remaining = deadline - time.monotonic()
         if remaining > 0.0:
             time.sleep(remaining)
-
-
-class ManualClock:
-    """A clock that advances only in `advance` and `sleep_until`.
-
-    Args:
-        start: First reading, [s].
-    """
-
-    def __init__(self, start: float = 0.0) -> None:
-        self._now = start
-
-    def now(self) -> float:
-        """Returns its current time, [s]."""
-        return self._now
-
-    def advance(self, duration: float) -> None:
-        """Advances the clock by `duration`, [s]."""
-        self._now += duration
-
-    def sleep_until(self, deadline: float) -> None:
-        """Sets the clock to `deadline`, [s], unless that has passed."""
-        self._now = max(self._now, deadline)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeAlias
 
-from rcilab.core.arrays import Array, JointPath
+from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, JointPosition
+from rcilab.core.command import CartesianPosition
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
 
@@ -19,24 +19,6 @@ Progress: TypeAlias = Callable[[float, float], None]
 """`(t, duration)`, both [s]; called about 20 times a second from inside the loop, so it must be quick."""
 
 _PROGRESS_CYCLES = 50
-
-
-def follow(rows: JointPath, on_cycle: Callable[[int], None] | None = None) -> Callback:
-    """Returns the callback that streams prepared joint angles: row k in controller cycle k.
-
-    Args:
-        rows: Joint angles, shape (N, n), [rad].
-        on_cycle: Called with the number of every cycle.
-    """
-    last = len(rows) - 1
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = min(round(t / CYCLE_TIME), last)
-        if on_cycle is not None:
-            on_cycle(cycle)
-        return JointPosition(rows[cycle], finished=cycle == last)
-
-    return callback
 
 
 def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[int], None] | None = None) -> Callback:

@@ -22,7 +22,7 @@ from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.control_loop import SILENCE, SILENCE_HERE, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
-from rcilab.execution.motion_callback import Progress, follow, follow_poses, report_progress
+from rcilab.execution.motion_callback import Progress, follow_poses, report_progress
 from rcilab.execution.motion_progress import MotionProgress
 from rcilab.execution.motion_runner import MotionRunner, RunListener
 from rcilab.execution.session_lock import SessionLock
@@ -515,8 +515,8 @@ class RobotSession(Closeable):
             state = self.receive_state()
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
             self._require_allowed(motion, state)
-            callback = follow(motion.q, report_progress(motion, progress))
-            return self._runner.run(callback, "joint_position", motion)
+            stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
+            return self._runner.run(stream, "joint_position", motion)
 
     def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
         """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.

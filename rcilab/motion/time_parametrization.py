@@ -145,11 +145,6 @@ class FastestLaw:
             squares[k + 1] = x
 
 
-def duration_of(knots: Array, squares: Array) -> float:
-    """Returns how long the law with these squares of s' lasts, s'' constant from knot to knot, [s]."""
-    return float(_knot_times(knots, squares)[-1])
-
-
 def smooth_law(knots: Array, squares: Array, cycles: int) -> TimeParametrization:
     """Returns the law on the grid of cycles whose acceleration is the mean of the given one's over some cycles.
 

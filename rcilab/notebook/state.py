@@ -161,14 +161,6 @@ class LabState:
             self._as_run = build_plan_view(self.model, run.plan, plan.report, plan.box)
         return self._as_run
 
-    def start_from(self, q: ArrayLike) -> None:
-        """Sets where the arm is while no robot is connected, shape (n,), [rad]."""
-        with self.lock:
-            self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
-            self.store.update(plan=None, no_plan=None, recording=None)
-            self.moment, self.exhibition = None, None
-            self.tell("plan", "moment", "goal")
-
     def pose(self, q: ArrayLike) -> None:
         """Sets the goal to joint angles, shape (n,), [rad]; the plan stays until it is planned again.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from io import BytesIO, TextIOWrapper
+from io import TextIOWrapper
 from os import PathLike, fspath
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeAlias
@@ -49,15 +49,6 @@ def save_run(
         raise InvalidValueError("file", fspath(file), f"cannot be written: {error.strerror}").coded(
             "file_unwritable", file=fspath(file)
         ) from error
-
-
-def export_run(
-    run: Run, ending: str, *, progress: Progress | None = None, language: str = "en", units: Units = USUAL
-) -> bytes:
-    """Returns a run in one of the forms of `ENDINGS`; see `Run.save`."""
-    stream = BytesIO()
-    write_export(run, ending, stream, progress=progress, language=language, units=units)
-    return stream.getvalue()
 
 
 def write_export(

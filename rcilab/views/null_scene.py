@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import Array, as_vector, readonly_copy
-from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
 
 
@@ -103,17 +102,6 @@ class NullScene:
         """Counts the batches; see `Scene`."""
         self.batches += 1
         yield
-
-    def world_pose(self, name: str) -> Pose:
-        """Returns where a node stands in the world: the product of all transforms above it."""
-        self._node(name)
-        T_world_node = IDENTITY
-        parts = name.strip("/").split("/")
-        for depth in range(1, len(parts) + 1):
-            node = self.nodes.get("/" + "/".join(parts[:depth]))
-            if node is not None:
-                T_world_node = T_world_node @ Pose(node.position, node.wxyz)
-        return T_world_node
 
     def is_shown(self, name: str) -> bool:
         """Returns whether a node and everything above it is visible."""

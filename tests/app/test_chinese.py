@@ -15,7 +15,7 @@ from rcilab.app.status_text import tell_error
 from rcilab.app.text import Text, message
 from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
-from rcilab.conformance.limit_violation import LimitViolation, describe_violations
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.motion_preconditions import require_ready
 from rcilab.core.cycle_log import cycle_dtype
@@ -205,7 +205,7 @@ REASONS: dict[str, Remark] = {
     "a tool too fast": LimitViolation(RCI_CONDITIONS.find("cartesian.velocity.translation"), 0, 2.3, 2.0).remark,
     "a tool outside": LimitViolation(RCI_CONDITIONS.find("cartesian.position"), 0, 0.02, 1e-3).remark,
     "no pose": LimitViolation(RCI_CONDITIONS.find("cartesian.frame"), 0, 2.0, 1.0).remark,
-    "two at once": describe_violations([LimitViolation(RCI_CONDITIONS.find("joint.jerk"), 1, 9e3, 8e3)] * 2),
+    "two at once": Remark.all([LimitViolation(RCI_CONDITIONS.find("joint.jerk"), 1, 9e3, 8e3).remark] * 2),
     "lost commands": lost_motion(Remark("x", "thrown", joint=2, value=9.0, bound=8.0, unit="rad/s^2"))
     .violations[0]
     .remark,

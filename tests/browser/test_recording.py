@@ -13,10 +13,9 @@ import pytest
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.view_actions import SetView
 from rcilab.model.robot_model import RobotModel
-from rcilab.recording.export import export_run
 from rcilab.recording.run import build_run
 from rcilab.recording.setup import Setup
-from tests.recording.runs import MODEL, PLAN, some_cycles, some_ideal_run, some_long_run, some_run
+from tests.recording.runs import MODEL, PLAN, export_run, some_cycles, some_ideal_run, some_long_run, some_run
 
 
 def plot_numbers(page) -> list[list[str]]:

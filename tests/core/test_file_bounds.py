@@ -20,8 +20,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.recording.chunks import encode_block, encode_header
-from rcilab.recording.export import export_run
-from tests.recording.runs import some_run
+from tests.recording.runs import export_run, some_run
 
 MODEL = rcilab.load_model("xMatePro7")
 MEMORY = 1_500_000_000  # [bytes] Address space that a reader gets: the libraries take two thirds of it.

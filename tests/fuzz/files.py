@@ -11,10 +11,9 @@ import numpy as np
 import rcilab
 from rcilab.core.errors import RcilabError
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.recording.export import export_run
 from rcilab.recording.run import decode_run
 from tests.fuzz.noise import spoilt
-from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles
+from tests.recording.runs import MODEL, PLAN, SETUP, export_run, some_cycles
 
 _ROWS = 20_000  # A spoilt length may be any; no test needs more.
 

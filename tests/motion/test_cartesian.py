@@ -14,6 +14,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.robots import ROBOT_NAMES
+from tests.model.kinematics.elbow import branch_ranges
 
 SEVEN, SIX = load_model("xMatePro7"), load_model("xMate3")
 ALL = pytest.mark.parametrize("name", ROBOT_NAMES)
@@ -257,7 +258,7 @@ def test_an_unknown_orientation_is_named(plan, options):
 def elbow_below(model, psi) -> np.ndarray:
     """Joint angles on a branch that leaves the elbow from about 0 over +-pi to about 0 again, but not across 0."""
     T = model.forward([-0.528, 0.204, -2.747, 1.041, 0.222, -0.699, 3.552])
-    ((low, high),) = model.feasible_arcs(T).of_branch(5)
+    ((low, high),) = branch_ranges(model.feasible_arcs(T), 5)
     assert (low, high) == pytest.approx((0.1, math.tau - 0.1), abs=0.1)
     return np.array(model.inverse(T, psi=psi).all[5].q)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rcilab.core.arrays import Array
 from rcilab.motion.path_bounds import PathBounds, path_bounds
-from rcilab.motion.time_parametrization import FastestLaw, duration_of, fastest_squares, smooth_law
+from rcilab.motion.time_parametrization import FastestLaw, fastest_squares, smooth_law
 
 KNOTS = 400
 
@@ -51,6 +51,12 @@ def wavy(seed: int) -> Wavy:
         velocity=rng.uniform(0.5, 2.0, 3),
         acceleration=rng.uniform(2.0, 10.0, 3),
     )
+
+
+def duration_of(knots: np.ndarray, squares: np.ndarray) -> float:
+    """Returns how long the law with these squares of s' lasts, s'' constant from knot to knot, [s]."""
+    speed = np.sqrt(squares)
+    return float((2.0 * np.diff(knots) / (speed[:-1] + speed[1:])).sum())
 
 
 def lasts(bounds: PathBounds) -> float:

@@ -43,7 +43,11 @@ def lab() -> Iterator[Lab]:
 
 @pytest.fixture
 def fresh(lab: Lab) -> Lab:
-    lab.state.start_from(PRO7.home)
+    with lab.state.lock:
+        lab.state._rest = PRO7.home
+        lab.state.store.update(plan=None, no_plan=None, recording=None)
+        lab.state.moment, lab.state.exhibition = None, None
+        lab.state.tell("plan", "moment", "goal")
     lab.jog.q = PRO7.home
     return lab
 

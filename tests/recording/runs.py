@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from io import BytesIO
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ from rcilab.execution.recorder import Recorder
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_stop
+from rcilab.recording.export import write_export
 from rcilab.recording.run import Run, build_run
 from rcilab.recording.setup import Setup
 
@@ -65,3 +68,10 @@ def some_stopped_run(place: int = 300) -> Run:
 
 def some_run(**facts) -> Run:
     return build_run(some_cycles(), plan=PLAN, model=MODEL, setup=SETUP, **facts)
+
+
+def export_run(run: Run, ending: str, **options: Any) -> bytes:
+    """Returns what `Run.save` writes to a file with this ending."""
+    stream = BytesIO()
+    write_export(run, ending, stream, **options)
+    return stream.getvalue()

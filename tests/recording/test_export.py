@@ -13,8 +13,7 @@ import pytest
 
 from rcilab.i18n.units import Units
 from rcilab.recording.columns import run_facts
-from rcilab.recording.export import export_run
-from tests.recording.runs import OFFSET, SETUP, some_ideal_run, some_run, some_stopped_run
+from tests.recording.runs import OFFSET, SETUP, export_run, some_ideal_run, some_run, some_stopped_run
 
 RUN = some_run()
 

@@ -16,11 +16,10 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, encode_block, encode_header
-from rcilab.recording.export import export_run
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run
 from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, write_run
-from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, some_cycles, some_run
+from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, export_run, some_cycles, some_run
 
 
 def same(a: Run, b: Run) -> bool:

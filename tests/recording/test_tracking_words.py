@@ -10,10 +10,9 @@ import pytest
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.text import Text as PageText
 from rcilab.i18n.translator import Text
-from rcilab.recording.export import export_run
 from rcilab.recording.tracking_words import tracking_notes
 from rcilab.workbench.panels.recording import summary_html
-from tests.recording.runs import SETUP, some_ideal_run, some_run, some_stopped_run
+from tests.recording.runs import SETUP, export_run, some_ideal_run, some_run, some_stopped_run
 
 
 def notes(run, language: str = "en") -> list[str]:

@@ -26,14 +26,13 @@ from rcilab.app.view_actions import Seek
 from rcilab.core.errors import UsageError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
-from rcilab.recording.export import export_run
 from rcilab.recording.run import decode_run
 from rcilab.recording.setup import Setup
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.panels.timeline import TimelinePanel
-from tests.recording.runs import PLAN, some_run
+from tests.recording.runs import PLAN, export_run, some_run
 from tests.workbench.opened import told, wait
 
 

@@ -22,9 +22,9 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
-from rcilab.execution.motion_callback import follow
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
+from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator
 from rcilab.makers.parameters import default_parameters
@@ -167,7 +167,7 @@ class FaultLab(Closeable):
     def _go(self, robot: RobotSession, goal: Array) -> None:
         """Moves the private arm: inside every limit, and unchecked for collisions, as nothing can be hurt."""
         motion = plan_joint(self.model, robot.receive_state().q_c, goal)
-        robot.control(follow(motion.q))
+        robot.control(MotionStream(motion.q, "joint_position", self.model))
 
     def _widen(self, robot: RobotSession) -> None:
         limits = self.model.limits.joint

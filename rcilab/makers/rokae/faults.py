@@ -6,8 +6,6 @@ causes and remedies: RCI manual V1.3.1, section 4.6.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from rcilab.core.fault import FaultCode
 
 
@@ -72,11 +70,6 @@ class Fault(FaultCode):
 
 
 FAULT_COUNT = len(Fault)
-
-
-def faults_from_bits(bits: Iterable[int]) -> tuple[Fault, ...]:
-    """Returns the faults whose error byte is set, in wire order."""
-    return tuple(Fault(place) for place, bit in enumerate(bits) if bit)
 
 
 _CAUSES = {

@@ -55,10 +55,6 @@ class FeasibleArcs:
         """Ranges (start, end) of arm angles with at least one feasible branch, [rad], end above start."""
         return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok])
 
-    def of_branch(self, branch: int) -> tuple[tuple[float, float], ...]:
-        """Returns the ranges (start, end), [rad], in which one branch, 0 to 7, stays possible all along."""
-        return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok and branch in arc.branches])
-
     def nearest(self, psi: float, branch: int | None = None) -> float | None:
         """Returns the arm angle closest to one, [rad], at which a branch keeps every joint limit; None if none does.
 

@@ -17,6 +17,7 @@ from rcilab.model.kinematics.elbow_ranges import INSIDE
 from rcilab.model.kinematics.solvers.spherical.inverse import build_geometry, inverse_seven
 from rcilab.model.kinematics.solvers.spherical.singularity import find_singularity
 from rcilab.model.robot_model import RobotModel, load_model
+from tests.model.kinematics.elbow import branch_ranges
 
 NAMES = ["xMatePro3", "xMatePro7"]
 TOOL = Pose.from_rpy((0.03, -0.02, 0.12), (0.3, -0.4, 0.5))
@@ -102,7 +103,7 @@ def test_arcs_cover_the_circle_once_and_neighbours_differ(name, seed):
     is_in = any((psi - start) % math.tau <= end - start for start, end in found.feasible)
     assert is_in == found.at(psi).ok
     for branch in range(8):
-        for start, end in found.of_branch(branch):
+        for start, end in branch_ranges(found, branch):
             middle = found.at(0.5 * (start + end))
             assert middle.ok
             assert branch in middle.branches

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from rcilab.core.clock import CYCLE_TIME, ManualClock
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.rokae.faults import Fault
 from rcilab.sim.cycle_timer import LONGEST_PATIENCE, CycleTimer
 from tests.makers.rokae.controller.conftest import Hand
+from tests.manual_clock import ManualClock
 
 START = 0.1  # [s] into the motion, when somebody stops.
 

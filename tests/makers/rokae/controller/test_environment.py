@@ -7,7 +7,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rcilab.core.clock import ManualClock
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import load_model
@@ -20,6 +19,7 @@ from rcilab.sim.environment import Environment, ServerCounters
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.plants import build_plant
 from rcilab.sim.virtual_arm import VirtualArm
+from tests.manual_clock import ManualClock
 from tests.sim.api.test_world_lines import REQUESTS
 
 MODEL = load_model("xMatePro7")
