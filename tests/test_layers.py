@@ -68,10 +68,6 @@ LATE_FILES = re.compile(r"rcilab\.makers\.\w+\.maker")
 """A maker is cheap to import: its codec, controller and driver are loaded by the methods that need them."""
 NAMES_A_MAKER = {"rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI"}
 """Modules outside `makers` that import a maker's folder, and why."""
-LATE_LEFT = {"app": 8, "notebook": 7}
-"""Function-level imports of rcilab that are still to go, a part: a smaller number here with each that goes."""
-CIRCLES_LEFT: set[tuple[str, ...]] = set()
-"""Import circles that are still to go; one that has gone goes from here too."""
 
 MODULES = sorted((ROOT / "rcilab").rglob("*.py"))
 NAMES = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for path in MODULES}
@@ -184,21 +180,17 @@ def test_no_modules_import_each_other_in_circles() -> None:
     edges = {name_of(path): {module for module, _ in runtime_imports(path)} - {name_of(path)} for path in MODULES}
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == {("a", "b", "c")}
     found = circles(edges)
-    assert found <= CIRCLES_LEFT, "import circles: " + "; ".join(" ".join(group) for group in found - CIRCLES_LEFT)
-    assert found >= CIRCLES_LEFT, f"gone, take them out of CIRCLES_LEFT: {CIRCLES_LEFT - found}"
+    assert not found, "import circles: " + "; ".join(" ".join(group) for group in found)
 
 
 def test_functions_import_only_what_loads_a_heavy_library() -> None:
-    late: dict[str, set[str]] = {}
+    late: list[str] = []
     for path in MODULES:
         name = name_of(path)
         for module, is_late in runtime_imports(path):
             if is_late and not (module in LATE_TARGETS or part_of(name) in LATE_PARTS or LATE_FILES.fullmatch(name)):
-                late.setdefault(part_of(name), set()).add(f"{name} imports {module}")
-    for part in late.keys() | LATE_LEFT.keys():
-        found, known = late.get(part, set()), LATE_LEFT.get(part, 0)
-        assert len(found) <= known, f"{len(found)} function-level imports, {known} known:\n" + "\n".join(sorted(found))
-        assert len(found) >= known, f"fewer than known: write {len(found)} for {part!r} in LATE_LEFT"
+                late.append(f"{name} imports {module}")
+    assert not late, "function-level imports:\n" + "\n".join(late)
 
 
 def test_no_module_is_outside_the_layers() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.conformance.check import check
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
@@ -18,6 +19,7 @@ from rcilab.core.state import Mode
 from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion import plan_arc, plan_joint, plan_line, plan_recovery
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
@@ -67,8 +69,6 @@ class Plan:
 
     def completed(self, mode: Mode = "joint_position") -> Plan:
         """Returns this plan with a report on all conditions of a mode, collisions too: what may be executed."""
-        from rcilab.conformance.check import check
-
         if self.complete and self.mode == mode:
             return self
         report = check(self.motion, self.model, box=self.box, mode=mode)
@@ -111,8 +111,6 @@ def make_plan(
     via: Pose | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal, checked except for collisions, or why none was found."""
-    from rcilab.conformance.check import check
-
     for place, q in (("start", start), ("goal", goal)):
         joint = find_outside(model, q)
         if joint is not None:
@@ -135,9 +133,6 @@ def make_plan(
 
 def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
     """Returns the motion that leads joints and tool back inside, checked but for collisions, or why none does."""
-    from rcilab.conformance.check import check
-    from rcilab.motion import plan_recovery
-
     try:
         motion = plan_recovery(model, start, box)
         report = check(motion, model, start=start, box=box, distance=None)
@@ -174,8 +169,6 @@ def _go(
     kind: PathKind,
     via: Pose | None,
 ) -> Motion:
-    from rcilab.motion import plan_arc, plan_joint, plan_line
-
     if kind == "joint":
         return plan_joint(model, start, goal, speed=speed, law=law)
     target, psi = model.forward(goal), model.arm_angle(goal) if model.redundancy else None

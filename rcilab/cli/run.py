@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.core.arrays import JointVector
     from rcilab.core.state import RobotState
-    from rcilab.execution import RobotSession, Run
+    from rcilab.execution.session import RobotSession
     from rcilab.motion import Motion
+    from rcilab.recording.run import Run
 
 _DONE, _NOT_DONE = 0, 1
 _TO_START_SPEED = 0.2  # Part of the limits; slow, because the way is not the program's.
@@ -118,7 +119,7 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
 
 def _run(args: Namespace, stopper: _Stopper) -> int:
     from rcilab.cli.report_json import as_json_text
-    from rcilab.execution import connect
+    from rcilab.execution.session import connect
     from rcilab.execution.start_pose_check import describe_start_mismatch
     from rcilab.model.robot_model import load_model
 

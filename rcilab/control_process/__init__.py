@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ __all__ = ["PendingRequest", "Supervisor", "SupervisorStatus"]
 
 def __getattr__(name: str) -> object:
     """Imports a public name when it is first asked for: the control process must not pay for its parent's imports."""
-    from importlib import import_module
-
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -20,6 +20,8 @@ from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any, Protocol
 
+from rcilab.notebook.browser_watchdog import BrowserWatchdog
+
 
 class CellResource(Protocol):
     """What a cell may own."""
@@ -134,8 +136,6 @@ def kernel_cells() -> CellRegistry:
         _kernel_cells = CellRegistry(shell)
         atexit.register(_kernel_cells.close)
         if getattr(shell, "kernel", None) is not None and find_spec("ipywidgets") is not None:
-            from rcilab.notebook.browser_watchdog import BrowserWatchdog
-
             _kernel_cells.keep(BrowserWatchdog(lambda: kernel_cells().is_running))
     return _kernel_cells
 

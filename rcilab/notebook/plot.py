@@ -23,6 +23,7 @@ from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.fonts import writing
 from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.palette import JOINT_COLORS
+from rcilab.recording.run import Run
 from rcilab.views.plots import QUANTITIES, recorded_curves
 
 if TYPE_CHECKING:
@@ -229,8 +230,6 @@ def _motion_and_run(motion: object, run: object) -> tuple[Motion, Run | None]:
     Raises:
         InvalidValueError: One of them is something else.
     """
-    from rcilab.recording.run import Run
-
     if isinstance(motion, Run):
         return motion.plan or motion.commanded(), motion
     if run is not None and not isinstance(run, Run):

@@ -18,6 +18,7 @@ from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.motion import Motion
 from rcilab.notebook.kernel_reachability import find_place
 from rcilab.notebook.optional_deps import require_installed
 from rcilab.robots.upright import upright_joints
@@ -204,8 +205,6 @@ def aim_camera(visualizer: Any) -> None:
 
 def _motion_in(what: Motion | ArrayLike) -> Motion | None:
     """Returns what is to be played, if it is a motion."""
-    from rcilab.motion.motion import Motion
-
     return what if isinstance(what, Motion) else None
 
 

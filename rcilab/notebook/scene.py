@@ -16,6 +16,7 @@ from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.part import Part
 from rcilab.notebook.preview import Preview, aim_camera
 from rcilab.notebook.style import block, soft, write
+from rcilab.notebook.viser_link import LOOPBACK, open_page
 from rcilab.views.arm_view import ArmView
 from rcilab.views.scene import Color
 from rcilab.views.scene import Scene as Canvas
@@ -189,7 +190,6 @@ class _LivePicture:
         return self._meshcat
 
     def _open_viser(self) -> Canvas:
-        from rcilab.notebook.viser_link import LOOPBACK, open_page
         from rcilab.views.viser_scene import ViserScene
 
         self._door, port = open_page(0)

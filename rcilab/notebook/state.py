@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeGuard
 from numpy.typing import ArrayLike
 
 from rcilab.app.app_state import AppState
+from rcilab.app.exhibition import exhibit_run
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
 from rcilab.app.goal.target_status import evaluate_joints
@@ -24,6 +25,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.run.drive_state import choose_mode
 from rcilab.app.run.plan_readiness import ArmStatus
 from rcilab.app.state_store import StateStore
+from rcilab.conformance.check import check
 from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import InvalidValueError
@@ -31,6 +33,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode, require_mode
 from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel, require_model
+from rcilab.motion.motion import require_motion
 
 if TYPE_CHECKING:
     from rcilab.app.exhibition import Exhibition
@@ -209,9 +212,6 @@ class LabState:
 
     def take_motion(self, motion: Motion) -> None:
         """Takes a motion that was planned elsewhere; it is checked as any other."""
-        from rcilab.conformance.check import check
-        from rcilab.motion.motion import require_motion
-
         require_motion(motion)
         mode = self.now.drive.mode
         report = check(motion, self.model, mode=mode)
@@ -258,8 +258,6 @@ class LabState:
 
     def take(self, outcome: Outcome) -> None:
         """Shows how an execution ended: that of the plan beside it, that of a cell in its place."""
-        from rcilab.app.exhibition import exhibit_run
-
         with self.lock:
             self.outcome, run = outcome, outcome.run
             if outcome.what == "cell":

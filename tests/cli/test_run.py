@@ -15,7 +15,7 @@ from rcilab.cli import main
 from rcilab.control_process.launch import start_controller
 from rcilab.core.command import JointPosition
 from rcilab.core.errors import ControlError
-from rcilab.execution import connect
+from rcilab.execution.session import connect
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint

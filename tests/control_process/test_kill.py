@@ -18,7 +18,7 @@ import pytest
 from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import ConnectionLostError
-from rcilab.execution import connect
+from rcilab.execution.session import connect
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.motion import plan_joint
 from rcilab.sim.controller_config import ControllerConfig

@@ -10,7 +10,7 @@ import pytest
 
 from rcilab.cli import _build_parser
 from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError, ModelError
-from rcilab.execution import connect
+from rcilab.execution.session import connect
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.driver.identify import require_same_arm
 from rcilab.model.robot_model import load_model

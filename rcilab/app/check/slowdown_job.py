@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from rcilab.app.planning import Plan, build_plan_view, make_plan
 from rcilab.app.program.program_draft import Draft
 from rcilab.app.program.program_planning import PROGRAM_LAW
+from rcilab.conformance.check import check
 from rcilab.core.background_job import ProgressCallback
+from rcilab.motion import plan_program
 
 if TYPE_CHECKING:
     from rcilab.app.planning import PlannableLaw
@@ -49,9 +51,6 @@ def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: ProgressCall
 
 def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) -> SlowdownJob:
     """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
-    from rcilab.conformance.check import check
-    from rcilab.motion import plan_program
-
     drafts: dict[float, Draft] = {}
 
     def make(scale: float) -> Plan | None:

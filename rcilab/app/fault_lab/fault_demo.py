@@ -19,6 +19,7 @@ from rcilab.i18n.locale import Language
 from rcilab.i18n.units import USUAL, Units
 from rcilab.makers.scenario import FaultScenario
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion import Motion
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
@@ -101,8 +102,6 @@ class FaultDemo:
         After the fault it is the controller's way to rest. While torques are commanded no angles are: the motion stands
         at the start.
         """
-        from rcilab.motion import Motion
-
         q, sent = self._every_cycle("q_c"), self.cycles["command"][:-1]
         if self.scenario.mode == "torque":
             q[:] = q[0]
@@ -113,8 +112,6 @@ class FaultDemo:
     @property
     def moved(self) -> Motion:
         """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
-        from rcilab.motion import Motion
-
         if self.scenario.is_commanded:
             return self.commanded
         return Motion.from_cycles(self._every_cycle("q"))

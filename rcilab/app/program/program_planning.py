@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.program.program_draft import Draft
+from rcilab.conformance.check import check
 from rcilab.control_process.layout import MOTION_ROWS
 from rcilab.core.arrays import JointVector
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.safety_box import SafetyBox
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion import plan_program
 from rcilab.motion.joint import JointLaw
 from rcilab.motion.program import Program
 
@@ -37,9 +39,6 @@ class Job:
 
 def plan_job(job: Job, tell: ProgressCallback) -> Plan:
     """Returns the plan of a program."""
-    from rcilab.conformance.check import check
-    from rcilab.motion import plan_program
-
     motion = plan_program(
         job.model,
         job.program,

@@ -15,6 +15,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.status_text import tell_error
 from rcilab.app.text import message
 from rcilab.core.errors import RcilabError
+from rcilab.recording.export import write_export
 from rcilab.recording.optional_deps import MissingExtraError
 
 if TYPE_CHECKING:
@@ -107,8 +108,6 @@ class ExportActions:
 
     def _write(self, run: Run, ending: str, page: int | None) -> None:
         try:
-            from rcilab.recording.export import write_export
-
             with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
                 state = self._store.state
                 write_export(
