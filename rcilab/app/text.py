@@ -29,8 +29,8 @@ class Text(text.Text):
     def __init__(self, language: str, units: Units = USUAL) -> None:
         super().__init__(language, _PAGE, units)
 
-    def _explain(self, said: Explainable) -> str:
-        return said.explain(self.language, self.units)
+    def _explain(self, item: Explainable) -> str:
+        return item.explain(self.language, self.units)
 
     def unit(self, usual: str) -> Unit:
         """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""

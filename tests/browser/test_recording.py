@@ -37,7 +37,7 @@ def test_a_run_is_shown_against_its_plan_and_downloaded(page, tmp_path):
     page.wait(
         lambda: "Ran to its end" in page.tab.locator(".rl-verdict:visible").all_inner_texts().__str__(), "its end"
     )
-    page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Error of the tool").count() == 1, "a plot of errors")
+    page.wait(lambda: page.tab.locator(".rl-plot-title", has_text="Tool error").count() == 1, "a plot of errors")
     page.wait(lambda: len(plot_numbers(page)) == len(page.state.plots), "all plots that are chosen")
     assert all(len(numbers) >= 2 for numbers in plot_numbers(page)), plot_numbers(page)
     assert plot_numbers(page)[:4] == [["-100", "0", "100"]] * 4  # As low as they are on a small page.

@@ -81,7 +81,7 @@ def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> 
         panel.modes.fields["desired_wrench"][2].box.value = "-1"
         wait_for(lambda: held(panel) is not None, 30.0, "the answer")
         assert held(panel) == ControllerParameters(desired_wrench=(0.0, 0.0, -1.0, 0.0, 0.0, 0.0))
-        assert "its own; it cannot be asked" in text_of(panel.modes._held)
+        assert "its own value, which cannot be read" in text_of(panel.modes._held)
         panel.modes.fields["desired_wrench"][2].box.value = "0"
         wait_for(lambda: held(panel) == ControllerParameters(desired_wrench=(0.0,) * 6), 30.0, "the answer")
         wait_for(lambda: panel.state.status is not None and panel.state.status.powered, 30.0, "motor power")

@@ -172,7 +172,7 @@ def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
         panel.speed_override.pause.click()
-        wait_for(lambda: "Too late to hold" in panel.speed_override._way.value, what="why not")
+        wait_for(lambda: "Too late to pause" in panel.speed_override._way.value, what="why not")
         assert robot.overrides == [0.0]
         assert "rl-problem" in panel.speed_override._way.value
 
@@ -315,4 +315,4 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], what="the whole range")
         limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"
         limits.send.click()
-        assert "20.0° to 10.0° is no range" in limits.said.value
+        assert "20.0° to 10.0° is not a range" in limits.said.value

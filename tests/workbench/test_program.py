@@ -492,7 +492,7 @@ def test_a_program_longer_than_any_motion_may_be_is_told_before_it_is_sampled(sq
     square.type("dwell", "3600")
     square.type("rounds", "100")
     square.plan()
-    assert "300 s are the most: take fewer rounds" in Text("en").render(square.program.answer)
+    assert "the maximum is 300 s: use fewer rounds" in Text("en").render(square.program.answer)
     assert square.state.busy is None
 
 
