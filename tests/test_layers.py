@@ -193,6 +193,21 @@ def test_functions_import_only_what_loads_a_heavy_library() -> None:
     assert not late, "function-level imports:\n" + "\n".join(late)
 
 
+def test_what_people_read_of_neutral_rooms_names_no_command_of_a_maker() -> None:
+    named = re.compile(r"robot\.rci\.|toolTobase|set_(joint|cartesian)_limit|set_filters|teach pendant")
+    neutral = "core robots model motion conformance sim execution control_process".split()
+    files = [path for part in neutral for path in (ROOT / "rcilab" / part).rglob("*.py")]
+    found = [
+        f"{path.name}:{node.lineno}"
+        for path in files
+        for parent in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if not isinstance(parent, ast.Expr)  # A docstring.
+        for node in ast.iter_child_nodes(parent)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and named.search(node.value)
+    ]
+    assert found == []
+
+
 def test_no_module_is_outside_the_layers() -> None:
     assert {part_of(name) for name in NAMES} <= HEIGHT.keys()
 

@@ -118,7 +118,7 @@ class Certificate:
         if changed == ["safety box"]:
             return (
                 "the certificate is stale: it does not cover the safety box that is in force; check the motion again "
-                "with box=..., the one that set_cartesian_limit was given"
+                "with box=..., the one that robot.set_safety_box was given"
             )
         if changed == ["safety distance"]:
             if self.parts["safety distance"] == NOT_CHECKED:

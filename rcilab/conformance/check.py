@@ -63,7 +63,7 @@ def check(
         model: The arm.
         start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one; None for
             an arm that stands where the motion starts.
-        box: Where the tool shall stay, as sent with `set_cartesian_limit`; None, or one that is not active, is not
+        box: Where the tool shall stay, as sent with `robot.set_safety_box`; None, or one that is not active, is not
             checked.
         distance: How far links shall stay from each other and from the floor, and where that is. None does not
             check it: for planning while the operator drags a target, as no hand-off accepts the certificate.

@@ -1,4 +1,4 @@
-"""The box that the tool must not leave: `setCartesianLimit`, RCI manual V1.3.1, section 3.1.4."""
+"""The safety box: a box that the tool must not leave."""
 
 from __future__ import annotations
 

@@ -49,13 +49,14 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
     return CartesianPosition(T, command.psi, command.finished)
 
 
-def require_first(command: Command, state: RobotState, limits: Limits) -> None:
+def require_first(command: Command, state: RobotState, limits: Limits, *, has_psi: bool) -> None:
     """Rejects a first command that differs from the commanded state: the arm would jump.
 
     Args:
         command: The first command of a motion.
         state: The state that it answers.
         limits: Bounds of the arm: torques begin at zero, so the first ones are at most one cycle's rate away from it.
+        has_psi: Whether the arm has a redundancy, whose angle counts.
 
     Raises:
         InvalidValueError: It differs; the message names the joint, both values and the tolerance.
@@ -81,7 +82,7 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
                 f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
                 "begin with state.T_base_tool_c",
             )
-        if command.psi is not None and len(state.q_c) == 7:
+        if command.psi is not None and has_psi:
             off = abs(math.remainder(command.psi - state.psi_c, math.tau))
             if off > START_TOLERANCE:
                 raise InvalidValueError(
@@ -104,7 +105,7 @@ def require_first(command: Command, state: RobotState, limits: Limits) -> None:
             )
 
 
-def distance_to(state: RobotState, command: Command) -> float:
+def distance_to(state: RobotState, command: Command, *, has_psi: bool) -> float:
     """Returns the distance of the controller's commanded state from a command; 0 for torques.
 
     Returns:
@@ -115,19 +116,21 @@ def distance_to(state: RobotState, command: Command) -> float:
         off = float(np.abs(state.q_c - command.q).max())
         return 0.0 if off <= _ARRIVED else off
     if isinstance(command, CartesianPosition):
-        off = max(float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max()), _turned(state, command))
+        off = max(
+            float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max()), _turned(state, command, has_psi)
+        )
         return 0.0 if off <= _POSE_ARRIVED else off
     return 0.0
 
 
-def _turned(state: RobotState, command: CartesianPosition) -> float:
+def _turned(state: RobotState, command: CartesianPosition, has_psi: bool) -> float:
     """Returns how far the commanded arm angle is from a command, [rad]; 0 where it was left to the controller."""
-    if command.psi is None or len(state.q_c) != 7:
+    if command.psi is None or not has_psi:
         return 0.0
     return abs(math.remainder(command.psi - state.psi_c, math.tau))
 
 
-def describe_distance(state: RobotState, command: Command) -> str:
+def describe_distance(state: RobotState, command: Command, *, has_psi: bool) -> str:
     """Returns the distance from a command as text: "joint 2 is 11.46 deg"."""
     if isinstance(command, JointPosition):
         off = np.abs(state.q_c - command.q)
@@ -135,7 +138,7 @@ def describe_distance(state: RobotState, command: Command) -> str:
         return f"joint {joint + 1} is {math.degrees(off[joint]):.4g} deg"
     assert isinstance(command, CartesianPosition)  # Torques are always there.
     length = float(np.linalg.norm(state.T_base_tool_c.position - command.T_base_tool[:3, 3]))
-    turned = _turned(state, command)
+    turned = _turned(state, command, has_psi)
     if turned > length:
         return f"the arm angle is {math.degrees(turned):.4g} deg"
     return f"the tool is {1e3 * length:.4g} mm"

@@ -98,6 +98,7 @@ class ControlLoop:
             raise InvalidValueError("mode", mode, f"must be one of {[m.name for m in _COMMANDS]}")
         self._driver = driver
         self._model = model
+        self._has_psi = bool(model.redundancy)
         self._limits = limits
         self._mode = mode
         self._kind = _COMMANDS[mode]
@@ -176,7 +177,7 @@ class ControlLoop:
             raise self._cut_off()
         raise DeadlineError(
             f"{self._driver.name} accepted the start of a motion and then did not show {self._mode.name} within "
-            f"{MODE_TIMEOUT:g} s; try again, and look at the teach pendant if it goes on"
+            f"{MODE_TIMEOUT:g} s; try again, and look at the controller's own display if it goes on"
         ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
 
     def _stream(self, state: RobotState, callback: Callback) -> str | None:
@@ -224,7 +225,7 @@ class ControlLoop:
                 "arm was stopped within the limits, farther on; let the commands stop before finished=True",
             )
         state = self._hold(last)
-        if distance_to(state, last) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
+        if distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
             raise self._not_arrived(state, last)
         return None
 
@@ -282,7 +283,7 @@ class ControlLoop:
         while True:
             state = self._next()
             self._answer(state, command)
-            off, cycle = distance_to(state, command), cycle + 1
+            off, cycle = distance_to(state, command, has_psi=self._has_psi), cycle + 1
             if off == 0.0:
                 return state
             if cycle % SETTLE_CYCLES == 0:
@@ -388,7 +389,7 @@ class ControlLoop:
                 link.begin(command)
             command = link.step(command)
         if is_first:
-            require_first(command, state, self._limits)
+            require_first(command, state, self._limits, has_psi=self._has_psi)
         return command
 
     def _time(self, state: RobotState) -> float:
@@ -426,9 +427,13 @@ class ControlLoop:
                 f"{100.0 * state.success_rate:.1f} % of the last second's commands arrived in time: look at the network"
             )
         else:
-            cause = "something in the controller holds it back: look at the filters (set_filters) and soft limits"
+            cause = "something in the controller holds it back: look at its filters and soft limits"
         record = self._log.recorder.last(RECORD_CYCLES)
-        off = "" if isinstance(command, JointTorque) else f": {describe_distance(state, command)} from its end"
+        off = (
+            ""
+            if isinstance(command, JointTorque)
+            else f": {describe_distance(state, command, has_psi=self._has_psi)} from its end"
+        )
         return ControlError(f"the motion was executed and did not arrive{off}; {cause}", (), record)
 
     def _has_power(self) -> bool:
@@ -450,7 +455,7 @@ class ControlLoop:
         mode = state.robot_mode.name.lower().replace("_", " ")
         return ControlError(
             f"the controller ended the motion by itself at t = {self._time(state):.3f} s without naming a fault "
-            f"(robot mode: {mode}); look at the teach pendant and the emergency stop",
+            f"(robot mode: {mode}); look at the controller's own display and the emergency stop",
             (),
             record,
         )

@@ -34,7 +34,7 @@ def find_route(address: RobotAddress) -> HostRoute:
     except OSError as error:
         raise ConnectionLostError(
             f"{address}: the host {address.host!r} is not known ({_reason(error)}); "
-            "check its spelling, or write the IP address that the teach pendant's RCI page shows"
+            "check its spelling, or write the IP address that the controller shows"
         ).coded("unknown_host", host=address.host) from error
     host = str(found)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -53,7 +53,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
         said += f"{degrees(soft):.2f}° is the soft limit that was set; "
         facts["limit"] = soft
-        widen = "widen the soft limit (set_joint_limit)"
+        widen = "widen the soft limit"
         if what == "start":
             raise PlanningError(f"{said}where the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
         raise PlanningError(f"{said}choose an angle between them, or {widen}").coded("range_soft", **facts)
@@ -89,7 +89,7 @@ def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[
         what = f"joint {joint} would {verb} its limit at {degrees(angle):.2f} deg"
         return f"{what} ({degrees(low):.0f} to {degrees(high):.0f} deg)", facts
     what = f"joint {joint} would {verb} the soft limit of {degrees(soft):.2f} deg that was set, at "
-    return f"{what}{degrees(angle):.2f} deg; widen it (set_joint_limit)", facts | {"limit": soft}
+    return f"{what}{degrees(angle):.2f} deg; widen it", facts | {"limit": soft}
 
 
 def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointLimits:

@@ -46,7 +46,7 @@ def plan_recovery(
         speed: Part of the velocity and acceleration limits to use, 0.001 to 1.
 
     Raises:
-        PlanningError: A joint is farther outside; move the arm by hand (`robot.rci.start_drag()`) or by its panel.
+        PlanningError: A joint is farther outside; guide the arm by hand, or move it by its panel.
         InvalidValueError: Wrong shape, not finite, or a speed out of range.
     """
     limits = require_model(model).limits.joint
@@ -72,11 +72,11 @@ def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> Pl
     where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
     said = (
         f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery leads back "
-        f"from {most}° at most; guide the arm back by hand (robot.rci.start_drag())"
+        f"from {most}° at most; guide the arm back by hand"
     )
     if soft is None:
         return PlanningError(said).coded("recovery_range", **facts)
-    said += ", or widen the soft limit (set_joint_limit)"
+    said += ", or widen the soft limit"
     return PlanningError(said).coded("recovery_range_soft", **facts, limit=soft)
 
 

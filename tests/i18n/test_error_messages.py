@@ -14,7 +14,7 @@ import pytest
 import rcilab
 from rcilab.control_process.messages import as_sendable
 from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
-from rcilab.i18n.catalogue import load_catalogue
+from rcilab.i18n.catalogue import MAKERS, load_catalogue, merge_catalogues
 from rcilab.i18n.error_messages import _WITH_ADVICE, describe_error, describe_note
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import LiteralText, Message, Remark, Text
@@ -38,7 +38,7 @@ def test_every_code_has_words_and_whatever_fills_them():
     used = list(coded())
     assert len(used) > 70
     for language in LANGUAGES:
-        words = load_catalogue("rcilab.i18n", language)
+        words = merge_catalogues(("rcilab.i18n", *MAKERS), language)
         known = {key.removeprefix("error.") for key in words if key.startswith("error.")}
         assert {code for code, _ in used} == known
         for code, facts in used:

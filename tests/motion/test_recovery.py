@@ -57,7 +57,7 @@ def test_a_joint_too_far_beyond_a_soft_limit_is_told_that_limit_and_the_other_is
     model = load_model("xMate3")
     soft = model.with_joint_limits(model.home - 0.1, model.home + 0.1)
     with pytest.raises(
-        PlanningError, match=r"outside the soft limit of 5\.73° that was set.*set_joint_limit"
+        PlanningError, match=r"outside the soft limit of 5\.73° that was set.*widen the soft limit"
     ) as caught:
         plan_recovery(soft, model.home + 0.6)
     assert caught.value.code == "recovery_range_soft"

@@ -115,7 +115,7 @@ class Solutions(Sequence[JointVector]):
         error = UnreachableError(
             f"joint {joint} would have to be at {degrees(angle):.1f} deg, {beyond} "
             f"({degrees(lower):.0f} to {degrees(upper):.0f} deg), {place}; {advice}"
-            f"{'' if soft is None else ', or widen the soft limit (set_joint_limit)'}",
+            f"{'' if soft is None else ', or widen the soft limit'}",
             joint=joint,
             excess=best.excess,
         )
