@@ -257,6 +257,7 @@ FAMILY = (
     errors.RecordedError("r", np.zeros(2)),
     errors.ConnectionLostError("gone"),
     errors.CommandRejectedError("StartMove", rci.StartStatus.REFLEX, "recover()", reason="fault"),
+    errors.ManualRecoveryError("recover", rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED),
     errors.ControlError("stopped", (Fault.COLLISION,), np.ones(3)),
     errors.DeadlineError("late"),
     errors.UsageError("wrong order"),
