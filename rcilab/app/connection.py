@@ -21,7 +21,7 @@ class Robot(Protocol):
     """Takes requests. `rcilab.control_process.Supervisor` is one."""
 
     @property
-    def paced(self) -> SpeedScaledMotion | None:
+    def scaled_motion(self) -> SpeedScaledMotion | None:
         """The motion in progress, or the last one, with its speed override; None where the run itself holds it."""
         ...
 

@@ -137,7 +137,7 @@ class SessionConnection:
         return self
 
     @property
-    def paced(self) -> None:
+    def scaled_motion(self) -> None:
         """None: the run of a session holds the motion as it was run."""
 
     def drain(self) -> NDArray[np.void]:
@@ -293,7 +293,7 @@ def _settled(what: str) -> PendingRequest:
 def _describe_progress(way: MotionProgress | None) -> dict[str, Any]:
     if way is None:
         return {}
-    names = {"motion_time": way.time, "motion_duration": way.duration, "motion_place": way.place}
+    names = {"motion_time": way.time, "motion_duration": way.duration, "motion_plan_time": way.place}
     return {**names, "speed_override": way.speed_override, "mode": way.mode}
 
 

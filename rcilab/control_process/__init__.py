@@ -1,6 +1,6 @@
-"""The control process and its supervisor: shared memory, requests, start, watch, stop, restart.
+"""The control process and its supervisor: shared memory, requests, process start, monitoring and restart.
 
-`simulate` lives in the module of the same name and is for that reason not a name of this package: `rcilab.simulate`.
+`simulate` is not a name of this package, because its module has that name: use `rcilab.simulate`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ __all__ = ["PendingRequest", "Supervisor", "SupervisorStatus"]
 
 
 def __getattr__(name: str) -> object:
-    """Imports a public name when it is first asked for: the control process must not pay for its parent's imports."""
+    """Imports a public name on first use, so that the control process loads only what it needs."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,4 +1,4 @@
-"""The configuration sent to the controller, whether it accepted it, and what it is sent at each new connection."""
+"""The configuration of the controller: requested, acknowledged, and sent again at each new connection."""
 
 from __future__ import annotations
 
@@ -15,72 +15,72 @@ if TYPE_CHECKING:
 
 
 class ConfigurationSync:
-    """Guarded by the lock of its owner.
+    """Tracks which configuration the controller has. Guarded by its owner's lock.
 
     Args:
-        setup: What the controller is sent at its first connection.
+        setup: Configuration to send at the first connection.
     """
 
     def __init__(self, setup: RobotConfiguration) -> None:
-        self.wanted = setup
-        """The whole configuration that it was sent last."""
+        self.requested = setup
+        """The whole configuration that was requested last."""
         self.acknowledged = RobotConfiguration()
-        """What it has answered yes to since it was connected."""
-        self.times = 0
-        """At how many connections it has accepted a configuration."""
-        self._waiting: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
+        """The parts that the controller has accepted since it was connected."""
+        self.connections = 0
+        """Number of connections at which it has accepted a configuration."""
+        self._pending: list[tuple[PendingRequest, RobotConfiguration, bool]] = []
         self._refusal: RcilabError | None = None
 
-    def follow(self, request: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
-        """Takes note of a request that carries a configuration.
+    def track(self, request: PendingRequest, setup: RobotConfiguration, *, is_new_connection: bool = False) -> None:
+        """Registers a request with a configuration.
 
         Args:
             request: The request.
-            setup: What it carries.
-            is_new_connection: Whether it begins a connection: what the controller had before is then not known.
+            setup: Its configuration.
+            is_new_connection: Whether it opens a connection: what the controller had before is then not known.
         """
-        self.wanted = self.wanted.updated(setup)
-        self._waiting.append((request, setup, is_new_connection))
+        self.requested = self.requested.updated(setup)
+        self._pending.append((request, setup, is_new_connection))
         self._refusal = None
 
-    def look(self) -> None:
-        """Takes note of the answers, as far as there are any."""
-        while self._waiting and self._waiting[0][0].done:
-            request, setup, is_new_connection = self._waiting.pop(0)
+    def collect(self) -> None:
+        """Processes the requests that are done; does not wait."""
+        while self._pending and self._pending[0][0].done:
+            request, setup, is_new_connection = self._pending.pop(0)
             if is_new_connection:
                 self.acknowledged = RobotConfiguration()
             if request.error is not None:
                 self._refusal = request.error
-                # It may have taken some of it: which of these parts it has now is unknown.
+                # It may have accepted some of these parts: which ones it has now is unknown.
                 self.acknowledged = self.acknowledged.without(setup.parts)
                 continue
             self._refusal = None
             self.acknowledged = self.acknowledged.updated(setup)
-            self.times += is_new_connection and bool(setup.parts)
+            self.connections += is_new_connection and bool(setup.parts)
 
-    def require_given(self) -> None:
-        """Makes sure that no configuration is in transit and that none was refused.
+    def require_accepted(self) -> None:
+        """Requires that no configuration is being sent and none was refused.
 
         Raises:
-            UsageError: The controller has another configuration than motions are checked with.
+            UsageError: The configuration of the controller differs from that of the checks, or may do so.
         """
-        self.look()
-        if self._waiting:
+        self.collect()
+        if self._pending:
             raise UsageError("the configuration is still being sent; wait for the request of set_up()").coded(
                 "telling_setup"
             )
-        if self._refusal is not None and self.wanted.parts:
+        if self._refusal is not None and self.requested.parts:
             raise UsageError(f"the controller refused its configuration ({self._refusal}); call set_up() again").coded(
                 "setup_refused", reason=self._refusal
             )
 
 
 def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotConfiguration:
-    """Returns the configuration that a controller is sent by default.
+    """Returns the default configuration of a controller.
 
     Args:
         model: The arm.
-        is_virtual: Whether it is a virtual controller: then it is sent tool and load. A real one has its own settings.
+        is_virtual: Whether the controller is virtual: then tool and load are sent. A real one has its own settings.
     """
     if not is_virtual:
         return RobotConfiguration()

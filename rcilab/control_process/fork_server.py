@@ -1,9 +1,9 @@
-"""The fork server of this process: multiprocessing's, with what our processes need loaded once.
+"""The fork server of this process: multiprocessing's, with the libraries of our processes preloaded.
 
 Loading the numerical libraries takes a control process or a virtual controller half a second of a core; a fork of a
-process that has them takes milliseconds. The instance is separate from the one that multiprocessing gives to the
-user's own code, because what it loads, its session and its handling of signals are ours. It receives preparation data
-that never name the user's `__main__`, so that a script without `if __name__ == "__main__"` is not run a second time.
+process that has loaded them takes milliseconds. The instance is separate from the one that multiprocessing gives to
+user code, because it differs in preloaded modules, session and signal handling. Its preparation data never name the
+user's `__main__`, so that a script without `if __name__ == "__main__"` does not run a second time.
 """
 
 from __future__ import annotations
@@ -40,26 +40,26 @@ def fork_server_pid() -> int:
         try:
             _server.ensure_running()
         except ChildProcessError:  # It ended, and the user's code reaped it.
-            _forget()
+            _replace_server()
             _server.ensure_running()
-        except FileNotFoundError:  # The working folder was removed; it is asked for only when there is a preload.
+        except FileNotFoundError:  # The working folder was removed; only a preload needs it.
             _server.set_forkserver_preload([])
             _server.ensure_running()
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-    return _server._forkserver_pid  # pyright: ignore[reportAttributeAccessIssue]  There is no public name for it.
+    return _server._forkserver_pid  # pyright: ignore[reportAttributeAccessIssue]  It has no public name.
 
 
 def fork(task: object, files: Sequence[int]) -> tuple[int, int]:
     """Requests a process; returns at once, even while the fork server is still loading.
 
     Args:
-        task: What the process unpickles and runs: it calls `task._bootstrap(parent_sentinel)`.
-        files: Open descriptors for the process; they remain the caller's.
+        task: Object that the new process unpickles; it then calls `task._bootstrap(parent_sentinel)`.
+        files: Open descriptors that the process inherits; the caller still closes its own.
 
     Returns:
         A descriptor from which the process id and later the exit code can be read (`multiprocessing.forkserver.
-        read_signed`), and one that the process sees closed when this process ends.
+        read_signed`), and one whose other end, in the process, closes when this process ends.
 
     Raises:
         OSError: The fork server could not be started or reached.
@@ -79,20 +79,20 @@ def fork(task: object, files: Sequence[int]) -> tuple[int, int]:
 
 
 def kill_fork_server() -> None:
-    """Ends a fork server that does not respond. The processes that it forked detect that and end."""
+    """Kills a fork server that does not respond. The processes forked from it detect its end and exit."""
     pid = _server._forkserver_pid  # pyright: ignore[reportAttributeAccessIssue]
     if pid is not None:
         os.kill(pid, signal.SIGKILL)
         _server._stop()  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _forget() -> None:
-    """Gives a fork of this process, such as multiprocessing makes them, a fork server of its own."""
+def _replace_server() -> None:
+    """Replaces the fork server in a fork of this process, such as one that multiprocessing makes."""
     global _server
     alive = _server._forkserver_alive_fd  # pyright: ignore[reportAttributeAccessIssue]
     if alive is not None:
-        os.close(alive)  # The other fork server ends with the process that it belongs to.
+        os.close(alive)  # The other fork server ends with the process that owns it.
     _server = _new_server()
 
 
-os.register_at_fork(after_in_child=_forget)
+os.register_at_fork(after_in_child=_replace_server)

@@ -1,4 +1,4 @@
-"""The jog that is held: one small record in the shared block, renewed as long as it is held."""
+"""The held jog: one small record in the shared block, which is renewed as long as the jog is held."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import get_args
 from rcilab.control_process.layout import ControlBlock, Counter
 from rcilab.execution.jog import JogCommand, JogKind
 
-HOLD_TIMEOUT = 0.3  # [s] A jog that is not renewed for that long was let go; a page renews it ten times a second.
+HOLD_TIMEOUT = 0.3  # [s] A jog that is not renewed for this time is released; a page renews it ten times a second.
 
 _KINDS: tuple[JogKind, ...] = get_args(JogKind)
 _RECORD = struct.Struct("<qq7d")  # index of the kind, count of the numbers, the numbers
-_ATTEMPTS = 3  # The writer needs a microsecond; a reader that meets it goes on with the last jog.
+_ATTEMPTS = 3  # The writer needs a microsecond; if all fail, the reader uses the previous jog.
 
 
 class HeldJog:
-    """The `JogSource` of the control process: the jog that is held in the block.
+    """The `JogSource` of the control process: the held jog in the block.
 
     Args:
         block: The shared block.
@@ -27,10 +27,10 @@ class HeldJog:
         self._block = block
 
     def read(self, current: JogCommand | None) -> JogCommand | None:
-        """Returns the jog that is held now; None: nothing is held.
+        """Returns the held jog; None: no jog is held.
 
         Args:
-            current: What was read last; it is returned again while another one is being written.
+            current: The previous jog, returned again while another one is being written.
         """
         counters = self._block.counters
         if not is_held(counters):
@@ -39,23 +39,23 @@ class HeldJog:
 
 
 def hold_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> None:
-    """Writes the jog that is held now, and when."""
+    """Writes or renews the held jog."""
     write_jog(memory, counters, command)
-    counters[Counter.JOG_BEAT] = time.monotonic_ns()
+    counters[Counter.JOG_HEARTBEAT] = time.monotonic_ns()
 
 
 def release_jog(counters: memoryview) -> None:
-    """Says that nothing is held any more."""
-    counters[Counter.JOG_BEAT] = 0
+    """Releases the jog."""
+    counters[Counter.JOG_HEARTBEAT] = 0
 
 
 def is_held(counters: memoryview) -> bool:
-    """Returns whether a jog has been held within the last `HOLD_TIMEOUT`."""
-    return time.monotonic_ns() - counters[Counter.JOG_BEAT] <= HOLD_TIMEOUT * 1e9
+    """Returns whether a jog was written or renewed within the last `HOLD_TIMEOUT`."""
+    return time.monotonic_ns() - counters[Counter.JOG_HEARTBEAT] <= HOLD_TIMEOUT * 1e9
 
 
 def write_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> None:
-    """Writes the jog; the sequence word is odd meanwhile."""
+    """Writes a jog; the sequence number is odd meanwhile."""
     numbers = (*command.values, *(0.0,) * (7 - len(command.values)))
     sequence = counters[Counter.JOG] | 1
     counters[Counter.JOG] = sequence
@@ -64,7 +64,7 @@ def write_jog(memory: memoryview, counters: memoryview, command: JogCommand) -> 
 
 
 def read_jog(memory: memoryview, counters: memoryview) -> JogCommand | None:
-    """Returns the jog as a whole, or None when it is just being written."""
+    """Returns the complete jog, or None while it is being written."""
     for _ in range(_ATTEMPTS):
         before = counters[Counter.JOG]
         kind, count, *numbers = _RECORD.unpack_from(memory, 0)

@@ -1,4 +1,4 @@
-"""Starting a private virtual controller in a process of its own."""
+"""Start of a private virtual controller in a separate process."""
 
 from __future__ import annotations
 
@@ -10,23 +10,25 @@ from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.core.errors import ConnectionLostError, InvalidValueError
 from rcilab.sim.controller_config import PLANT_KINDS
 
-START_TIMEOUT = 20.0  # [s] A cold Python with its numerical libraries takes about 1 s; a busy machine several.
+START_TIMEOUT = (
+    20.0  # [s] Python with its numerical libraries takes about 1 s from a cold disk; more on a busy machine.
+)
 _LISTENING = re.compile(r"^listening ([a-z]+://\S+)( |$)")
 _WORLD = re.compile(r"^world (\S+)$", re.MULTILINE)
 
 
 def require_plant(plant: object) -> None:
-    """Checks that a virtual controller has this plant.
+    """Requires a plant of the virtual controller.
 
     Raises:
-        InvalidValueError: It has not; the message lists the plants.
+        InvalidValueError: The plant is unknown; the message lists the plants.
     """
     if plant not in PLANT_KINDS:
         raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
 
 
 class VirtualController(ManagedProcess):
-    """A private `rcilab controller` on loopback and free ports; it ends with this process, however that ends.
+    """A private `rcilab controller` on loopback and free ports; it ends with this process, even after a crash.
 
     Args:
         model_name: Name of the arm.
@@ -48,10 +50,10 @@ class VirtualController(ManagedProcess):
 
     @property
     def address(self) -> str | None:
-        """Address at which it listens, or None as long as it does not.
+        """Address at which it listens, or None before that.
 
         Raises:
-            ConnectionLostError: It has ended, or has not been ready for too long; the message contains its output.
+            ConnectionLostError: It has ended, or was not ready in time; the message contains its output.
         """
         if self._address is None:
             is_alive = self.is_alive
@@ -62,20 +64,20 @@ class VirtualController(ManagedProcess):
                     self._address = found[1]
                     return self._address
             if not is_alive:
-                words = self.last_words or "it printed nothing"
-                raise ConnectionLostError(f"{self.name} did not start ({self.how_it_ended}): {words}").coded(
+                output = self.stderr_tail or "it printed nothing"
+                raise ConnectionLostError(f"{self.name} did not start ({self.exit_description}): {output}").coded(
                     "no_process"
                 )
             if time.monotonic() - self._started > START_TIMEOUT:
                 raise ConnectionLostError(
-                    f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.last_words or 'it printed nothing'}; "
+                    f"{self.name} was not ready after {START_TIMEOUT:g} s: {self.stderr_tail or 'it printed nothing'}; "
                     "try again when the machine is less busy"
                 ).coded("slow_start", seconds=f"{START_TIMEOUT:g}")
         return self._address
 
     @property
     def world_address(self) -> str | None:
-        """Address of its simulation port, HOST:PORT, once it listens; None without a simulation port."""
+        """Address of its simulation port, HOST:PORT; None before it listens and without a simulation port."""
         found = _WORLD.search(self._output)
         return found[1] if found else None
 

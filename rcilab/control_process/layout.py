@@ -1,21 +1,21 @@
-"""The block of memory that supervisor and control process share.
+"""The shared memory block of supervisor and control process.
 
-    header      magic, version and sizes: two builds of rcilab must not misread each other
+    header      magic, version and sizes, so that different builds of rcilab cannot misread it
     counters    counters and heartbeats, 8 bytes each, each written by one side only
-    settings    what the control process needs to know at its start, pickled; written once
+    settings    the data that the control process needs at its start, pickled; written once
     snapshot    phase, message and motion, guarded by a sequence number
     histogram   lateness of cycles
     requests    ring of messages to the control process
-    replies     ring of messages back
-    jog         the jog that is held, guarded by a sequence number
-    felt        the controller's newest estimate of the force and moment from outside, and the tool that it has
-    cycles      ring of every cycle
+    replies     ring of messages from the control process
+    jog         the held jog, guarded by a sequence number
+    wrench      the controller's latest estimate of the external wrench, and its tool
+    cycles      ring of recorded cycles
     motion      rows of the motion to stream
 
-The block is an unnamed file in memory, handed to the control process as an open descriptor: when both are gone, killed
-or not, nothing is left of it. Counters are aligned and stored with one instruction; data is written before the counter
-that announces it. (That order is what x86 guarantees; on other processors the interpreter's own locks between two
-statements have the same effect in practice.)
+The block is an unnamed file in memory, inherited by the control process as an open descriptor: the system frees it when
+both processes have ended, even if they were killed. Counters are aligned and stored with one instruction; data is
+written before the counter that announces it. (x86 guarantees this order; on other processors the interpreter's locks
+between two statements have the same effect in practice.)
 """
 
 from __future__ import annotations
@@ -37,58 +37,58 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import UsageError, VersionMismatchError
 
 MAGIC = b"RCILABCP"
-VERSION = 10  # Count up with every change of this file, of the snapshot or of `cycle_dtype`.
+VERSION = 10  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
 
-RING_CYCLES = 32768  # 33 s of cycles: how long a reader may sleep.
-MOTION_TIME = 300.0  # [s] Longest motion that can be handed over.
+RING_CYCLES = 32768  # 33 s: the longest time between two reads without a loss.
+MOTION_TIME = 300.0  # [s] Longest motion that fits into the block.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
-OPERATOR_TIMEOUT = 2.0  # [s] No operator for that long ends a motion (workbench: operator lease).
+OPERATOR_TIMEOUT = 2.0  # [s] A motion ends after this time without an operator (workbench: operator lease).
 MESSAGE_SLOTS = 16
-MESSAGE_SIZE = 4096  # [bytes] Of one message; the largest request, a configuration, takes 1300.
+MESSAGE_SIZE = 4096  # [bytes] The largest request, a configuration, needs 1300.
 
 _HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
 _PAGE = 4096
 _SETTINGS_SIZE = 4 * _PAGE
 _SNAPSHOT_SIZE = _PAGE
-_MEMORY = Path("/dev/shm")  # Linux: files there live in memory. Elsewhere, or when it is full: the temp directory.
+_MEMORY = Path("/dev/shm")  # Linux: files here are in memory. Elsewhere, or if it is full: the temp directory.
 
 
 class Counter(IntEnum):
-    """Index of each counter, and who writes it."""
+    """Index of each counter. The description names the side that writes it."""
 
-    SUPERVISOR_BEAT = 0
-    """Supervisor: monotonic time of its last sign of life, [ns]."""
-    OPERATOR_BEAT = 1
-    """Supervisor: when an operator was last present, [ns]; 0 as long as none is expected."""
-    STOPS_ASKED = 2
-    """Supervisor: how often a stop was asked for."""
+    SUPERVISOR_HEARTBEAT = 0
+    """Supervisor: monotonic time of its last heartbeat, [ns]."""
+    OPERATOR_HEARTBEAT = 1
+    """Supervisor: monotonic time when an operator was last present, [ns]; 0 while none is expected."""
+    STOPS_REQUESTED = 2
+    """Supervisor: number of requested stops."""
     REQUESTS_POSTED = 3
     """Supervisor."""
-    REPLIES_TAKEN = 4
+    REPLIES_READ = 4
     """Supervisor."""
-    WORKER_BEAT = 5
-    """Control process: monotonic time of its last sign of life, [ns]."""
-    REQUESTS_TAKEN = 6
+    WORKER_HEARTBEAT = 5
+    """Control process: monotonic time of its last heartbeat, [ns]."""
+    REQUESTS_READ = 6
     """Control process."""
     REPLIES_POSTED = 7
     """Control process."""
     CYCLES = 8
-    """Control process: rows written to the ring since the beginning."""
+    """Control process: number of rows written to the ring."""
     SNAPSHOT = 9
-    """Control process: odd while the snapshot is being written."""
+    """Control process: sequence number, odd while the snapshot is being written."""
     LOST = 10
-    """Control process: controller cycles of which no state came, since the connection was made."""
+    """Control process: controller cycles whose state was not received, since the connection was made."""
     JOG = 11
-    """Supervisor: odd while the jog is being written."""
-    JOG_BEAT = 12
-    """Supervisor: when a jog was last held, [ns]; 0 when it was let go."""
+    """Supervisor: sequence number, odd while the jog is being written."""
+    JOG_HEARTBEAT = 12
+    """Supervisor: monotonic time when a jog was last held, [ns]; 0 after its release."""
 
 
 class ControlBlock:
-    """The mapped block. Both sides hold one.
+    """The mapped block; one object in each process.
 
     Args:
-        descriptor: An open file of the block; owned by this object from now on.
+        descriptor: Open file of the block; this object owns and closes it.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -115,11 +115,13 @@ class ControlBlock:
 
         Args:
             n: Number of joints.
-            settings: What the control process needs to know at its start; it is pickled.
+            settings: The data that the control process needs at its start; pickled.
         """
         data = pickle.dumps(settings)
         if len(data) > _SETTINGS_SIZE - 4:
-            raise UsageError(f"settings of the control process take {len(data)} bytes, {_SETTINGS_SIZE - 4} fit")
+            raise UsageError(
+                f"the settings of the control process need {len(data)} bytes, at most {_SETTINGS_SIZE - 4} fit"
+            )
         size = _total_size(n)
         descriptor = _open_memory(size)
         os.pwrite(descriptor, _HEADER.pack(MAGIC, VERSION, n, cycle_dtype(n).itemsize, RING_CYCLES, size), 0)
@@ -128,12 +130,12 @@ class ControlBlock:
 
     @property
     def settings(self) -> object:
-        """What the block was created with."""
+        """The settings that the block was created with."""
         (length,) = struct.unpack_from("<I", self._memory, 2 * _PAGE)
         return pickle.loads(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + min(length, _SETTINGS_SIZE - 4)])
 
     def close(self) -> None:
-        """Releases the memory once no view of it is left, and of the descriptor. May be called twice."""
+        """Closes the descriptor; the memory is freed with its last view. May be called twice."""
         if self.descriptor >= 0:
             os.close(self.descriptor)
             self.descriptor = -1
@@ -152,23 +154,23 @@ class ControlBlock:
         return n
 
     def _place_regions(self) -> None:
-        place = _PAGE
+        start = _PAGE
         regions: list[memoryview] = []
         for size in _region_sizes(self.n):
-            regions.append(self._memory[place : place + size])
-            place += size
-        counters, _, self.snapshot, histogram, self.requests, self.replies, self.jog, felt, self.cycles, motion = (
+            regions.append(self._memory[start : start + size])
+            start += size
+        counters, _, self.snapshot, histogram, self.requests, self.replies, self.jog, wrench, self.cycles, motion = (
             regions
         )
         self.counters = counters.cast("Q")
-        self.felt = felt[: 8 * 6].cast("d")
-        self.tool = felt[8 * 6 : 8 * (6 + 16)].cast("d")
+        self.wrench = wrench[: 8 * 6].cast("d")
+        self.tool = wrench[8 * 6 : 8 * (6 + 16)].cast("d")
         self.histogram = histogram[: 8 * HISTOGRAM_WORDS].cast("Q")
         self.motion: Array = np.frombuffer(motion, "<f8", MOTION_ROWS * self.n).reshape(MOTION_ROWS, self.n)
 
 
 def _region_sizes(n: int) -> tuple[int, ...]:
-    """Returns the sizes of all regions but the header, in the order of the list above, [bytes]."""
+    """Returns the sizes of all regions after the header, in the order of the module's docstring, [bytes]."""
     messages = MESSAGE_SLOTS * MESSAGE_SIZE
     return (
         _PAGE,
@@ -193,7 +195,7 @@ def _whole_pages(size: int) -> int:
 
 
 def _open_memory(size: int) -> int:
-    """Returns the descriptor of a file without a name, all of whose bytes exist: no write can fail later."""
+    """Returns the descriptor of an unnamed file whose bytes are all allocated, so that no later write fails."""
     for directory in (_MEMORY, Path(tempfile.gettempdir())):
         if not directory.is_dir():
             continue
@@ -201,9 +203,9 @@ def _open_memory(size: int) -> int:
             with tempfile.TemporaryFile(dir=directory) as file:
                 os.posix_fallocate(file.fileno(), 0, size)
                 return os.dup(file.fileno())
-        except OSError:  # Full, or not ours to write in: containers often grant /dev/shm only 64 MB.
+        except OSError:  # Full or not writable: containers often limit /dev/shm to 64 MB.
             continue
     raise UsageError(
-        f"the control process needs {size / 1e6:.0f} MB of memory to share, and neither {_MEMORY} nor "
-        f"{tempfile.gettempdir()} has room; free some"
+        f"the control process needs {size / 1e6:.0f} MB of shared memory, and neither {_MEMORY} nor "
+        f"{tempfile.gettempdir()} has enough space; free some"
     ).coded("no_memory", size=f"{size / 1e6:.0f}")

@@ -1,7 +1,7 @@
-"""What supervisor and control process send each other: one frozen dataclass for each request, and the reply.
+"""Messages between supervisor and control process: one frozen dataclass per request, and the reply.
 
-Both ends are one build, and the shared block is memory without a name that only these two processes have open. So
-messages are pickled; nothing else can put one there.
+Messages are pickled. That is safe: both ends run the same build, and only these two processes have the shared block
+open.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from rcilab.core.state import Mode
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace
 
-_OVERHEAD = 256  # [bytes] Left for what surrounds an error in its reply.
-_LONGEST = 1000  # Characters that are kept of a sentence that does not fit.
+_OVERHEAD = 256  # [bytes] Of a reply, in addition to its error.
+_MAX_TEXT = 1000  # Characters; longer texts are cut.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """The arm, as far as the control process needs it when it starts."""
+    """The data of the arm that the control process needs when it starts."""
 
     arm: ExpectedArm
     limits: Limits
@@ -34,11 +34,11 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Connect:
-    """Make a connection to a controller, in place of the present one."""
+    """Connect to a controller; replaces the present connection."""
 
     address: str
     timeout: float
-    """For the connection and every answer, [s]."""
+    """For the connection and every response, [s]."""
     configuration: RobotConfiguration
 
 
@@ -81,10 +81,10 @@ class Recover:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """Stop what moves."""
+    """Stop the motion or the hand guiding in progress."""
 
     number: int
-    """How many stops were requested so far, this one included."""
+    """Number of stops requested so far, including this one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +102,7 @@ class StopGuiding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Execute:
-    """Stream the first rows of the block's motion region."""
+    """Stream the motion: the first rows of the block's motion region."""
 
     rows: int
     duration: float
@@ -115,24 +115,24 @@ class SwitchRows:
     """Continue the motion in progress with other rows of the block's motion region."""
 
     first: int
-    """Cycle of the motion from which on they are streamed."""
+    """First cycle of the motion that streams them."""
     start: int
     """Index of the first row in the region."""
     rows: int
     holds: bool
-    """Whether the arm waits at the last one."""
+    """Whether the arm waits at the last row."""
     duration: float
     """New duration of the motion, [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Jog:
-    """Follow the jog that is held in the block."""
+    """Follow the jog in the block."""
 
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """Stop what moves and end the process."""
+    """Stop the arm and end the process."""
 
 
 Request: TypeAlias = (
@@ -143,16 +143,16 @@ Request: TypeAlias = (
 
 @dataclass(frozen=True, slots=True)
 class NumberedRequest:
-    """A request as it is sent."""
+    """A request with its number."""
 
     id: int
-    """Its number, which the reply repeats."""
+    """The reply has the same number."""
     body: Request
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What became of a request."""
+    """The result of a request."""
 
     id: int
     error: RcilabError | None = None
@@ -161,8 +161,7 @@ class Reply:
 def as_sendable(error: Exception) -> RcilabError:
     """Returns an error that fits into a reply.
 
-    The recorded cycles are left out: they are in the ring. An error that is not an RcilabError is a defect, and its
-    sentence says so.
+    It has no recorded cycles: they are in the ring. An error that is not an RcilabError is reported as a defect.
     """
     if not isinstance(error, RcilabError):
         return _shortened(
@@ -176,12 +175,12 @@ def as_sendable(error: Exception) -> RcilabError:
     try:
         if len(pickle.dumps(error)) <= MESSAGE_SIZE - _OVERHEAD:
             return error
-    except Exception:  # Any object may be the value of an InvalidValueError, and pickle raises what that raises.
+    except Exception:  # The value of an InvalidValueError may be any object, and pickling it may raise anything.
         pass
     return _shortened(type(error), str(error))
 
 
-def _shortened(kind: type[RcilabError], sentence: str) -> RcilabError:
+def _shortened(kind: type[RcilabError], text: str) -> RcilabError:
     error: RcilabError = kind.__new__(kind)
-    error.args = (sentence[:_LONGEST],)
+    error.args = (text[:_MAX_TEXT],)
     return error

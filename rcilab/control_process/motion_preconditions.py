@@ -1,4 +1,4 @@
-"""Whether a motion may begin: every reason to refuse one before the control process hears of it."""
+"""Preconditions of a motion, checked before it is sent to the control process."""
 
 from __future__ import annotations
 
@@ -28,20 +28,21 @@ def require_admissible(
     box: SafetyBox | None = None,
     mode: Mode = "joint_position",
 ) -> None:
-    """Returns if the motion may begin now.
+    """Requires that the motion may begin now.
 
     Args:
         motion: The motion.
-        certificate: What `check` gave for it.
+        certificate: Its certificate from `check`.
         model: The arm.
-        status: Where the arm is and what it does.
+        status: Present status of the arm.
         is_operator_overdue: Whether an operator is expected and absent.
-        box: The safety box that the controller was sent.
+        box: The safety box of the controller.
         mode: How the arm is to be commanded.
 
     Raises:
-        InvalidValueError: It is no motion, or the certificate is something else, such as a report.
-        CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
+        InvalidValueError: The motion or the certificate has another type, such as a report.
+        CertificateError: The certificate is missing, or does not fit the motion, the model, or the position of the
+            arm.
         UsageError: The arm is moving, no controller is connected, no operator is present, or the motion is too long.
     """
     require_motion(motion)
@@ -56,7 +57,7 @@ def require_admissible(
     certificate.verify(motion, model, q_c, box, mode=mode)
     if len(motion.q) > MOTION_ROWS:
         raise UsageError(
-            f"the motion takes {motion.duration:.1f} s, {MOTION_TIME:g} s at most can be handed over; split it"
+            f"the motion takes {motion.duration:.1f} s, at most {MOTION_TIME:g} s are possible; split it"
         ).coded("long_motion", duration=f"{motion.duration:.1f}", most=f"{MOTION_TIME:g}")
 
 
@@ -64,7 +65,7 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
     """Returns the commanded joint angles, shape (n,), [rad], if the arm may be moved now.
 
     Args:
-        status: Where the arm is and what it does.
+        status: Present status of the arm.
         is_operator_overdue: Whether an operator is expected and absent.
 
     Raises:
@@ -73,9 +74,9 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
     if status.phase in ("moving", "stopping"):
         raise UsageError("the arm is moving; stop it first, or wait until it has arrived").coded("moving")
     if status.q_c is None or status.phase not in ("idle", "fault"):
-        raise UsageError(f"nothing can move now: {status.message}").coded("not_ready")
+        raise UsageError(f"no motion is possible now: {status.message}").coded("not_ready")
     if is_operator_overdue:
-        raise UsageError(f"the operator's page is gone: no sign of it for {OPERATOR_TIMEOUT:g} s").coded(
+        raise UsageError(f"the operator's page does not respond: no heartbeat for {OPERATOR_TIMEOUT:g} s").coded(
             "nobody", seconds=f"{OPERATOR_TIMEOUT:g}"
         )
     return status.q_c

@@ -1,4 +1,4 @@
-"""Where the rows of the motion in progress are in the shared block, and the switch to others."""
+"""The rows of the motion in progress in the shared block, and their replacement."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from rcilab.control_process.pending_request import PendingRequest
 from rcilab.core.errors import PlanningError, RcilabError, UsageError
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
-_ANSWER_TIMEOUT = 0.5  # [s] for the control process to take a switch; it looks for requests in every cycle.
-_LATEST = 5  # Cycles that the control process needs at least to read a request.
+_REPLY_TIMEOUT = 0.5  # [s] For the control process to handle a switch; it polls requests in every cycle.
+_MIN_LEAD = 5  # Cycles that the control process needs to read a request.
 
 
 @dataclass(frozen=True, slots=True)
 class _Region:
-    """Rows in the block that the control process streams from a cycle on."""
+    """A range of rows in the block, with the cycle of its first row."""
 
     first: int
-    """Cycle of the first one."""
+    """Cycle of the first row."""
     start: int
-    """Its index in the block."""
+    """Index of the first row in the block."""
     count: int
 
 
@@ -31,10 +31,10 @@ class SharedRows:
     """The `RowSink` of a supervisor.
 
     Args:
-        block: Where the rows are.
+        block: The shared block.
         lock: Guards the requests.
-        read_cycle: Returns the motion's cycle now; raises UsageError when none is in progress.
-        send: Sends the request to switch.
+        read_cycle: Returns the present cycle of the motion; raises UsageError if none is in progress.
+        send: Sends a `SwitchRows` request.
     """
 
     def __init__(
@@ -49,36 +49,36 @@ class SharedRows:
         self._send = send
         self.cycle = read_cycle
         self._in_use: list[_Region] = []
-        self._last: tuple[PendingRequest, list[_Region]] | None = None  # The last switch, and what was in use before.
+        self._last: tuple[PendingRequest, list[_Region]] | None = None  # The last switch, and the regions before it.
 
     def begin(self, motion: SpeedScaledMotion) -> None:
-        """Writes the rows of a motion that begins.
+        """Writes the rows of a new motion.
 
         Raises:
-            PlanningError: There is no room: at its speed the motion lasts too long.
+            PlanningError: The region is too small: at this speed the motion takes too long.
         """
         rows = motion.q
         if len(rows) > MOTION_ROWS:
-            raise _too_long(motion)
+            raise _too_long_error(motion)
         self._block.motion[: len(rows)] = rows
         self._in_use, self._last = [_Region(0, 0, len(rows))], None
 
     def switch(self, first: int, changed: SpeedScaledMotion) -> PendingRequest | None:
-        """Writes the rows of a change where none are streamed now, and requests the switch; None: too late for that.
+        """Writes changed rows into a free part of the region and requests the switch; None: it is too late for that.
 
         Raises:
-            PlanningError: There is no room: the motion would last too long.
+            PlanningError: No free part is large enough: the motion would take too long.
         """
         with self._lock:
             cycle = self.cycle()
-            if first < cycle + _LATEST:
+            if first < cycle + _MIN_LEAD:
                 return None
-            begun = [region for region in self._in_use if region.first <= cycle]
-            used = [*begun[-1:], *(region for region in self._in_use if region.first > cycle)]
+            started = [region for region in self._in_use if region.first <= cycle]
+            used = [*started[-1:], *(region for region in self._in_use if region.first > cycle)]
             rows = changed.q[first:]
             start = _find_room(used, len(rows))
             if start is None:
-                raise _too_long(changed)
+                raise _too_long_error(changed)
             self._block.motion[start : start + len(rows)] = rows
             pending = self._send(
                 SwitchRows(first=first, start=start, rows=len(rows), holds=changed.holds, duration=changed.duration)
@@ -88,20 +88,18 @@ class SharedRows:
             return pending
 
     def was_refused(self) -> bool:
-        """Returns whether the control process refused the last switch; waits for its answer.
+        """Returns whether the control process refused the last switch; waits for the reply.
 
         Raises:
-            UsageError: The answer has not come yet.
+            UsageError: The reply has not arrived yet.
         """
         if self._last is None:
             return False
         pending, in_use = self._last
         with suppress(RcilabError):
-            pending.wait(_ANSWER_TIMEOUT)
+            pending.wait(_REPLY_TIMEOUT)
         if not pending.done:
-            raise UsageError("the last change of speed is still being handed over; ask again in a moment").coded(
-                "pace_again"
-            )
+            raise UsageError("the last change of the speed override is still being sent; try again").coded("pace_again")
         self._last = None
         if pending.error is None:
             return False
@@ -109,15 +107,15 @@ class SharedRows:
         return True
 
 
-def _too_long(motion: SpeedScaledMotion) -> PlanningError:
+def _too_long_error(motion: SpeedScaledMotion) -> PlanningError:
     return PlanningError(
-        f"at this speed the motion would last {motion.duration:.0f} s; {MOTION_TIME:g} s at most can be handed over, "
-        "less what is being streamed; choose a higher one"
+        f"at this speed override the motion would take {motion.duration:.0f} s, and at most {MOTION_TIME:g} s, less "
+        "the part in progress, can be sent; choose a higher one"
     ).coded("pace_long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:g}")
 
 
 def _find_room(used: list[_Region], count: int) -> int | None:
-    """Returns the first index with so many rows free between those in use; None if no gap is large enough."""
+    """Returns the first index of `count` free rows; None if no gap is large enough."""
     start = 0
     for region in sorted(used, key=lambda region: region.start):
         if start + count <= region.start:

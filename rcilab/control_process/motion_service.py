@@ -1,4 +1,4 @@
-"""The control process while the arm moves: planned rows or a jog, and the requests that arrive meanwhile."""
+"""Motions in the control process: planned rows or a jog, and the requests that arrive meanwhile."""
 
 from __future__ import annotations
 
@@ -33,36 +33,36 @@ class MotionService:
     """Runs one motion after the other. Owned by the control process's one thread.
 
     Args:
-        block: The shared block, where rows and jogs are read from.
-        limits: Bounds that every command keeps.
-        publisher: Shows how a motion goes.
-        log: Takes every cycle.
-        requests: Requests that come while the arm moves.
-        oversight: Whether a motion is to end.
+        block: The shared block with rows and jogs.
+        limits: Bounds of every command.
+        status: Writes the progress of a motion.
+        log: Records every cycle.
+        requests: Requests that arrive while the arm moves.
+        stop_conditions: Conditions that end a motion.
     """
 
     def __init__(
         self,
         block: ControlBlock,
         limits: Limits,
-        publisher: StatusWriter,
+        status: StatusWriter,
         log: CycleLog,
         requests: RequestChannel,
-        oversight: StopConditions,
+        stop_conditions: StopConditions,
     ) -> None:
         self._block, self._limits = block, limits
-        self._publisher, self._log = publisher, log
-        self._requests, self._oversight = requests, oversight
+        self._status, self._log = status, log
+        self._requests, self._stop_conditions = requests, stop_conditions
         self._jog: JogCallback | None = None
         self._is_stopping = False
         self._stream: MotionStream | None = None
 
     def execute(self, driver: StreamingDriver, model: RobotModel, request: Execute) -> None:
-        """Streams the rows that lie in the block; returns once the arm stands at their end.
+        """Streams the rows in the block; returns once the arm is stationary at their end.
 
         Raises:
-            UsageError: The arm is not where they begin.
-            StoppedError: It was stopped before.
+            UsageError: The arm is not at their start.
+            StoppedError: The motion was stopped before its end.
             ControlError: The controller stopped the arm.
         """
         rows = self._block.motion[: request.rows]
@@ -71,26 +71,26 @@ class MotionService:
             mismatch = describe_start_mismatch(rows[0], driver.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
-            model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Builds it now.
-        self._publisher.begin_motion(request.duration)
-        self._publisher.say("moving", "moving")
-        self._stream = MotionStream(rows, mode, model, self._publisher.on_cycle)
+            model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Warm-up.
+        self._status.begin_motion(request.duration)
+        self._status.set_phase("moving", "moving")
+        self._stream = MotionStream(rows, mode, model, self._status.on_cycle)
         try:
             self._move(driver, model, self._stream, "idle.arrived", mode)
         finally:
             self._stream = None
 
     def jog(self, driver: StreamingDriver, model: RobotModel) -> None:
-        """Moves the arm for as long as the jog is renewed, and returns once it stands.
+        """Moves the arm as long as the jog is renewed; returns once the arm is stationary.
 
         Raises:
-            StoppedError: It was stopped before.
+            StoppedError: The jog was stopped on request.
             ControlError: The controller stopped the arm.
         """
         assert driver.latest is not None  # A connection begins with a state.
         self._jog = JogCallback(HeldJog(self._block), model, driver.latest.q_c)
-        self._publisher.begin_motion(None)
-        self._publisher.say("moving", "moving.jog")
+        self._status.begin_motion(None)
+        self._status.set_phase("moving", "moving.jog")
         try:
             self._move(driver, model, self._jog, "idle.jogged")
         finally:
@@ -104,41 +104,41 @@ class MotionService:
         arrived: str,
         mode: Mode = "joint_position",
     ) -> None:
-        """Runs a motion; its outcome says why it ended."""
+        """Runs a motion and reports why it ended."""
         self._is_stopping = False
-        executor = MotionExecutor(driver, self._log, self._stop_reason, self._limits, on_stopping=self._show_stopping)
+        executor = MotionExecutor(driver, self._log, self._stop_reason, self._limits, on_stopping=self._report_stopping)
         try:
             with awake_cores():
                 reason = executor.run(callback, mode, model)
         finally:
-            self._publisher.end_motion()  # Before it is said to be over: a reader then sees where it ended.
+            self._status.end_motion()  # Before the phase changes, so that a reader sees the final time.
             gc.collect()
-        say = self._publisher.say
+        set_phase = self._status.set_phase
         if reason is None:
-            say("idle", arrived)
+            set_phase("idle", arrived)
             return
         if reason == "idle.operator":
-            say("idle", reason, seconds=OPERATOR_TIMEOUT)
+            set_phase("idle", reason, seconds=OPERATOR_TIMEOUT)
         elif reason == HELD_TOO_LONG:
-            say("idle", "idle.held", seconds=LONGEST_PAUSE * CYCLE_TIME)
+            set_phase("idle", "idle.held", seconds=LONGEST_PAUSE * CYCLE_TIME)
         else:
-            say("idle", "idle.stopped")
-        raise StoppedError(self._publisher.snapshot.message)
+            set_phase("idle", "idle.stopped")
+        raise StoppedError(self._status.snapshot.message)
 
     def _stop_reason(self, t: float) -> str | None:
-        """Returns why the motion is to stop; called in every cycle."""
-        reason = self._oversight.reason_to_stop()
+        """Returns the reason to stop the motion, or None; called in every cycle."""
+        reason = self._stop_conditions.reason_to_stop()
         if reason is None and self._requests.has_new:
-            reason = self._answer()
+            reason = self._handle_request()
         return reason
 
-    def _show_stopping(self, reason: str) -> None:
+    def _report_stopping(self, reason: str) -> None:
         self._is_stopping = True
-        self._publisher.say("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
+        self._status.set_phase("stopping", "stopping.operator" if reason == "idle.operator" else "stopping")
 
-    def _answer(self) -> str | None:
-        """Looks at a request that has come while the arm moves; returns why the motion is to end for it, or None."""
-        request = self._requests.take_new()
+    def _handle_request(self) -> str | None:
+        """Handles a request while the arm moves; returns the reason to stop the motion for it, or None."""
+        request = self._requests.pop_new()
         if request is None:
             return None
         if isinstance(request.body, Stop | End):
@@ -146,19 +146,19 @@ class MotionService:
             return "idle.stopped"
         if isinstance(request.body, SwitchRows) and self._stream is not None and not self._is_stopping:
             self._switch_rows(request, request.body, self._stream)
-        elif self._jog is not None:  # It stops at once, and then has no reason to go on.
+        elif self._jog is not None:  # The jog stops and ends; the request follows.
             self._requests.defer(request)
-            self._jog.is_wanted = False
+            self._jog.is_enabled = False
         else:
             self._requests.answer(request, UsageError("the arm is moving; stop it first, or wait until it has arrived"))
         return None
 
     def _switch_rows(self, request: NumberedRequest, switch: SwitchRows, stream: MotionStream) -> None:
-        """Continues with rows that lie ready in the block."""
+        """Continues with other rows of the block."""
         rows = self._block.motion[switch.start : switch.start + switch.rows]
         if stream.switch(switch.first, rows, holds=switch.holds):
-            self._publisher.update(motion_duration=switch.duration)
-            self._publisher.say("moving", "moving.held" if switch.holds else "moving")
+            self._status.update(motion_duration=switch.duration)
+            self._status.set_phase("moving", "moving.held" if switch.holds else "moving")
             self._requests.answer(request)
         else:
-            self._requests.answer(request, UsageError("the change of the speed override came too late; ask again"))
+            self._requests.answer(request, UsageError("the change of the speed override arrived too late; try again"))

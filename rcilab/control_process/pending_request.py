@@ -1,4 +1,4 @@
-"""A request that the control process carries out, as its sender sees it."""
+"""The future of a request to the control process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcilab.core.errors import DeadlineError, RcilabError
 
 
 class PendingRequest:
-    """A request that the control process carries out. Thread-safe.
+    """The future of a request to the control process. Thread-safe.
 
     Args:
         what: Name of the request, for error messages.
@@ -21,34 +21,34 @@ class PendingRequest:
 
     @property
     def done(self) -> bool:
-        """Whether the request has been carried out or has failed. For `execute`: the arm stands still again."""
+        """Whether the request has succeeded or failed. For `execute`: the arm is stationary again."""
         return self._event.is_set()
 
     @property
     def error(self) -> RcilabError | None:
-        """Why it failed; None while it is in progress and when it succeeded.
+        """Why it failed; None while it is in progress and if it succeeded.
 
-        An `execute` that was stopped before its end has a `ControlError` without faults.
+        A stopped `execute` has a `ControlError` without faults.
         """
         return self._error
 
     def wait(self, timeout: float | None = None) -> None:
-        """Returns once the request has been carried out.
+        """Returns once the request has succeeded.
 
         Args:
-            timeout: How long to wait, [s]; None waits as long as it takes.
+            timeout: Timeout, [s]; None: no timeout.
 
         Raises:
-            DeadlineError: It is still in progress after `timeout`; it goes on.
+            DeadlineError: It is still in progress after `timeout`; it continues.
             RcilabError: It failed; the same object as `.error`.
         """
         if not self._event.wait(timeout):
-            raise DeadlineError(f"{self._what} is still in progress after {timeout:g} s; it goes on, wait again")
+            raise DeadlineError(f"{self._what} is still in progress after {timeout:g} s; it continues, wait again")
         if self._error is not None:
             raise self._error
 
     def settle(self, error: RcilabError | None = None) -> None:
-        """Marks it done; the supervisor calls this. Only the first call counts."""
+        """Marks it done; called by the supervisor. Only the first call has an effect."""
         if not self._event.is_set():
             self._error = error
             self._event.set()

@@ -1,4 +1,4 @@
-"""The supervisor of control process and virtual controller: start, exits, restarts, end."""
+"""Supervision of the control process and the virtual controller: start, exit, restart, end."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError
 
-ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every answer of the controller.
-LOAD_TIMEOUT = START_TIMEOUT  # [s] for the control process to load; as long as the virtual controller may take.
-FROZEN_AFTER = 1.0  # [s] Without a heartbeat of the control process; longer than any wait of its own.
+ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every response of the controller.
+LOAD_TIMEOUT = START_TIMEOUT  # [s] For the control process to load; the same as for the virtual controller.
+FROZEN_AFTER = 1.0  # [s] Without a heartbeat of the control process; longer than any of its waits.
 END_TIMEOUT = 3.0  # [s] For the control process to stop the arm and exit; the longest stop takes 0.4 s.
-MODE_DELAY = 0.2  # [s] Of our own controller: our client needs no delay after a change of mode.
-PREFILL = 40  # [cycles] Play-out of our own controller: with a browser open pauses of tens of ms are common.
-_RESTARTS, _RESTART_WINDOW = 3, 60.0  # Automatic restarts, in so many seconds.
+MODE_DELAY = 0.2  # [s] Of the virtual controller: our client needs no longer delay after a change of mode.
+PREFILL = 40  # [cycles] Of the virtual controller's jitter buffer: an open browser causes pauses of tens of ms.
+_RESTARTS, _RESTART_WINDOW = 3, 60.0  # Largest number of automatic restarts, and within which time, [s].
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProcessExit:
-    """An unexpected end of a process of ours: it ended by itself, or it froze and was ended."""
+    """An unexpected end of a child process: it ended by itself, or it hung and was killed."""
 
     code: str
     """Key of `MESSAGES`."""
     message: str
-    """One English sentence: what ended, how, and what happens next."""
+    """One English sentence: which process ended, how, and what happens next."""
     is_worker: bool
-    """Whether it was the control process: every pending request is lost with it."""
+    """Whether it was the control process: all pending requests are lost."""
 
 
 class ProcessSupervisor:
-    """Owns the control process and, where the controller is ours, the virtual controller.
+    """Owns the control process and, if there is one, the virtual controller.
 
-    It has no thread and no lock: `look()` is called often, and every call is guarded by its owner's lock.
-    Nothing here waits, except `end()`.
+    It has no thread and no lock: its owner calls `reap()` periodically and guards every call with its lock. Only
+    `end()` waits.
 
     Args:
         block: Shared memory for the control process.
         model_name: Name of the arm, for the virtual controller.
-        plant: What the virtual controller moves: "ideal" or "mujoco".
-        address: Address of a controller that is not ours; None to start a virtual one.
-        auto_restart: Whether a process that ended is started again automatically (at most 3 times a minute).
+        plant: Plant of the virtual controller: "ideal" or "mujoco".
+        address: Address of an external controller; None starts a virtual one.
+        auto_restart: Whether a process that ended is restarted automatically (at most 3 times a minute).
     """
 
     def __init__(
@@ -56,14 +56,14 @@ class ProcessSupervisor:
         self._block = block
         self._model_name = model_name
         self._plant = plant
-        self._foreign_address = address
+        self._external_address = address
         self._auto_restart = auto_restart
         self._worker: ManagedProcess | None = None
         self._worker_started = 0.0
         self._controller: VirtualController | None = None
         self._restarts: deque[float] = deque(maxlen=_RESTARTS)
         self.address: str | None = None
-        """Where the controller listens; None as long as the virtual one does not."""
+        """Address of the controller; None until the virtual one listens."""
 
     @property
     def worker_pid(self) -> int | None:
@@ -72,39 +72,41 @@ class ProcessSupervisor:
 
     @property
     def controller_pid(self) -> int | None:
-        """Process id of the virtual controller; None when it is not ours or not running."""
+        """Process id of the virtual controller; None without one or when it is not running."""
         return self._controller.pid if self._controller is not None and self._controller.is_alive else None
 
     @property
     def world_address(self) -> str | None:
-        """Address of our virtual controller's simulation port, HOST:PORT; None without one."""
+        """Address of the virtual controller's simulation port, HOST:PORT; None without one."""
         return self._controller.world_address if self._controller is not None and self.address is not None else None
 
     @property
     def is_ready(self) -> bool:
-        """Whether the control process takes requests and a controller is there to connect to."""
+        """Whether the control process handles requests and the address of the controller is known."""
         return (
-            self.address is not None and self._block.counters[Counter.WORKER_BEAT] != 0 and self.worker_pid is not None
+            self.address is not None
+            and self._block.counters[Counter.WORKER_HEARTBEAT] != 0
+            and self.worker_pid is not None
         )
 
     def launch(self) -> None:
-        """Starts our processes and returns at once; the count of restarts begins again.
+        """Starts the processes and returns at once; resets the count of restarts.
 
         Raises:
             ConnectionLostError: A process could not be started.
         """
         self._restarts.clear()
-        self.address = self._foreign_address
-        if self._foreign_address is None:
+        self.address = self._external_address
+        if self._external_address is None:
             self._start_controller()
         self._start_worker()
 
-    def look(self) -> list[ProcessExit]:
-        """Reaps what has ended or frozen since the last call and restarts it where that is enabled."""
-        return [death for death in (self._check_controller(), self._check_worker()) if death is not None]
+    def reap(self) -> list[ProcessExit]:
+        """Reaps processes that have ended or hung since the last call and restarts them if that is enabled."""
+        return [exited for exited in (self._check_controller(), self._check_worker()) if exited is not None]
 
     def end(self) -> None:
-        """Ends both processes; the control process has `END_TIMEOUT` to exit by itself if that was requested."""
+        """Ends both processes; a control process with an `End` request has `END_TIMEOUT` to exit by itself."""
         worker, self._worker = self._worker, None
         if worker is not None:
             worker.wait(END_TIMEOUT)
@@ -118,13 +120,13 @@ class ProcessSupervisor:
         )
 
     def _start_worker(self) -> None:
-        words = self._block.counters
-        # Pending messages were for a process that has ended.
-        for word in (Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN):
-            words[word] = 0
-        words[Counter.WORKER_BEAT] = 0
+        counters = self._block.counters
+        # Pending messages were for the previous process.
+        for counter in (Counter.REQUESTS_POSTED, Counter.REQUESTS_READ, Counter.REPLIES_POSTED, Counter.REPLIES_READ):
+            counters[counter] = 0
+        counters[Counter.WORKER_HEARTBEAT] = 0
         self._worker_started = time.monotonic()
-        words[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
+        counters[Counter.SUPERVISOR_HEARTBEAT] = time.monotonic_ns()
         self._worker = ManagedProcess(
             "rcilab.control_process.worker",
             ["--block", str(self._block.descriptor), "--parent", str(parent_pid())],
@@ -139,12 +141,12 @@ class ProcessSupervisor:
         was_ready = self.address is not None
         try:
             self.address = controller.address
-        except ConnectionLostError as error:  # It has never been ready: another attempt would end the same way.
+        except ConnectionLostError as error:  # It was never ready: another attempt would fail as well.
             self._end_controller()
             return ProcessExit(code="crashed.controller", message=str(error), is_worker=False)
         if controller.is_alive:
             return None
-        how = controller.how_it_ended
+        how = controller.exit_description
         self._end_controller()
         return self._restart("crashed.controller", self._start_controller if was_ready else None, how=how)
 
@@ -159,8 +161,8 @@ class ProcessSupervisor:
             worker.kill()
             code, facts = "crashed.frozen", {"seconds": silence}
         else:
-            words = worker.last_words
-            how = f"{worker.how_it_ended}; {words.splitlines()[-1]}" if words else worker.how_it_ended
+            output = worker.stderr_tail
+            how = f"{worker.exit_description}; {output.splitlines()[-1]}" if output else worker.exit_description
             code, facts = "crashed.worker", {"how": how}
         worker.end()
         self._worker = None
@@ -168,12 +170,12 @@ class ProcessSupervisor:
 
     def _heartbeat_age(self) -> float:
         """Returns the time since the last heartbeat of the control process, [s]; 0 while none is expected."""
-        beat = self._block.counters[Counter.WORKER_BEAT]
-        if beat == 0:  # It is still loading.
+        heartbeat = self._block.counters[Counter.WORKER_HEARTBEAT]
+        if heartbeat == 0:  # It is still loading.
             loading = time.monotonic() - self._worker_started
             return loading if loading > LOAD_TIMEOUT else 0.0
-        silence = (time.monotonic_ns() - beat) * 1e-9
-        # While it waits for a TCP connection it cannot do anything else.
+        silence = (time.monotonic_ns() - heartbeat) * 1e-9
+        # It blocks while it waits for a TCP connection.
         is_connecting = read_snapshot(self._block.snapshot, self._block.counters).phase == "connecting"
         return 0.0 if is_connecting and silence < 3.0 * ANSWER_TIMEOUT else silence
 
@@ -182,16 +184,16 @@ class ProcessSupervisor:
 
         Args:
             code: Key of `MESSAGES`.
-            start: Starts the process again; None when it is not to be restarted.
-            **facts: What the message contains.
+            start: Restarts the process; None: do not restart it.
+            **facts: Values for the message.
         """
         now = time.monotonic()
-        is_often = len(self._restarts) == _RESTARTS and now - self._restarts[0] < _RESTART_WINDOW
-        again = self._auto_restart and not is_often and start is not None
-        following = "it is being started again" if again else "restart starts it again"
-        if is_often:
-            following = f"that was {_RESTARTS} times in a minute; restart"
-        death = ProcessExit(
+        is_repeated = len(self._restarts) == _RESTARTS and now - self._restarts[0] < _RESTART_WINDOW
+        again = self._auto_restart and not is_repeated and start is not None
+        following = "it is being restarted" if again else "use restart"
+        if is_repeated:
+            following = f"that happened {_RESTARTS} times in a minute; use restart"
+        exited = ProcessExit(
             code=code, message=MESSAGES[code].format(**facts, next=following), is_worker=code != "crashed.controller"
         )
         if again and start is not None:
@@ -199,11 +201,11 @@ class ProcessSupervisor:
             try:
                 start()
             except ConnectionLostError as error:
-                return replace(death, message=str(error))
-        return death
+                return replace(exited, message=str(error))
+        return exited
 
     def _end_controller(self) -> None:
         controller, self._controller = self._controller, None
-        self.address = self._foreign_address
+        self.address = self._external_address
         if controller is not None:
             controller.end()

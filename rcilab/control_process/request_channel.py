@@ -1,4 +1,4 @@
-"""The control process's end of the message rings: requests come in, each is answered once."""
+"""The control process's end of the message rings: receives requests and replies once to each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcilab.control_process.messages import NumberedRequest, Reply, as_sendable
 
 
 class RequestChannel:
-    """Takes requests and answers them. Owned by the control process's one thread.
+    """Receives requests and sends replies. Owned by the control process's one thread.
 
     Args:
         block: The shared block.
@@ -16,30 +16,30 @@ class RequestChannel:
 
     def __init__(self, block: ControlBlock) -> None:
         self._requests: MessageRing[NumberedRequest] = MessageRing(
-            block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN
+            block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_READ
         )
         self._replies: MessageRing[Reply] = MessageRing(
-            block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN
+            block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_READ
         )
         self._deferred: list[NumberedRequest] = []
 
     @property
     def has_new(self) -> bool:
-        """Whether a request has arrived that was not taken yet; cheap enough for every cycle."""
+        """Whether the ring has an unread request; cheap enough for every cycle."""
         return self._requests.has_message
 
-    def take_new(self) -> NumberedRequest | None:
-        """Returns a request that was not taken yet, or None."""
-        return self._requests.take()
+    def pop_new(self) -> NumberedRequest | None:
+        """Returns the next unread request, or None."""
+        return self._requests.pop()
 
-    def take(self) -> NumberedRequest | None:
-        """Returns the oldest request, the deferred ones first, or None."""
-        return self._deferred.pop(0) if self._deferred else self._requests.take()
+    def pop(self) -> NumberedRequest | None:
+        """Returns the oldest request, deferred ones first, or None."""
+        return self._deferred.pop(0) if self._deferred else self._requests.pop()
 
     def defer(self, request: NumberedRequest) -> None:
-        """Keeps a request for later: `take` returns it."""
+        """Queues a request again: `pop` returns it later."""
         self._deferred.append(request)
 
     def answer(self, request: NumberedRequest, error: Exception | None = None) -> None:
-        """Reports that a request was carried out, or why not."""
+        """Sends the reply to a request: success, or the error."""
         self._replies.post(Reply(request.id, None if error is None else as_sendable(error)))

@@ -1,4 +1,4 @@
-"""The supervisor's end of the message rings: requests go out, each has a `PendingRequest` that its reply settles."""
+"""The supervisor's end of the message rings: sends requests and matches replies to their `PendingRequest`."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from rcilab.core.errors import RcilabError, UsageError
 
 
 class RequestClient:
-    """Sends requests and collects replies; guarded by the lock of its owner.
+    """Sends requests and collects replies. Guarded by its owner's lock.
 
     Args:
-        block: Holds the message rings.
+        block: The shared block.
     """
 
     def __init__(self, block: ControlBlock) -> None:
         self._requests: MessageRing[NumberedRequest] = MessageRing(
-            block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN
+            block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_READ
         )
         self._replies: MessageRing[Reply] = MessageRing(
-            block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN
+            block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_READ
         )
         self._pending: dict[int, PendingRequest] = {}
         self._next_id = 1
 
     def send(self, what: str, request: Request) -> PendingRequest:
-        """Sends a request and returns what its reply settles.
+        """Sends a request and returns its future.
 
         Args:
             what: Name of the request, for error messages.
             request: The request.
 
         Raises:
-            UsageError: Too many requests wait already.
+            UsageError: Too many requests are queued.
         """
         pending = PendingRequest(what)
         self._requests.post(NumberedRequest(self._next_id, request))
@@ -45,14 +45,14 @@ class RequestClient:
         return pending
 
     def send_end(self) -> None:
-        """Asks the control process to stop the arm and end."""
-        with suppress(UsageError):  # The ring is full: then the control process does not read it anyway.
+        """Requests that the control process stops the arm and ends."""
+        with suppress(UsageError):  # The ring is full: the control process does not read it.
             self._requests.post(NumberedRequest(0, End()))
 
     def collect(self) -> list[RcilabError]:
-        """Settles the requests that were answered and returns the errors among the answers; does not wait."""
+        """Settles the requests that have a reply and returns the errors in the replies; does not wait."""
         errors: list[RcilabError] = []
-        while (reply := self._replies.take()) is not None:
+        while (reply := self._replies.pop()) is not None:
             pending = self._pending.pop(reply.id, None)
             if pending is not None:
                 pending.settle(reply.error)
@@ -61,7 +61,7 @@ class RequestClient:
         return errors
 
     def fail_all(self, error: RcilabError) -> None:
-        """Settles every pending request with an error: no reply will come any more."""
+        """Settles every pending request with an error: no reply will arrive."""
         for pending in self._pending.values():
             pending.settle(error)
         self._pending.clear()

@@ -1,4 +1,4 @@
-"""Reading the ring of cycles while the control process writes it."""
+"""Reader of the ring of cycles that the control process writes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.core.cycle_log import cycle_dtype
 
 
 class RingReader:
-    """One reader with its own place in the ring. Owned by one thread at a time.
+    """One reader with its own position in the ring. Owned by one thread at a time.
 
     Args:
         block: The shared block.
@@ -21,7 +21,7 @@ class RingReader:
         self._rows: NDArray[np.void] = np.frombuffer(block.cycles, cycle_dtype(block.n), RING_CYCLES)
         self._next = 0
         self.overrun = 0
-        """Rows that were overwritten before they were read."""
+        """Number of rows that were overwritten before they were read."""
 
     def newest(self) -> NDArray[np.void] | None:
         """Returns a copy of the newest row, shape (1,), or None while the ring is empty; does not move the reader."""
@@ -29,8 +29,8 @@ class RingReader:
             count = self._counters[Counter.CYCLES]
             if count == 0:
                 return None
-            place = (count - 1) % RING_CYCLES
-            row = self._rows[place : place + 1].copy()
+            index = (count - 1) % RING_CYCLES
+            row = self._rows[index : index + 1].copy()
             if self._counters[Counter.CYCLES] - (count - 1) < RING_CYCLES:
                 return row
 
@@ -44,10 +44,10 @@ class RingReader:
         count = self._counters[Counter.CYCLES]
         first = max(self._next, count - RING_CYCLES)
         rows = self._copy(first, count)
-        # What the writer has overwritten while we copied is rubbish; the row it writes just now counts as well.
-        spoiled = max(0, self._counters[Counter.CYCLES] + 1 - RING_CYCLES - first)
-        lost = first - self._next + min(spoiled, len(rows))
-        rows = rows[spoiled:]
+        # Rows that were overwritten during the copy are invalid; so is the row being written.
+        overwritten = max(0, self._counters[Counter.CYCLES] + 1 - RING_CYCLES - first)
+        lost = first - self._next + min(overwritten, len(rows))
+        rows = rows[overwritten:]
         self.overrun += lost
         self._next = count
         if lost and len(rows):

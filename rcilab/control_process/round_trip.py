@@ -1,4 +1,4 @@
-"""How long a command takes to come back in a state, and how long we take to answer: from the recorded cycles."""
+"""Round-trip time of a command, and time from a state to its answer, measured in the recorded cycles."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.recording.run import find_delay
 
 _PERIOD = 0.5  # [s] between two samples; the delay changes slowly.
-_CYCLES = 600  # Of the newest that are looked at.
-_FEWEST = 50
-_MOVED = 1e-6  # [rad] Less motion than that does not show a delay.
+_CYCLES = 600  # Newest cycles that a sample uses.
+_MIN_CYCLES = 50
+_MIN_MOTION = 1e-6  # [rad] A smaller motion does not show the delay.
 
 
 class RoundTrip:
-    """Looks at the ring twice a second at most; changes nothing. Guarded by the lock of its owner.
+    """Samples the ring at most twice a second. Guarded by its owner's lock.
 
     Args:
         block: The shared block.
@@ -27,21 +27,21 @@ class RoundTrip:
 
     def __init__(self, block: ControlBlock) -> None:
         self._ring = RingReader(block)
-        self._looked = 0.0
-        self._found: dict[str, Any] = {}
+        self._sampled_at = 0.0
+        self._fields: dict[str, Any] = {}
 
     def read_fields(self) -> dict[str, Any]:
-        """Returns `round_trip` and `answer_time` of the status, as far as they are known."""
+        """Returns `round_trip` and `answer_time` of the status; an unknown one is left out."""
         now = time.monotonic()
-        if now - self._looked < _PERIOD:
-            return self._found
-        self._looked = now
+        if now - self._sampled_at < _PERIOD:
+            return self._fields
+        self._sampled_at = now
         rows = self._ring.last(_CYCLES)
         rows = rows[np.isfinite(rows["t"]) & (rows["sent_ns"] > 0)]
-        if len(rows) < _FEWEST:
-            return self._found
-        self._found = {**self._found, "answer_time": 1e-9 * float(np.median(rows["sent_ns"] - rows["received_ns"]))}
+        if len(rows) < _MIN_CYCLES:
+            return self._fields
+        self._fields = {**self._fields, "answer_time": 1e-9 * float(np.median(rows["sent_ns"] - rows["received_ns"]))}
         command = rows["command"]
-        if np.isfinite(command).all() and np.ptp(command, axis=0).max() > _MOVED:
-            self._found["round_trip"] = CYCLE_TIME * find_delay(rows["q_c"], command)
-        return self._found
+        if np.isfinite(command).all() and np.ptp(command, axis=0).max() > _MIN_MOTION:
+            self._fields["round_trip"] = CYCLE_TIME * find_delay(rows["q_c"], command)
+        return self._fields

@@ -1,4 +1,4 @@
-"""`simulate`: the same session as `connect`, with a private virtual controller at the other end."""
+"""`simulate`: a session as with `connect`, on a private virtual controller."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 
-ANSWER_TIMEOUT = 10.0  # [s] The other end is on this machine: if it is slow, the machine is busy.
-SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller that has no deadlines to keep for long.
+ANSWER_TIMEOUT = 10.0  # [s] The controller is on this machine: if it is slow, the machine is busy.
+SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller without deadlines for seconds.
 
 
 def simulate(
     model: RobotModel, *, plant: str = "ideal", lockstep: bool = True, record_all: bool = False
 ) -> RobotSession:
-    """Returns a session with a simulated arm; closing the session, or dropping it, ends the simulation.
+    """Returns a session with a simulated arm; the simulation ends when the session is closed or garbage-collected.
 
     Args:
         model: The arm, with its tool, load and soft limits; the virtual controller receives all three.
         plant: "ideal" (the arm follows the command exactly) or "mujoco".
-        lockstep: True: each simulated millisecond waits for its command, so that a run comes out the same to the last
-            bit on any machine. False: the controller runs free at 1 kHz, as a real one does.
-        record_all: Whether runs hold everything that the state has, three times as much; see `Run.cycles`.
+        lockstep: True: each simulated millisecond waits for its command, so that a run has the same result to the last
+            bit on any machine. False: the controller runs freely at 1 kHz, like a real one.
+        record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
 
     Raises:
         InvalidValueError: `model` is not a robot model, or the plant is unknown.
@@ -39,10 +39,10 @@ def simulate(
     require_plant(plant)
     controller = start_controller(model.name, plant, lockstep)
     try:
-        assert controller.address is not None  # start_controller waits for it.
+        assert controller.address is not None  # Set by start_controller.
         session = open_session(
             controller.address,
-            model.with_tool(IDENTITY),  # As the controller starts; it receives the tool below.
+            model.with_tool(IDENTITY),  # As the controller starts; the tool is set below.
             ANSWER_TIMEOUT,
             record_all=record_all,
             realtime=not lockstep,
@@ -66,7 +66,7 @@ def simulate(
     except BaseException:
         session.close()
         raise
-    weakref.finalize(session, controller.end)  # A cell that runs again drops its earlier session.
+    weakref.finalize(session, controller.end)  # A notebook cell that runs again drops its earlier session.
     return session
 
 

@@ -1,4 +1,4 @@
-"""The part of the status that only the control process knows, written in one piece and read in one piece."""
+"""The status of the control process as one record in shared memory, written and read as a whole."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from rcilab.control_process.layout import Counter
 from rcilab.control_process.status import PHASES, Phase
 
 _RECORD = struct.Struct("<BbBBqIIddd96s1024s")
-_ATTEMPTS = 1000  # The writer needs about 3 us; failing this often means that the writer ended while writing.
+_ATTEMPTS = 1000  # The writer needs about 3 us; more failures mean that it ended while writing.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """What the control process says about itself."""
+    """Status of the control process."""
 
     phase: Phase = "starting"
     code: str = "starting"
@@ -23,18 +23,18 @@ class Snapshot:
     is_fifo: bool = False
     memory_locked: bool = False
     inputs: int = -1
-    """Levels of the digital inputs when they were read last, a bit each; -1: not read on this connection."""
+    """Levels of the digital inputs when last read, one bit each; -1: not read on this connection."""
     outputs_known: int = 0
-    """Digital outputs that were set on this connection, a bit each: a controller cannot be asked for them."""
+    """Digital outputs that were set on this connection, one bit each: a controller does not report them."""
     outputs: int = 0
-    """Levels of those, a bit each."""
+    """Levels of these outputs, one bit each."""
     rate_hz: float = 0.0
     motion_time: float | None = None
     motion_duration: float | None = None
 
 
 def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot) -> None:
-    """Writes a snapshot; the sequence word is odd meanwhile."""
+    """Writes a snapshot; the sequence number is odd meanwhile."""
     sequence = counters[Counter.SNAPSHOT] | 1
     counters[Counter.SNAPSHOT] = sequence
     _RECORD.pack_into(
@@ -51,13 +51,13 @@ def write_snapshot(memory: memoryview, counters: memoryview, snapshot: Snapshot)
         -1.0 if snapshot.motion_time is None else snapshot.motion_time,
         -1.0 if snapshot.motion_duration is None else snapshot.motion_duration,
         snapshot.code.encode(),
-        _fitting(snapshot.message, 1024),
+        _encode(snapshot.message, 1024),
     )
     counters[Counter.SNAPSHOT] = sequence + 1
 
 
 def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
-    """Returns the latest whole snapshot."""
+    """Returns the latest complete snapshot."""
     data = b""
     for _ in range(_ATTEMPTS):
         before = counters[Counter.SNAPSHOT]
@@ -82,7 +82,7 @@ def read_snapshot(memory: memoryview, counters: memoryview) -> Snapshot:
     )
 
 
-def _fitting(text: str, size: int) -> bytes:
+def _encode(text: str, size: int) -> bytes:
     return text.encode()[:size].decode(errors="ignore").encode()
 
 

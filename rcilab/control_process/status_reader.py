@@ -1,4 +1,4 @@
-"""Reading the part of the status that is in the shared block: arm, motion and timing."""
+"""Reader of the status in the shared block: arm, motion and timing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rcilab.makers.maker import Maker
 
 
 class StatusReader:
-    """Looks at what the control process shows of itself; changes nothing.
+    """Reads the status that the control process writes.
 
     Args:
         block: The shared block.
@@ -35,14 +35,14 @@ class StatusReader:
         self._tool: tuple[bytes, Pose | None] = b"", None
 
     def read_snapshot(self) -> Snapshot:
-        """Returns what the control process last said about itself."""
+        """Returns the latest snapshot of the control process."""
         return read_snapshot(self._block.snapshot, self._block.counters)
 
     def read_fields(self, shown: Snapshot) -> dict[str, Any]:
-        """Returns the fields of `SupervisorStatus` that the block knows; those of the arm only once states came.
+        """Returns the fields of `SupervisorStatus` that are in the block; those of the arm only after the first state.
 
         Args:
-            shown: The snapshot to take motion and scheduling from.
+            shown: Snapshot with motion and scheduling.
         """
         return {
             "powered": shown.powered,
@@ -62,10 +62,10 @@ class StatusReader:
         }
 
     def read_cycle(self) -> int:
-        """Returns the newest cycle of the motion in progress; 0 as long as it has not begun."""
+        """Returns the newest cycle of the motion in progress; 0 before its first."""
         row = self._ring.newest()
         t = 0.0 if row is None else float(row["t"][0])
-        return round(t / CYCLE_TIME) if t == t else 0  # NaN outside of a motion.
+        return round(t / CYCLE_TIME) if t == t else 0  # NaN outside a motion.
 
     def _read_arm(self) -> dict[str, Any]:
         row = self._ring.newest()
@@ -80,14 +80,14 @@ class StatusReader:
             "robot_mode": RobotMode(last["robot_mode"]),
             "controller_mode": ControllerMode(last["controller_mode"]),
             "faults": tuple(fault for fault in self._faults if bits >> fault & 1) if bits else (),
-            "tau_ext": np.array(self._block.felt),
+            "tau_ext": np.array(self._block.wrench),
             "T_flange_tool": self._read_tool(),
             "success_rate": float(last["success_rate"]),
             "message_id": int(last["message_id"]),
         }
 
     def _read_tool(self) -> Pose | None:
-        """Returns the tool; the same pose for as long as the same numbers stand there."""
+        """Returns the tool; the same object as long as the numbers do not change."""
         raw = self._block.tool.tobytes()
         if raw != self._tool[0]:
             self._tool = raw, _pose(self._block.tool.tolist())
@@ -99,5 +99,5 @@ def _pose(numbers: Sequence[float]) -> Pose | None:
         return None
     try:
         return Pose.from_row_major(numbers)
-    except InvalidValueError:  # It is being written at this moment.
+    except InvalidValueError:  # It is being written.
         return None

@@ -1,4 +1,4 @@
-"""What the control process shows of itself, kept cheap enough for every cycle."""
+"""Writer of the control process's status, cheap enough for every cycle."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Pose
 from rcilab.execution.recorder import CycleLog, Recorder
 
-_SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 a second.
+_SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 per second.
 _WRENCH = struct.Struct("=6d")
 _POSE = struct.Struct("=16d")
-_RATE_TIME = 1.0  # [s] over which states are counted.
+_RATE_TIME = 1.0  # [s] For which states are counted.
 
 
 class StatusWriter:
-    """Owns the control process's side of the shared block. One thread.
+    """Writes the control process's part of the shared block. Owned by its one thread.
 
     Args:
         block: The shared block.
@@ -33,25 +33,25 @@ class StatusWriter:
         self._block = block
         self._counters = block.counters
         self.recorder = Recorder(block.n, RING_CYCLES, block.cycles)
-        self.recorder.count = self._counters[Counter.CYCLES]  # A successor goes on where its predecessor died.
+        self.recorder.count = self._counters[Counter.CYCLES]  # A restarted process continues the ring.
         self.snapshot = Snapshot()
         self._histogram = JitterHistogram(block.histogram)
         self._rate_since = time.monotonic_ns()
         self._rate_from = self.recorder.count
         self._motion_cycle = 0
-        self._felt: Array | None = None  # What the block says of the wrench from outside.
+        self._wrench: Array | None = None  # The external wrench in the block.
         self.update()
 
     def restart(self) -> None:
-        """Forgets the timing: another connection begins."""
+        """Resets the timing for a new connection."""
         self._histogram.clear()
         self._block.tool[15] = 0.0
         self._counters[Counter.LOST] = 0
 
-    def beat(self) -> None:
-        """Gives a sign of life, and counts states a second."""
+    def write_heartbeat(self) -> None:
+        """Writes the heartbeat, and the rate of states once a second."""
         now = time.monotonic_ns()
-        self._counters[Counter.WORKER_BEAT] = now
+        self._counters[Counter.WORKER_HEARTBEAT] = now
         elapsed = (now - self._rate_since) * 1e-9
         if elapsed >= _RATE_TIME:
             self.update(rate_hz=(self.recorder.count - self._rate_from) / elapsed)
@@ -62,40 +62,40 @@ class StatusWriter:
         self.snapshot = replace(self.snapshot, **changes)
         write_snapshot(self._block.snapshot, self._counters, self.snapshot)
 
-    def say(self, phase: Phase, code: str, **facts: Any) -> None:
-        """Shows another phase, and why; what was said last is not said again."""
+    def set_phase(self, phase: Phase, code: str, **facts: Any) -> None:
+        """Sets phase and message; does nothing if the code is unchanged and the message has no values."""
         if self.snapshot.code != code or facts:
             self.update(phase=phase, code=code, message=MESSAGES[code].format(**facts))
 
     def on_row(self, log: CycleLog) -> None:
-        """Announces a row that was written to the ring."""
+        """Updates counters and status after a row was written to the ring."""
         count = self.recorder.count
         self._counters[Counter.CYCLES] = count
         self._counters[Counter.LOST] = log.lost_total
-        if log.lateness == log.lateness:  # NaN where the state was not waited for.
+        if log.lateness == log.lateness:  # NaN if the loop did not wait for the state.
             self._histogram.add(log.lateness)
-        if log.state is not None and log.state.tau_ext_in_base is not self._felt:
-            self._felt = log.state.tau_ext_in_base
-            _WRENCH.pack_into(self._block.felt, 0, *self._felt.tolist())
-        self.beat()
+        if log.state is not None and log.state.tau_ext_in_base is not self._wrench:
+            self._wrench = log.state.tau_ext_in_base
+            _WRENCH.pack_into(self._block.wrench, 0, *self._wrench.tolist())
+        self.write_heartbeat()
         is_timed = self.snapshot.motion_duration is not None and self.snapshot.phase in ("moving", "stopping")
         if is_timed and count % _SNAPSHOT_CYCLES == 0:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
     def end_motion(self) -> None:
-        """Says how far the motion came; nothing where it was no timed one."""
+        """Writes the final time of a motion with a duration."""
         if self.snapshot.motion_duration is not None:
             self.update(motion_time=self._motion_cycle * CYCLE_TIME)
 
     def begin_motion(self, duration: float | None) -> None:
-        """Says how long the motion takes that begins now, [s]; None: for as long as it is renewed."""
+        """Writes the duration of a motion that begins, [s]; None: it has none, such as a jog."""
         self._motion_cycle = 0
         self.update(motion_time=None if duration is None else 0.0, motion_duration=duration)
 
-    def show_tool(self, T_flange_tool: Pose) -> None:
-        """Shows which tool the controller has, by the poses it reports."""
+    def write_tool(self, T_flange_tool: Pose) -> None:
+        """Writes the tool that follows from the poses that the controller reports."""
         _POSE.pack_into(self._block.tool, 0, *T_flange_tool.as_row_major())
 
     def on_cycle(self, cycle: int) -> None:
-        """Takes note of how far the motion is."""
+        """Stores the present cycle of the motion."""
         self._motion_cycle = cycle

@@ -1,4 +1,4 @@
-"""The supervisor: the face of the control process to the rest of the program."""
+"""The supervisor: the interface of the control process to the rest of the program."""
 
 from __future__ import annotations
 
@@ -64,30 +64,29 @@ if TYPE_CHECKING:
 __all__ = ["PendingRequest", "Supervisor"]
 
 VIRTUAL = "virtual"
-_TICK = 0.02  # [s] between two looks of the watching thread.
-_LOSS_LOOKS = 3  # Polls that have to find a connection lost before it is reported, 0.06 s.
+_PERIOD = 0.02  # [s] Of the monitoring thread.
+_LOSS_PERIODS = 3  # Periods with a lost connection until it is reported, 0.06 s.
 
 
 class Supervisor(Closeable):
-    """Runs motions in a process of its own, so that nothing the page does can disturb a cycle.
+    """Runs motions in a separate process, so that the page cannot delay a cycle.
 
-    All methods may be called from any thread. Requests return a
-    `PendingRequest` at once; nothing here waits for the robot except `start()`, `restart()` and `close()`. The
-    processes belong to a `ProcessSupervisor`, pending requests to a `RequestClient`; a thread of this object looks
-    after both.
+    All methods may be called from any thread. Requests return a `PendingRequest` at once; only `start()`, `restart()`
+    and `close()` wait for the robot. A `ProcessSupervisor` owns the processes and a `RequestClient` the pending
+    requests; a thread of this object monitors both.
 
     Args:
         model: The arm.
         target: "virtual" for a private virtual controller on loopback, or the address of a controller, rci://HOST:PORT.
-        plant: What the virtual controller moves: "ideal" or "mujoco".
-        stop_without_operator: Whether a motion is stopped once no operator has been present for 2 s (see
-            `set_operator_present`). False lets it finish; meant for the virtual controller.
-        auto_restart: Whether a process of ours that died is started again by itself (at most 3 times a minute).
-        setup: What the controller is sent at every connection. None: the virtual one the model's tool and load, a
-            real one nothing, since it has its own.
+        plant: Plant of the virtual controller: "ideal" or "mujoco".
+        stop_without_operator: Whether a motion is stopped when no operator has been present for 2 s (see
+            `set_operator_present`). False lets it finish; intended for the virtual controller.
+        auto_restart: Whether a process that ended unexpectedly is restarted automatically (at most 3 times a minute).
+        setup: The configuration to send at every connection. None: the model's tool and load to a virtual controller,
+            nothing to a real one, which has its own.
 
     Raises:
-        InvalidValueError: The target is no address, the model no model, or the plant unknown.
+        InvalidValueError: The target is not a valid address, the model is not a robot model, or the plant is unknown.
     """
 
     def __init__(
@@ -110,49 +109,49 @@ class Supervisor(Closeable):
         self._plant = plant
         self._stop_without_operator = stop_without_operator
         self._auto_restart = auto_restart
-        self._lock = threading.RLock()  # Guards everything below; held for long only while our processes are ended.
-        self._block: ControlBlock | None = None  # With it come and go the keeper, the desk and the readers.
+        self._lock = threading.RLock()  # Guards everything below; held for long only while the processes end.
+        self._block: ControlBlock | None = None  # None while not running; what uses the block is created with it.
         self._connecting: PendingRequest | None = None
         self._jogging: PendingRequest | None = None
         self._crash: tuple[str, str] | None = None
         self._incident: Incident | None = None
-        self._lost_looks = 0  # So many looks have found the connection lost.
-        self._watcher: threading.Thread | None = None
+        self._loss_periods = 0  # Consecutive periods with a lost connection.
+        self._monitor_thread: threading.Thread | None = None
         self._is_closing = threading.Event()
 
     def start(self, timeout: float = 20.0) -> None:
-        """Starts the processes and returns once states arrive or it is clear that they will not.
+        """Starts the processes and returns once states arrive or the connection has failed.
 
-        An unreachable robot is no error here: the phase is then "lost" and `reconnect()` tries again.
+        An unreachable robot is not an error: the phase is then "lost", and `reconnect()` tries again.
 
         Args:
-            timeout: How long to wait, [s].
+            timeout: Timeout, [s].
 
         Raises:
-            ConnectionLostError: A process of ours could not be started; the message carries what it said.
+            ConnectionLostError: A process could not be started; the message contains its output.
             UsageError: It was started before, or memory is short.
         """
         with self._lock:
             if self._block is not None:
-                raise UsageError("the supervisor has been started already; use restart(), or make a new one")
+                raise UsageError("the supervisor has been started already; use restart(), or create another one")
         try:
             with memory_needed():
                 with self._lock:
                     self._open()
-                    watcher = threading.Thread(target=self._watch, name="rcilab-supervisor", daemon=True)
-                    watcher.start()
-                    self._watcher = watcher
+                    thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
+                    thread.start()
+                    self._monitor_thread = thread
                 self._await_connection(timeout)
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
-        """Brings a running motion to rest, ends our processes and frees the shared memory. May be called twice."""
+        """Stops a running motion, ends the processes and frees the shared memory. May be called twice."""
         self._is_closing.set()
-        watcher, self._watcher = self._watcher, None
-        if watcher is not None and watcher is not threading.current_thread():
-            watcher.join()
+        thread, self._monitor_thread = self._monitor_thread, None
+        if thread is not None and thread is not threading.current_thread():
+            thread.join()
         with self._lock:
             if self._block is not None:
                 self._end_processes(ConnectionLostError("the supervisor was closed"))
@@ -160,109 +159,109 @@ class Supervisor(Closeable):
                 self._block = None
 
     def restart(self, timeout: float = 20.0) -> None:
-        """Ends and starts our processes again, whatever state they are in, and returns once states arrive.
+        """Ends the processes in any state, starts them again and returns once states arrive.
 
         Args:
-            timeout: How long to wait, [s].
+            timeout: Timeout, [s].
 
         Raises:
-            ConnectionLostError: A process of ours could not be started; the message carries what it said.
+            ConnectionLostError: A process could not be started; the message contains its output.
             UsageError: It was never started.
         """
         with self._lock:
             self._require_block()
             self._end_processes(ConnectionLostError("the control process was restarted"))
-            self._keeper.launch()
+            self._processes.launch()
         self._await_connection(timeout)
 
     def status(self) -> SupervisorStatus:
-        """Returns a snapshot; cheap enough to be taken at the display's rate."""
+        """Returns a snapshot; cheap enough for the display's frame rate."""
         with self._lock:
             if self._block is None:
                 return SupervisorStatus(target=self._target, incident=self._incident)
             shown = self._reader.read_snapshot()
-            phase, code, message = self._judge(shown)
+            phase, code, message = self._find_phase(shown)
             fields = self._reader.read_fields(shown)
             if phase in ("crashed", "lost", "starting"):
-                fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # Not reported any more.
+                fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # No longer reported.
             return SupervisorStatus(
                 phase=phase,
                 code=code,
                 message=message,
                 incident=self._incident,
                 target=self._target,
-                address=self._keeper.address,
-                world_address=self._keeper.world_address,
-                controller_pid=self._keeper.controller_pid,
-                worker_pid=self._keeper.worker_pid,
+                address=self._processes.address,
+                world_address=self._processes.world_address,
+                controller_pid=self._processes.controller_pid,
+                worker_pid=self._processes.worker_pid,
                 setup=self._setup.acknowledged,
-                setup_times=self._setup.times,
+                setup_times=self._setup.connections,
                 **fields,
                 **self._read_override(shown),
                 **self._round_trip.read_fields(),
             )
 
     def reconnect(self) -> PendingRequest:
-        """Drops the connection to the controller and makes a new one.
+        """Closes the connection to the controller and opens a new one.
 
         Raises:
-            UsageError: There is no controller to connect to: the virtual one has died; `restart()` starts it again.
+            UsageError: There is no controller to connect to: the virtual one has ended; `restart()` restarts it.
         """
         with self._lock:
             self._require_block()
-            address = self._keeper.address
+            address = self._processes.address
             if address is None:
-                raise UsageError("there is no controller to connect to; restart() starts the virtual one again").coded(
+                raise UsageError("there is no controller to connect to; restart() restarts the virtual one").coded(
                     "not_connected"
                 )
-            wanted = self._setup.wanted
-            pending = self._ask("reconnect", Connect(address=address, timeout=ANSWER_TIMEOUT, configuration=wanted))
-            self._setup.follow(pending, wanted, is_new_connection=True)
+            requested = self._setup.requested
+            pending = self._send("reconnect", Connect(address=address, timeout=ANSWER_TIMEOUT, configuration=requested))
+            self._setup.track(pending, requested, is_new_connection=True)
             return pending
 
     def set_operator_present(self, present: bool) -> None:
-        """Reports that an operator is present; call with True at least once a second while that is so.
+        """Reports whether an operator is present; call it with True at least once a second while one is.
 
-        Until the first call no operator is expected. From then on, a motion is stopped when the last True is more
-        than 2 s ago (`stop_without_operator`), and `execute` is refused meanwhile. False changes nothing at once: a
-        page that is reloaded has those 2 s to come back.
+        Before the first call no operator is expected. From then on, a motion is stopped when the last True is more than
+        2 s old (`stop_without_operator`), and `execute` is refused. False has no immediate effect, so that a page can
+        be reloaded within 2 s.
         """
         with self._lock:
             if self._block is None or not self._stop_without_operator:
                 return
             counters = self._block.counters
-            if present or counters[Counter.OPERATOR_BEAT] == 0:
-                counters[Counter.OPERATOR_BEAT] = time.monotonic_ns()
+            if present or counters[Counter.OPERATOR_HEARTBEAT] == 0:
+                counters[Counter.OPERATOR_HEARTBEAT] = time.monotonic_ns()
 
     def drain(self) -> NDArray[np.void]:
         """Returns every cycle recorded since the last call, oldest first.
 
         Returns:
             Structured array, see `cycle_dtype`: message_id, t, q, q_c, dq, command, faults, ... Cycles that were
-            overwritten because nothing was drained for 30 s are missing; `lost` of the first row counts them.
+            overwritten because the last call was more than 30 s ago are missing; `lost` of the first row includes them.
         """
         with self._lock:
             self._require_block()
             return self._ring.drain()
 
     def open_reader(self) -> RingReader:
-        """Returns a reader of the recorded cycles with a place of its own, beside `drain`; good until `close`."""
+        """Returns a reader of the recorded cycles, independent of `drain`; valid until `close`."""
         with self._lock:
             return RingReader(self._require_block())
 
     def power_on(self) -> PendingRequest:
-        """Asks for motor power."""
-        return self._ask("power on", SetPower(True))
+        """Requests motor power on."""
+        return self._send("power on", SetPower(True))
 
     def power_off(self) -> PendingRequest:
-        """Asks for motor power to be taken away."""
-        return self._ask("power off", SetPower(False))
+        """Requests motor power off."""
+        return self._send("power off", SetPower(False))
 
     @property
     def stops(self) -> int:
-        """How often `stop` has been called since `start`; what was wanted before the last one moves nothing."""
+        """Number of calls of `stop` since `start`: a request for motion made before the last of them is refused."""
         with self._lock:
-            return 0 if self._block is None else self._block.counters[Counter.STOPS_ASKED]
+            return 0 if self._block is None else self._block.counters[Counter.STOPS_REQUESTED]
 
     def execute(
         self,
@@ -273,24 +272,25 @@ class Supervisor(Closeable):
         speed_override: float = 1.0,
         stops: int | None = None,
     ) -> PendingRequest:
-        """Streams a checked motion; the request is done when the arm stands still again.
+        """Streams a checked motion; the request is done when the arm is stationary again.
 
-        It is checked once more before it is handed over, which takes up to some 0.2 s; a `stop` meanwhile counts.
+        The motion is verified again before it is sent, which takes up to 0.2 s; a `stop` during that time counts.
 
         Args:
             motion: The motion.
             certificate: From `check(motion, model, mode=mode).certificate`.
-            mode: How the arm is commanded: the same way as joint angles, as poses of the tool, or as torques; see
+            mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques; see
                 `rcilab.execution.command_builder`.
-            speed_override: Part of its planned speed that it begins with, 0.1 to 1; `set_speed_override` changes it.
-            stops: What `stops` was when this was asked for; None: it is asked for now.
+            speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it.
+            stops: Value of `stops` when the operator requested this; None: its value now.
 
         Raises:
             InvalidValueError: The speed override is out of range.
-            PlanningError: At this speed override it would break a condition, or last too long.
-            CertificateError: The certificate is missing, or does not fit the motion, the model, or where the arm is.
+            PlanningError: At this speed override the motion would violate a condition, or take too long.
+            CertificateError: The certificate is missing, or does not fit the motion, the model, or the position of the
+                arm.
             UsageError: The arm is moving, no controller is connected, no operator is present, the motion takes more
-                than 300 s, the controller has not accepted its last configuration, or a stop has come meanwhile.
+                than 300 s, the controller has not accepted its last configuration, or a stop was requested meanwhile.
         """
         stops = self.stops if stops is None else stops
         require_admissible(
@@ -299,22 +299,22 @@ class Supervisor(Closeable):
             self.model,
             self.status(),
             is_operator_overdue=self._is_operator_overdue(),
-            box=self._setup.wanted.box,
+            box=self._setup.requested.box,
             mode=mode,
         )
-        paced = plan_start(motion, speed_override, self.model, mode)
+        scaled = plan_start(motion, speed_override, self.model, mode)
         with self._lock:
             self._require_unstopped(stops)
-            self._setup.require_given()
-            self._rows.begin(paced)
-            self._override.begin(paced, self.model, mode)
-            duration = paced.duration if paced.changed else motion.duration  # As planned it may end within a cycle.
-            return self._ask("execute", Execute(rows=len(paced.q), duration=duration, mode=mode))
+            self._setup.require_accepted()
+            self._rows.begin(scaled)
+            self._override.begin(scaled, self.model, mode)
+            duration = scaled.duration if scaled.changed else motion.duration  # A plan may end within a cycle.
+            return self._send("execute", Execute(rows=len(scaled.q), duration=duration, mode=mode))
 
     def pause(self) -> PendingRequest:
-        """Holds the motion in progress, along its path and within all limits; done once that is handed over.
+        """Holds the motion in progress, on its path and within all limits; done once the control process has the rows.
 
-        `resume` goes on; a motion that is held for more than 120 s is given up.
+        `resume` continues it; a motion that is held for more than 120 s is cancelled.
 
         Raises:
             UsageError: No motion of `execute` is in progress.
@@ -323,14 +323,14 @@ class Supervisor(Closeable):
         return self._override_of_motion().change(0.0)
 
     def resume(self, speed_override: float = 1.0) -> PendingRequest:
-        """Goes on with a motion that is held; see `set_speed_override`."""
+        """Continues a held motion; see `set_speed_override`."""
         return self.set_speed_override(speed_override)
 
     def set_speed_override(self, speed_override: float) -> PendingRequest:
-        """Runs the motion in progress at part of its planned speed; done once that is handed over.
+        """Sets the speed override of the motion in progress; done once the control process has the rows.
 
-        The change is planned here, along the path, and checked by the conditions of the motion's mode before any of it
-        is sent; that takes some 10 to 100 ms.
+        The change is planned here, on the path, and checked by the conditions of the motion's mode before it is sent;
+        this takes 10 to 100 ms.
 
         Args:
             speed_override: 0.1 to 1.
@@ -338,13 +338,13 @@ class Supervisor(Closeable):
         Raises:
             InvalidValueError: The speed override is out of range.
             UsageError: No motion of `execute` is in progress, or this machine is too busy.
-            PlanningError: There is no way within the limits to change from here; the motion goes on as it is.
+            PlanningError: The change is not possible within the limits from here; the motion continues unchanged.
         """
         return self._override_of_motion().change(require_speed_override(speed_override))
 
     @property
-    def paced(self) -> SpeedScaledMotion | None:
-        """The motion of the last `execute` as it was really commanded, with every change of speed; None before."""
+    def scaled_motion(self) -> SpeedScaledMotion | None:
+        """The motion of the last `execute` as commanded, with every change of speed; None before the first."""
         with self._lock:
             self._require_block()
             return self._override.motion
@@ -357,51 +357,51 @@ class Supervisor(Closeable):
     def _require_cycle(self) -> int:
         cycle = self._motion_cycle()
         if cycle is None:
-            raise UsageError("no motion runs whose speed override could change").coded("no_pace")
+            raise UsageError("no motion is running whose speed override could change").coded("no_pace")
         return cycle
 
     def jog(
-        self, kind: JogKind, values: ArrayLike, *, goes_on: PendingRequest | None = None, stops: int | None = None
+        self, kind: JogKind, values: ArrayLike, *, continues: PendingRequest | None = None, stops: int | None = None
     ) -> PendingRequest:
-        """Moves the arm as long as it is held: call it at least five times a second, and `release_jog` at the end.
+        """Jogs the arm: call it at least five times a second while a jog is held, and `release_jog` at the end.
 
-        The first call begins a jog, the next ones go on with it, whatever direction they ask for: on-line re-planning
-        inside every limit of the joints. A jog that is not renewed for 0.3 s stops. It is a motion like any
-        other, so the first movement comes when the controller shows its mode, 0.2 to 1 s after the first call; at rest
-        it listens for another second.
+        The first call starts a jog, further calls renew it, in the same or another direction: the motion is re-planned
+        online within all limits of the joints. A jog that is not renewed for 0.3 s stops. It is a motion like any
+        other, so the arm starts to move when the controller shows its mode, 0.2 to 1 s after the first call. It accepts
+        another jog for 1 s after standstill.
 
         Args:
             kind: "joint", or "base" or "tool" for a twist of the tool in these axes.
-            values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; lowered to
+            values: n joint velocities, [rad/s], or a twist of six numbers, linear first, [m/s, rad/s]; reduced to
                 what the limits allow.
-            goes_on: Request of the jog to go on with: where that has ended meanwhile, as by `stop`, none is begun.
-            stops: What `stops` was when the jog was asked for; None: it is asked for now.
+            continues: Request of the jog to continue: if it has ended, as after `stop`, no other one starts.
+            stops: Value of `stops` when the operator requested the jog; None: its value now.
 
         Returns:
-            The request of the jog; it is done when the arm stands still and no jog is held any more.
+            The request of the jog; it is done when the arm is stationary and no jog is held.
 
         Raises:
-            InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+            InvalidValueError: The kind is unknown, or the values are not the required number of finite numbers.
             UsageError: Another motion is in progress, no controller is connected, no operator is present, or a stop
-                has come meanwhile.
+                was requested meanwhile.
         """
         command = build_jog(kind, values, self.model.n)
         with self._lock:
             block = self._require_block()
-            is_under_way = self._jogging is not None and not self._jogging.done
-            if goes_on is not None and goes_on.done:
-                raise UsageError("this jog has ended; begin another one").coded("jog_ended")
-            if not is_under_way:
+            is_running = self._jogging is not None and not self._jogging.done
+            if continues is not None and continues.done:
+                raise UsageError("this jog has ended; start another one").coded("jog_ended")
+            if not is_running:
                 self._require_unstopped(stops)
-                self._setup.require_given()
+                self._setup.require_accepted()
                 require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
             hold_jog(block.jog, block.counters, command)
-            if self._jogging is None or not is_under_way:
-                self._jogging = self._ask("jog", Jog())
+            if self._jogging is None or not is_running:
+                self._jogging = self._send("jog", Jog())
             return self._jogging
 
     def release_jog(self) -> None:
-        """Brings a jog to rest at once."""
+        """Stops a jog."""
         with self._lock:
             if self._block is not None:
                 release_jog(self._block.counters)
@@ -409,20 +409,20 @@ class Supervisor(Closeable):
     def start_guiding(
         self, space: GuideSpace = "joint", kind: GuideKind = "free", *, stops: int | None = None
     ) -> PendingRequest:
-        """Frees the arm for a hand to guide it (startDrag), until `stop_guiding` or `stop`; done once it is free.
+        """Starts hand guiding (startDrag), until `stop_guiding` or `stop`; done once the arm can be guided.
 
-        The phase is "moving" meanwhile and the code "moving.guided". It ends like a motion when no operator is at the
-        controls any more, and by itself when the controller leaves it, as on a fault.
+        The phase is "moving" meanwhile and the code "moving.guided". Like a motion, it ends when the operator is no
+        longer present, and when the controller ends it, as on a fault.
 
         Args:
             space: In joint space every joint is free, and `kind` has no effect.
-            kind: What stays free in Cartesian space.
-            stops: What `stops` was when this was asked for; None: it is asked for now.
+            kind: Free directions in Cartesian space.
+            stops: Value of `stops` when the operator requested this; None: its value now.
 
         Raises:
-            InvalidValueError: There is no such space or kind.
+            InvalidValueError: The space or the kind is unknown.
             ModelError: The arm has no hand guiding.
-            UsageError: The arm is moving, no controller is connected, no operator is present, or a stop has come
+            UsageError: The arm is moving, no controller is connected, no operator is present, or a stop was requested
                 meanwhile.
         """
         require_guidable(space, kind)
@@ -430,36 +430,36 @@ class Supervisor(Closeable):
         with self._lock:
             self._require_unstopped(stops)
             require_ready(self.status(), is_operator_overdue=self._is_operator_overdue())
-            self._setup.require_given()
-            return self._ask("start guiding", StartGuiding(space, kind))
+            self._setup.require_accepted()
+            return self._send("start guiding", StartGuiding(space, kind))
 
     def stop_guiding(self) -> PendingRequest:
-        """Ends hand guiding (stopDrag); done once the arm stands still."""
-        return self._ask("stop guiding", StopGuiding())
+        """Ends hand guiding (stopDrag); done once the arm is stationary."""
+        return self._send("stop guiding", StopGuiding())
 
     def stop(self) -> PendingRequest:
-        """Brings a running motion to rest within the limits, or ends guiding; done when the arm stands still."""
+        """Stops a running motion within the limits, or ends guiding; done when the arm is stationary."""
         with self._lock:
             block = self._require_block()
             release_jog(block.counters)
-            block.counters[Counter.STOPS_ASKED] += 1
-            return self._ask("stop", Stop(block.counters[Counter.STOPS_ASKED]))
+            block.counters[Counter.STOPS_REQUESTED] += 1
+            return self._send("stop", Stop(block.counters[Counter.STOPS_REQUESTED]))
 
     def _require_unstopped(self, stops: int | None) -> None:
-        """Refuses what was wanted before the last stop, and all while not running; call with the lock."""
+        """Refuses a motion that was requested before the last stop; call it with the lock held."""
         self._require_block()
         if stops is not None and self.stops > stops:
-            raise UsageError("a stop came before the arm had begun to move; ask again if it is to move").coded(
-                "stopped_before"
-            )
+            raise UsageError(
+                "a stop was requested before the arm had started to move; repeat the request to move it"
+            ).coded("stopped_before")
 
     def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Sends a tool, a load, a safety box, a force-control frame; done once the controller has accepted all of it.
+        """Sends a configuration: tool, load, safety box, force-control frame; done once the controller has accepted it.
 
         From now on motions are checked with it, and it is sent again at every new connection.
 
         Args:
-            setup: What to tell; parts that are None stay.
+            setup: The configuration; parts that are None stay unchanged.
 
         Raises:
             InvalidValueError: It is not a configuration, or the load is heavier than the arm is rated for.
@@ -470,8 +470,8 @@ class Supervisor(Closeable):
         with self._lock:
             self._require_block()
             require_ready(self.status(), is_operator_overdue=False)
-            pending = self._ask("set up", Configure(setup))
-            self._setup.follow(pending, setup)
+            pending = self._send("set up", Configure(setup))
+            self._setup.track(pending, setup)
             self.model = model
             return pending
 
@@ -483,14 +483,14 @@ class Supervisor(Closeable):
             level: Whether it is switched on.
         """
         outputs = capabilities_of(self.model).outputs
-        return self._ask("set output", SetOutput(require_signal(signal, outputs), bool(level)))
+        return self._send("set output", SetOutput(require_signal(signal, outputs), bool(level)))
 
     def read_inputs(self) -> PendingRequest:
         """Reads the digital inputs; the status shows them."""
-        return self._ask("read inputs", ReadInputs())
+        return self._send("read inputs", ReadInputs())
 
     def reboot(self) -> PendingRequest:
-        """Restarts the controller, which ends the connection; `reconnect` makes the next one, and sets all up again.
+        """Restarts the controller, which ends the connection; `reconnect` connects again and sends the configuration.
 
         Raises:
             UsageError: The arm is moving, or no controller is connected.
@@ -498,39 +498,39 @@ class Supervisor(Closeable):
         with self._lock:
             self._require_block()
             require_ready(self.status(), is_operator_overdue=False)
-            return self._ask("reboot", Reboot())
+            return self._send("reboot", Reboot())
 
     def recover(self) -> PendingRequest:
-        """Asks the controller to clear its faults (automatic error recovery)."""
-        return self._ask("recover", Recover())
+        """Requests that the controller clears its faults (automatic error recovery)."""
+        return self._send("recover", Recover())
 
     def __enter__(self) -> Supervisor:
         self.start()
         return self
 
-    def _ask(self, what: str, request: Request) -> PendingRequest:
+    def _send(self, what: str, request: Request) -> PendingRequest:
         """Sends a request to the control process."""
         with self._lock:
             self._require_block()
-            if self._keeper.worker_pid is None:
-                raise UsageError(
-                    f"the control process is not running; restart() starts it again (asked: {what})"
-                ).coded("not_connected")
+            if self._processes.worker_pid is None:
+                raise UsageError(f"the control process is not running; restart() restarts it (request: {what})").coded(
+                    "not_connected"
+                )
             return self._client.send(what, request)
 
     def _open(self) -> None:
-        """Makes the shared block and what works on it, and starts the processes."""
+        """Creates the shared block and its users, and starts the processes."""
         block = ControlBlock.create(self.model.n, build_settings(self.model))
         address = None if self._target == VIRTUAL else self._target
         maker = maker_of(self.model)
         assert maker is not None  # It has a driver.
         try:
-            self._keeper = ProcessSupervisor(
+            self._processes = ProcessSupervisor(
                 block, self.model.name, self._plant, address, auto_restart=self._auto_restart
             )
             self._client = RequestClient(block)
             self._rows = SharedRows(
-                block, self._lock, self._require_cycle, lambda request: self._ask("change of speed", request)
+                block, self._lock, self._require_cycle, lambda request: self._send("change of speed", request)
             )
             self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
             self._reader, self._ring = StatusReader(block, maker), RingReader(block)
@@ -540,7 +540,7 @@ class Supervisor(Closeable):
         self._is_closing.clear()
         self._block = block
         try:
-            self._keeper.launch()
+            self._processes.launch()
         except BaseException:
             self.close()
             raise
@@ -552,56 +552,56 @@ class Supervisor(Closeable):
                 raise ConnectionLostError(
                     f"not ready after {timeout:g} s ({status.message}); try again when the machine is less busy"
                 ).coded("slow_start", seconds=f"{timeout:g}")
-            time.sleep(_TICK / 2)
+            time.sleep(_PERIOD / 2)
         if status.phase == "crashed":
             raise ConnectionLostError(status.message)
 
-    def _watch(self) -> None:
-        """The watching thread: heartbeats, replies, processes that ended. It never blocks."""
-        while not self._is_closing.wait(_TICK):
+    def _monitor(self) -> None:
+        """The monitoring thread: heartbeats, replies, processes that ended. It never blocks."""
+        while not self._is_closing.wait(_PERIOD):
             with self._lock:
                 if self._block is None:
                     return
-                self._block.counters[Counter.SUPERVISOR_BEAT] = time.monotonic_ns()
+                self._block.counters[Counter.SUPERVISOR_HEARTBEAT] = time.monotonic_ns()
                 self._collect_replies()
-                self._bear_deaths()
-                self._look_for_loss()
-                if self._connecting is None and self._keeper.is_ready:
-                    with suppress(UsageError):  # It died just now; the next look will tell.
+                self._handle_exits()
+                self._check_for_loss()
+                if self._connecting is None and self._processes.is_ready:
+                    with suppress(UsageError):  # The process has just ended; the next period detects it.
                         self._connecting = self.reconnect()
 
     def _collect_replies(self) -> None:
         errors = self._client.collect()
-        self._setup.look()
+        self._setup.collect()
         for error in errors:
             if self._crash is None and isinstance(error, ConnectionLostError | ControlError | ModelError):
                 shown = self._reader.read_snapshot()
                 if shown.phase in ("lost", "fault"):
-                    self._note(shown.code, str(error))
+                    self._record_incident(shown.code, str(error))
 
-    def _bear_deaths(self) -> None:
-        for death in self._keeper.look():
+    def _handle_exits(self) -> None:
+        for exited in self._processes.reap():
             self._connecting = None
-            self._crash = death.code, death.message
-            self._note(*self._crash)
-            if death.is_worker:
-                self._client.fail_all(ConnectionLostError(death.message))
+            self._crash = exited.code, exited.message
+            self._record_incident(*self._crash)
+            if exited.is_worker:
+                self._client.fail_all(ConnectionLostError(exited.message))
 
-    def _look_for_loss(self) -> None:
-        """Notes a connection lost while no request was pending, unless the end of a process of ours explains it.
+    def _check_for_loss(self) -> None:
+        """Records a connection loss without a pending request as an incident, unless a process exit explains it.
 
-        A controller's death is known a little later than the end of its connection: hence more looks than one.
+        The exit of a controller is detected slightly later than the end of its connection: hence several periods.
         """
         shown = self._reader.read_snapshot()
         is_lost = (
             shown.code in ("lost.unreachable", "lost.closed") and self._crash is None and self._connecting is not None
         )
-        self._lost_looks = self._lost_looks + 1 if is_lost else 0
-        if self._lost_looks == _LOSS_LOOKS:
-            self._note(shown.code, shown.message)
+        self._loss_periods = self._loss_periods + 1 if is_lost else 0
+        if self._loss_periods == _LOSS_PERIODS:
+            self._record_incident(shown.code, shown.message)
 
-    def _judge(self, shown: Snapshot) -> tuple[Phase, str, str]:
-        """Returns phase, code and message: what we know of the processes goes before what one of them says."""
+    def _find_phase(self, shown: Snapshot) -> tuple[Phase, str, str]:
+        """Returns phase, code and message: the state of the processes has precedence over the snapshot."""
         if self._is_closing.is_set():
             return "closed", "closed", MESSAGES["closed"]
         if self._connecting is not None and self._connecting.done:
@@ -609,22 +609,22 @@ class Supervisor(Closeable):
             return shown.phase, shown.code, shown.message
         if self._crash is not None:
             return "crashed", *self._crash
-        if self._keeper.address is None:
+        if self._processes.address is None:
             return "starting", "starting.controller", MESSAGES["starting.controller"]
         if self._connecting is None:
             return "starting", "starting", MESSAGES["starting"]
-        return "connecting", "connecting", MESSAGES["connecting"].format(address=self._keeper.address)
+        return "connecting", "connecting", MESSAGES["connecting"].format(address=self._processes.address)
 
-    def _note(self, code: str, message: str) -> None:
+    def _record_incident(self, code: str, message: str) -> None:
         number = 1 if self._incident is None else self._incident.number + 1
         self._incident = Incident(number=number, code=code, message=message)
-        self._lost_looks = _LOSS_LOOKS  # Once is enough.
+        self._loss_periods = _LOSS_PERIODS  # A loss is reported once.
 
     def _end_processes(self, reason: RcilabError) -> None:
-        """Has the arm stopped, ends our processes, and fails what was in progress."""
-        if self._keeper.worker_pid is not None:
+        """Stops the arm, ends the processes, and fails all pending requests."""
+        if self._processes.worker_pid is not None:
             self._client.send_end()
-        self._keeper.end()
+        self._processes.end()
         self._client.fail_all(reason)
         self._connecting, self._crash = None, None
 
@@ -637,16 +637,16 @@ class Supervisor(Closeable):
             return self._reader.read_cycle()
 
     def _read_override(self, shown: Snapshot) -> dict[str, Any]:
-        paced = self._override.motion
-        if paced is None or shown.motion_time is None:
+        scaled = self._override.motion
+        if scaled is None or shown.motion_time is None:
             return {}
-        place = paced.place_at(round(shown.motion_time / CYCLE_TIME))
-        return {"motion_place": place, "speed_override": paced.override, "mode": self._override.mode}
+        plan_time = scaled.place_at(round(shown.motion_time / CYCLE_TIME))
+        return {"motion_plan_time": plan_time, "speed_override": scaled.override, "mode": self._override.mode}
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:
-            beat = self._block.counters[Counter.OPERATOR_BEAT] if self._block is not None else 0
-        return beat != 0 and time.monotonic_ns() - beat > OPERATOR_TIMEOUT * 1e9
+            heartbeat = self._block.counters[Counter.OPERATOR_HEARTBEAT] if self._block is not None else 0
+        return heartbeat != 0 and time.monotonic_ns() - heartbeat > OPERATOR_TIMEOUT * 1e9
 
     def _require_block(self) -> ControlBlock:
         if self._block is None:
@@ -655,7 +655,7 @@ class Supervisor(Closeable):
 
 
 def build_settings(model: RobotModel) -> Settings:
-    """Returns what the control process needs to know of an arm when it starts."""
+    """Returns the data of an arm that the control process needs at its start."""
     return Settings(
         arm=ExpectedArm.of(model),
         limits=replace(model.limits, sources={}),

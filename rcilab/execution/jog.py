@@ -77,8 +77,8 @@ class JogCallback:
         self._command: JogCommand | None = None
         self._cycle = 0
         self._resting = 0
-        self.is_wanted = True
-        """False: stop and end, whatever is held."""
+        self.is_enabled = True
+        """False: stop and end, even if a jog is held."""
 
     def __call__(self, state: RobotState, t: float) -> JointPosition:
         """Returns the command that answers a state; the last one is sent at standstill when no jog is held any more."""
@@ -90,12 +90,12 @@ class JogCallback:
         is_free = self._command is None and self._jog.is_at_rest
         self._resting = self._resting + cycle - self._cycle if is_free else 0
         self._cycle = cycle
-        is_over = is_free and (not self.is_wanted or self._resting * CYCLE_TIME >= LINGER)
+        is_over = is_free and (not self.is_enabled or self._resting * CYCLE_TIME >= LINGER)
         return JointPosition(q, finished=is_over and cycle > 0)
 
     def _lead(self) -> None:
         """Follows the held jog."""
-        command = self._source.read(self._command) if self.is_wanted else None
+        command = self._source.read(self._command) if self.is_enabled else None
         if command is None:
             if self._command is not None:
                 self._let_go(self._command.kind)

@@ -355,7 +355,7 @@ class RunPanel(Part):
         write(self._health, "" if status is None else health_html(status, text))
 
     def _show_progress(self, status: SupervisorStatus | None, is_moving: bool) -> None:
-        place = None if status is None or not is_moving else status.motion_place
+        place = None if status is None or not is_moving else status.motion_plan_time
         robot = self.state.robot
         whole = robot.planned if isinstance(robot, SessionConnection) else self._running
         self.progress.layout.visibility = "hidden" if place is None or not whole else "visible"

@@ -73,7 +73,7 @@ class SpeedFields:
 
     def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
         speed_override = f"{100.0 * status.speed_override:.0f}"
-        place = f"{status.motion_place or 0.0:.1f}"
+        place = f"{status.motion_plan_time or 0.0:.1f}"
         return (
             self._text("run.held", place=place)
             if is_held

@@ -46,8 +46,8 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     assert page.status.code == "moving.held", page.status
     page.button("Go on").dispatch_event("click")
     page.wait(lambda: page.status.code == "moving", "the way on")
-    place = page.status.motion_place
-    page.wait(lambda: page.status.motion_place > place + 0.1, "the arm on its way again")
+    place = page.status.motion_plan_time
+    page.wait(lambda: page.status.motion_plan_time > place + 0.1, "the arm on its way again")
     page.button("Stop").click()
     page.wait(lambda: page.status.phase == "idle", "rest")
     page.unfold("Network lab")

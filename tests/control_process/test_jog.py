@@ -147,7 +147,7 @@ def test_without_anybody_at_the_controls_it_stops_and_does_not_begin() -> None:
         supervisor.power_on().wait(SOON)
         supervisor.set_operator_present(True)
         ticket = hold(supervisor, "joint", [0.2, 0, 0, 0, 0, 0, 0], lambda s: s.code == "moving.jog")
-        with pytest.raises(UsageError, match="the operator's page is gone"):  # It is held, but by nobody.
+        with pytest.raises(UsageError, match="the operator's page does not respond"):  # It is held, but by nobody.
             wait_for(lambda: supervisor.jog("joint", [0.2, 0, 0, 0, 0, 0, 0]).done)
         assert supervisor.status().code == "idle.operator"
         assert ticket.done

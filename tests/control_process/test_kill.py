@@ -73,7 +73,7 @@ def test_a_killed_controller_is_noticed_started_again_and_moves_again():
         with pytest.raises(ConnectionLostError, match=r"closed the connection|no state for"):
             ticket.wait(SOON)
         status = wait_for_phase(supervisor, "idle")
-        assert "virtual controller has died (signal 9" in status.incident.message
+        assert "virtual controller has ended unexpectedly (signal 9" in status.incident.message
         assert_in_limits(supervisor.drain())
         go_home(supervisor)
         begin(supervisor, speed=1.0)[1].wait(SOON)
@@ -90,7 +90,7 @@ def test_a_controller_killed_while_the_arm_rests_is_named_and_the_control_proces
         wait_for(lambda: supervisor.status().incident)
         status = wait_for_phase(supervisor, "idle")
         assert (status.incident.number, status.incident.code) == (1, "crashed.controller")
-        assert "virtual controller has died (signal 9" in status.incident.message
+        assert "virtual controller has ended unexpectedly (signal 9" in status.incident.message
         assert "wake-up pose" in status.incident.message
         assert "motor power off" in status.incident.message
         assert status.worker_pid == before.worker_pid
@@ -120,8 +120,8 @@ def test_a_killed_control_process_is_noticed_and_started_again_and_the_arm_stops
         ticket = begin_moving(supervisor)
         os.kill(supervisor.status().worker_pid, signal.SIGKILL)
         status = measure("control process", lambda: s if (s := supervisor.status()).phase == "crashed" else None)
-        assert "control process has died (signal 9" in status.message
-        with pytest.raises(ConnectionLostError, match="has died"):
+        assert "control process has ended unexpectedly (signal 9" in status.message
+        with pytest.raises(ConnectionLostError, match="has ended unexpectedly"):
             ticket.wait(SOON)
         wait_for(lambda: len(setpoints) > 100 and setpoints[-1] == setpoints[-100])
         assert_controlled_stop(np.array(setpoints))
@@ -136,7 +136,7 @@ def test_a_control_process_that_is_asked_to_end_brings_the_arm_to_rest_first():
         begin_moving(supervisor)
         os.kill(supervisor.status().worker_pid, signal.SIGTERM)
         status = measure("control process", lambda: s if (s := supervisor.status()).phase == "crashed" else None)
-        assert "control process has died (exit code 0" in status.message
+        assert "control process has ended unexpectedly (exit code 0" in status.message
         with connect(supervisor.status().address, MODEL) as robot:
             state = robot.state
             assert state.faults == ()  # Had it just gone, the controller would have stopped the arm, and said so.
@@ -158,7 +158,7 @@ def test_a_killed_workbench_leaves_an_arm_that_its_control_process_has_stopped_a
         measure("control process, of its workbench", lambda: not is_alive(worker))
         with connect(controller.address, MODEL) as robot:
             # Had the control process just died, too, the controller would have said so and stopped the arm itself.
-            assert "in mid-motion" not in controller.last_words
+            assert "in mid-motion" not in controller.stderr_tail
             state = robot.state
             assert state.faults == ()
             assert np.array_equal(state.q_c, robot.receive_state().q_c)
@@ -218,7 +218,7 @@ def test_closing_in_mid_motion_brings_the_arm_to_rest_first():
         with running(controller.address) as supervisor:
             begin_moving(supervisor)
             supervisor.drain()
-        assert "in mid-motion" not in controller.last_words
+        assert "in mid-motion" not in controller.stderr_tail
         with connect(controller.address, MODEL) as robot:
             assert robot.state.faults == ()
     finally:

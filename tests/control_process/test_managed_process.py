@@ -35,9 +35,9 @@ def run():
 def test_a_copy_has_its_own_session_name_output_and_is_our_fork_servers_child(run):
     child = run("import os, sys; print(os.getppid(), os.getsid(0) == os.getpid()); print('oh', file=sys.stderr)")
     assert child.wait(SOON)
-    assert child.how_it_ended == "exit code 0"
+    assert child.exit_description == "exit code 0"
     assert child.read_output().startswith(f"{fork_server_pid()} True\n")
-    assert child.last_words == "oh"
+    assert child.stderr_tail == "oh"
     with open("/proc/self/comm", encoding="ascii") as ours:
         assert ours.read() != "rcilab timeit\n"
 
@@ -84,16 +84,16 @@ def test_a_copy_is_handed_the_files_that_belong_to_it_under_their_numbers_and_no
 def test_it_is_known_how_a_copy_ended(run, line, how):
     child = run(line)
     assert child.wait(SOON)
-    assert child.how_it_ended == how
+    assert child.exit_description == how
     child.end()
-    assert child.how_it_ended == how
+    assert child.exit_description == how
     assert not child.is_alive
 
 
 def test_what_goes_wrong_in_a_copy_is_in_its_last_words(run):
     child = run("1 / 0")
     assert child.wait(SOON)
-    assert child.last_words.endswith("ZeroDivisionError: division by zero")
+    assert child.stderr_tail.endswith("ZeroDivisionError: division by zero")
     with pytest.raises(ConnectionLostError, match=r"did not start \(exit code 2\): rcilab: unknown robot 'none'"):
         start_controller("none")
 
@@ -101,7 +101,7 @@ def test_what_goes_wrong_in_a_copy_is_in_its_last_words(run):
 def test_a_copy_is_asked_to_end_even_before_it_exists(run):
     child = run("import time; time.sleep(60.0)")
     child.end(timeout=SOON)
-    assert child.how_it_ended == "signal 15 (SIGTERM)"
+    assert child.exit_description == "signal 15 (SIGTERM)"
 
 
 def test_a_fork_server_that_does_not_answer_is_replaced(run):
@@ -112,7 +112,7 @@ def test_a_fork_server_that_does_not_answer_is_replaced(run):
     assert child.pid is None
     child.end(timeout=0.1)
     assert not child.is_alive
-    assert child.how_it_ended == "unknown how"
+    assert child.exit_description == "exit status unknown"
     assert run("pass").wait(SOON)
     assert fork_server_pid() != stuck
 
@@ -123,10 +123,10 @@ def test_without_their_fork_server_copies_end_and_the_next_one_has_another():
         first = fork_server_pid()
         os.kill(first, signal.SIGKILL)
         assert controller.wait(SOON)
-        assert controller.how_it_ended == "unknown how"
+        assert controller.exit_description == "exit status unknown"
         following = start_controller("xMatePro7")
         following.end()
-        assert following.how_it_ended == "exit code 0"
+        assert following.exit_description == "exit code 0"
         assert fork_server_pid() != first
     finally:
         controller.end()
@@ -145,7 +145,7 @@ if pid == 0:
 ended = os.waitpid(pid, 0)[1]
 print(ended, controller.is_alive)
 controller.end()
-print(controller.how_it_ended)
+print(controller.exit_description)
 """
 
 
@@ -160,7 +160,7 @@ def test_many_come_and_go_at_once_and_no_file_stays_open(run):
     children = [run(f"import os; os._exit({number})") for number in range(20)]
     for number, child in enumerate(children):
         assert child.wait(SOON)
-        assert child.how_it_ended == f"exit code {number}"
+        assert child.exit_description == f"exit code {number}"
         child.end()
     assert set(os.listdir("/proc/self/fd")) <= before
     server = f"/proc/{fork_server_pid()}/fd"
@@ -190,7 +190,7 @@ def test_interrupts_reach_neither_the_fork_server_nor_a_copy(run):
     os.kill(fork_server_pid(), signal.SIGINT)
     child = run("import os; os.kill(os.getpid(), 2); print('still here')")
     assert child.wait(SOON)
-    assert (child.how_it_ended, child.read_output().splitlines()[0]) == ("exit code 0", "still here")
+    assert (child.exit_description, child.read_output().splitlines()[0]) == ("exit code 0", "still here")
 
 
 UNGUARDED = """
@@ -220,7 +220,7 @@ os.rmdir(folder)
 from rcilab.control_process.launch import start_controller
 controller = start_controller("xMatePro7")
 controller.end()
-print(controller.how_it_ended)
+print(controller.exit_description)
 """
 
 
@@ -238,7 +238,7 @@ os.kill(pid, signal.SIGKILL)
 os.waitpid(pid, 0)
 controller = start_controller("xMatePro7")
 controller.end()
-print(controller.how_it_ended)
+print(controller.exit_description)
 """
 
 

@@ -89,18 +89,20 @@ def test_held_gone_on_with_slower_and_arrived(supervisor, mode):
     assert supervisor.status().code == "moving.held"
     assert supervisor.status().speed_override == 0.0
     wait_for(lambda: not supervisor.status().dq.any())
-    place = supervisor.status().motion_place
+    place = supervisor.status().motion_plan_time
     time.sleep(0.05)
-    assert supervisor.status().motion_place == place < motion.duration
+    assert supervisor.status().motion_plan_time == place < motion.duration
     supervisor.resume(0.6).wait(SOON)
     assert supervisor.status().code == "moving"
-    wait_for(lambda: supervisor.status().motion_place > place + 0.1)
+    wait_for(lambda: supervisor.status().motion_plan_time > place + 0.1)
     supervisor.set_speed_override(1.0).wait(SOON)
     ticket.wait(SOON)
     assert supervisor.status().faults == ()
     assert supervisor.status().q_c == pytest.approx(motion.goal, abs=1e-7)
     rows = moved_rows(supervisor)
-    sent = supervisor.paced.q[np.rint(rows["t"] * 1e3).astype(int).clip(max=len(supervisor.paced.q) - 1)]
+    sent = supervisor.scaled_motion.q[
+        np.rint(rows["t"] * 1e3).astype(int).clip(max=len(supervisor.scaled_motion.q) - 1)
+    ]
     if mode == "joint_position":
         assert np.array_equal(rows["command"], sent)
 
@@ -112,7 +114,7 @@ def test_a_motion_that_is_to_run_slowly_does_so_from_its_first_row_on(supervisor
     ticket = supervisor.execute(motion, certificate, speed_override=0.3)
     wait_until_at(supervisor, 0.2)
     assert supervisor.status().speed_override == 0.3
-    assert supervisor.status().motion_place == pytest.approx(0.3 * supervisor.status().motion_time, abs=0.05)
+    assert supervisor.status().motion_plan_time == pytest.approx(0.3 * supervisor.status().motion_time, abs=0.05)
     ticket.wait(SOON)
     assert supervisor.status().q_c == pytest.approx(motion.goal, abs=1e-7)
     rows = moved_rows(supervisor)

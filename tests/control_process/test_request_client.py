@@ -20,13 +20,11 @@ def block():
 
 def test_each_reply_settles_the_request_it_is_for_and_errors_are_returned(block):
     client = RequestClient(block)
-    inbox = MessageRing[NumberedRequest](
-        block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN
-    )
-    outbox = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
+    inbox = MessageRing[NumberedRequest](block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_READ)
+    outbox = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_READ)
     bodies = [SetPower(True), Recover(), Stop(3)]
     pending = [client.send("a request", body) for body in bodies]
-    received = [inbox.take() for _ in pending]
+    received = [inbox.pop() for _ in pending]
     assert [request.body for request in received] == bodies
     outbox.post(Reply(received[2].id))
     outbox.post(Reply(received[0].id, UsageError("not now")))
@@ -50,6 +48,6 @@ def test_a_full_ring_refuses_requests_and_accepts_the_end(block):
     client = RequestClient(block)
     for number in range(MESSAGE_SLOTS):
         client.send("stop", Stop(number))
-    with pytest.raises(UsageError, match="requests are waiting already"):
+    with pytest.raises(UsageError, match="requests are queued already"):
         client.send("stop", Stop(99))
     client.send_end()

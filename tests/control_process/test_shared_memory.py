@@ -51,7 +51,7 @@ def block():
 
 
 def requests_of(block: ControlBlock) -> MessageRing:
-    return MessageRing(block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_TAKEN)
+    return MessageRing(block.requests, block.counters, Counter.REQUESTS_POSTED, Counter.REQUESTS_READ)
 
 
 def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
@@ -64,11 +64,11 @@ def write_rows(recorder: Recorder, block: ControlBlock, count: int) -> None:
 
 def test_the_other_side_sees_the_same_block(block):
     other = ControlBlock(os.dup(block.descriptor))
-    block.counters[Counter.STOPS_ASKED] = 41
+    block.counters[Counter.STOPS_REQUESTED] = 41
     block.motion[2] = range(7)
     assert other.n == 7
     assert other.settings == {"arm": "seven joints"}
-    assert other.counters[Counter.STOPS_ASKED] == 41
+    assert other.counters[Counter.STOPS_REQUESTED] == 41
     assert other.motion[2].tolist() == list(range(7))
     other.close()
 
@@ -102,13 +102,13 @@ def test_messages_come_out_in_order_and_a_full_ring_is_an_error(block):
     for number in range(3 * MESSAGE_SLOTS):
         box.post({"id": number})
         assert box.has_message
-        assert box.take() == {"id": number}
-    assert box.take() is None
+        assert box.pop() == {"id": number}
+    assert box.pop() is None
     for number in range(MESSAGE_SLOTS):
         box.post({"id": number})
-    with pytest.raises(UsageError, match="does not keep up"):
+    with pytest.raises(UsageError, match="is too slow"):
         box.post({"id": 99})
-    with pytest.raises(UsageError, match="does not fit"):
+    with pytest.raises(UsageError, match="is too long"):
         box.post({"id": "x" * MESSAGE_SIZE})
 
 
@@ -211,9 +211,9 @@ def test_settings_pass_through_the_block():
 
 
 def send(block: ControlBlock, error: Exception) -> RcilabError:
-    box = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_TAKEN)
+    box = MessageRing[Reply](block.replies, block.counters, Counter.REPLIES_POSTED, Counter.REPLIES_READ)
     box.post(Reply(1, as_sendable(error)))
-    reply = box.take()
+    reply = box.pop()
     assert reply is not None
     assert reply.error is not None
     return reply.error

@@ -134,7 +134,7 @@ def test_a_stop_while_a_motion_is_judged_for_the_last_time_keeps_the_arm_where_i
         return plan_start(*args)
 
     monkeypatch.setattr("rcilab.control_process.supervisor.plan_start", stopped_meanwhile)
-    with pytest.raises(UsageError, match="a stop came before the arm had begun to move"):
+    with pytest.raises(UsageError, match="a stop was requested before the arm had started to move"):
         begin(supervisor)
     monkeypatch.undo()
     assert supervisor.status().phase == "idle"
@@ -152,7 +152,7 @@ def test_what_was_wanted_before_a_stop_moves_nothing(supervisor):
         lambda: supervisor.jog("joint", [0.1, 0, 0, 0, 0, 0, 0], stops=wanted),
         lambda: supervisor.start_guiding(stops=wanted),
     ):
-        with pytest.raises(UsageError, match="a stop came before") as caught:
+        with pytest.raises(UsageError, match="a stop was requested before") as caught:
             ask()
         assert caught.value.code == "stopped_before"
     assert supervisor.status().phase == "idle"
@@ -192,12 +192,12 @@ def test_nobody_at_the_controls_ends_a_motion_after_two_seconds():
         supervisor.power_on().wait(SOON)
         supervisor.set_operator_present(True)
         _, ticket = begin(supervisor, speed=0.03)
-        with pytest.raises(ControlError, match="nobody was at the controls"):
+        with pytest.raises(ControlError, match="no operator was present"):
             ticket.wait(SOON)
         status = supervisor.status()
         assert (status.phase, status.code, status.faults) == ("idle", "idle.operator", ())
         assert status.motion_time > 1.0
-        with pytest.raises(UsageError, match="the operator's page is gone"):
+        with pytest.raises(UsageError, match="the operator's page does not respond"):
             begin(supervisor)
         supervisor.set_operator_present(True)
         begin(supervisor, MODEL.home, speed=1.0)
@@ -210,7 +210,7 @@ def test_an_unreachable_robot_is_a_phase_with_a_reason_and_not_an_error():
         status = supervisor.status()
         assert (status.phase, status.code) == ("lost", "lost.unreachable")
         assert "no robot at rci://127.0.0.2:9" in status.message
-        with pytest.raises(UsageError, match="nothing can move now"):
+        with pytest.raises(UsageError, match="no motion is possible now"):
             begin_nowhere(supervisor)
         with pytest.raises(UsageError, match="no controller is connected"):
             supervisor.power_on().wait(SOON)
@@ -226,7 +226,7 @@ def test_wrong_use_is_named():
     for call in (supervisor.power_on, supervisor.stop, supervisor.drain, supervisor.restart):
         with pytest.raises(UsageError, match=r"start\(\) it first"):
             call()
-    with pytest.raises(UsageError, match=r"nothing can move now: The supervisor is closed"):
+    with pytest.raises(UsageError, match=r"no motion is possible now: The supervisor is closed"):
         begin_nowhere(supervisor)
     with pytest.raises(InvalidValueError, match=r"known: ideal, mujoco"):
         Supervisor(MODEL, plant="rubber")

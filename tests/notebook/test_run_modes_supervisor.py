@@ -95,7 +95,7 @@ def test_a_session_is_told_only_what_was_typed_and_is_driven_in_every_mode() -> 
 class Real:
     """A robot that is not virtual, as RunPanel sees it."""
 
-    name, paced = "rci://192.168.0.160:1337", None
+    name, scaled_motion = "rci://192.168.0.160:1337", None
 
     def __init__(self) -> None:
         self.told: list[ControllerParameters] = []

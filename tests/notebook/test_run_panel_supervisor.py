@@ -137,7 +137,8 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         wait_for(lambda: "50 %" in speed_override._way.value, what="half the speed")
         wait_for(
             lambda: (
-                (now := panel.state.status).motion_place is not None and now.motion_place < (now.motion_time or 0.0)
+                (now := panel.state.status).motion_plan_time is not None
+                and now.motion_plan_time < (now.motion_time or 0.0)
             ),
             what="the plan falling behind the clock",
         )
@@ -168,7 +169,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
 
 def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
     with notebook.RunPanel(PRO7) as panel:
-        robot = Real(PRO7.home, phase="moving", code="moving", motion_duration=1.0, motion_place=0.9)
+        robot = Real(PRO7.home, phase="moving", code="moving", motion_duration=1.0, motion_plan_time=0.9)
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
         panel.speed_override.pause.click()
@@ -188,7 +189,7 @@ def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
 class Real:
     """A robot that is not virtual, as RunPanel sees it."""
 
-    name, paced = "rci://192.168.0.160:1337", None
+    name, scaled_motion = "rci://192.168.0.160:1337", None
 
     def __init__(self, q: Any, **how: Any) -> None:
         self.executed: list[Any] = []

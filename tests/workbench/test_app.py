@@ -283,10 +283,10 @@ def test_a_motion_that_was_seldom_looked_at_leaves_the_preview_where_it_ended(be
     monkeypatch.setattr(dispatcher, "_TICK", 1.0)  # [s] A busy machine.
     ask(RobotCommand(what="execute"))
     if what == "stop":
-        wait(lambda: (bench.session.status().motion_place or 0.0) > 0.3, "a part of the way")
+        wait(lambda: (bench.session.status().motion_plan_time or 0.0) > 0.3, "a part of the way")
         ask(RobotCommand(what="stop"))
     wait(lambda: told(bench) == ("notice.arrived" if what == "execute" else "notice.stopped"), "its end to be told")
-    left = bench.session.status().motion_place / bench.store.state.plan.motion.duration
+    left = bench.session.status().motion_plan_time / bench.store.state.plan.motion.duration
     assert (left == 1.0) is (what == "execute")
     wait(lambda: bench.store.state.place == left, "the preview to stand there")
 
@@ -299,7 +299,7 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
     wait(lambda: bench.session.status().phase == "moving", "the arm to move")
     ask(ChooseRobot(model="xMate3"))
     assert told(bench) == "notice.moving"
-    wait(lambda: (bench.session.status().motion_place or 0.0) > 0.2, "a part of the way")
+    wait(lambda: (bench.session.status().motion_plan_time or 0.0) > 0.2, "a part of the way")
     ask(RobotCommand(what="stop"))
     wait(lambda: told(bench) == "notice.stopped", "the stop to be told")
     assert bench.session.status().phase == "idle"
@@ -310,7 +310,7 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
 def test_while_the_arm_moves_the_timeline_is_where_the_arm_is(bench):
     plan = make_plan(bench.store.state.model, np.zeros(7), np.full(7, 0.2), 0.5, "jerk_limited")
     state = replace(bench.store.state, plan=plan, place=0.25)
-    still, moving = (replace(bench.session.status(), phase=phase, motion_place=0.1) for phase in ("idle", "moving"))
+    still, moving = (replace(bench.session.status(), phase=phase, motion_plan_time=0.1) for phase in ("idle", "moving"))
     assert time_shown(state, still) == pytest.approx(0.25 * plan.motion.duration)
     assert time_shown(state, moving) == 0.1
     assert time_shown(replace(state, plan=None), still) == 0.0

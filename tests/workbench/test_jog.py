@@ -52,7 +52,7 @@ class FakeSupervisor:
         self.motion = None
         self.ticket = SimpleNamespace(done=False, error=None)
 
-    def jog(self, kind, values, *, goes_on=None, stops=None):
+    def jog(self, kind, values, *, continues=None, stops=None):
         self.held = kind, np.array(values)
         return self.ticket
 

@@ -92,9 +92,9 @@ class RobotJog:
             change_jog(self._store, said=message("jog.near", first=first, second=second, distance=ADVISED_DISTANCE))
             return False
         try:
-            goes_on = None if request is None or request.done else request
+            continues = None if request is None or request.done else request
             self._request = self._session.supervisor().jog(
-                kind, min(share, room) * values, goes_on=goes_on, stops=stops
+                kind, min(share, room) * values, continues=continues, stops=stops
             )
         except RcilabError as error:
             change_jog(self._store, said=tell_error(error, status))

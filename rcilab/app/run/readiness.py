@@ -84,8 +84,8 @@ def describe_move(state: UiState) -> Message | None:
 
 def time_shown(state: UiState, status: SupervisorStatus) -> float:
     """Returns where in the plan's time, [s], scrubber and cursor stand: where the arm is while it moves along it."""
-    if is_moving(status) and status.motion_place is not None:
-        return status.motion_place
+    if is_moving(status) and status.motion_plan_time is not None:
+        return status.motion_plan_time
     return 0.0 if state.plan is None else state.place * state.plan.motion.duration
 
 

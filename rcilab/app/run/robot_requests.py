@@ -129,6 +129,6 @@ class RobotRequests:
     def _paced(self) -> SpeedScaledMotion | None:
         """Returns how the motion in progress, or the last one, is run; None as planned."""
         with suppress(RcilabError):
-            paced = self._connection.supervisor().paced
+            paced = self._connection.supervisor().scaled_motion
             return paced if paced is not None and paced.changed else None
         return None

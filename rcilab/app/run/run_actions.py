@@ -267,8 +267,8 @@ class RunActions:
     def _follow(self, status: SupervisorStatus) -> None:
         """Leaves the preview where the arm has left the plan, however seldom it was looked at on its way."""
         plan = self._store.state.plan
-        if (is_moving(status) or self._reached is not None) and status.motion_place is not None:
-            self._reached = status.motion_place
+        if (is_moving(status) or self._reached is not None) and status.motion_plan_time is not None:
+            self._reached = status.motion_plan_time
         if is_moving(status):
             return
         if self._reached is not None and plan is not None:

@@ -24,12 +24,14 @@ def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns how far a motion, or the planning of a program, is, as a bar; nothing while neither is in progress."""
     if state.program.progress is not None:
         return _bar(state.program.progress)
-    if status.code not in ("moving", "moving.held") or status.motion_place is None or not status.motion_duration:
+    if status.code not in ("moving", "moving.held") or status.motion_plan_time is None or not status.motion_duration:
         return ""
-    said = text("run.way", place=f"{status.motion_place:.1f}", speed_override=f"{100.0 * status.speed_override:.0f}")
+    said = text(
+        "run.way", place=f"{status.motion_plan_time:.1f}", speed_override=f"{100.0 * status.speed_override:.0f}"
+    )
     if status.code == "moving.held":
-        said = text("run.held", place=f"{status.motion_place:.1f}")
-    share = min(max(status.motion_place / status.motion_duration, 0.0), 1.0)
+        said = text("run.held", place=f"{status.motion_plan_time:.1f}")
+    share = min(max(status.motion_plan_time / status.motion_duration, 0.0), 1.0)
     return f'<p class="rl-note" role="status">{esc(said)}</p>{_bar(share)}'
 
 

@@ -126,7 +126,7 @@ class RunPanel:
         self._inside.visible = may_lead_inside(state, status)
         is_held = status.code == "moving.held"
         self._pause.visible, self._resume.visible = not is_held, is_held  # There before they are needed: nothing moves.
-        self._pause.disabled = status.code != "moving" or status.motion_place is None
+        self._pause.disabled = status.code != "moving" or status.motion_plan_time is None
         self._speed_override.show(round(100.0 * state.drive.speed_override, 1))
         self._way.show(way_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))
