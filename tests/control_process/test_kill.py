@@ -180,7 +180,7 @@ def test_a_frozen_control_process_is_replaced():
         pid = supervisor.status().worker_pid
         os.kill(pid, signal.SIGSTOP)
         status = wait_for_phase(supervisor, "crashed")
-        assert "has not answered for" in status.message
+        assert "has not responded for" in status.message
         wait_for(lambda: supervisor.status().phase in ("idle", "fault"))
         assert supervisor.status().worker_pid != pid
         assert not is_alive(pid)
@@ -195,7 +195,7 @@ def test_a_control_process_that_freezes_while_it_loads_is_replaced_too(monkeypat
         second = wait_for(lambda: pid if (pid := supervisor.status().worker_pid) not in (None, first) else None)
         os.kill(second, signal.SIGSTOP)
         wait_for(lambda: supervisor.status().incident.number == 2)
-        assert "has not answered for" in supervisor.status().incident.message
+        assert "has not responded for" in supervisor.status().incident.message
         assert not is_alive(second)
         wait_for_phase(supervisor, "idle")
 
@@ -206,7 +206,7 @@ def test_what_dies_again_and_again_is_left_alone_until_somebody_restarts_it():
             status = wait_for(lambda: s if (s := supervisor.status()).phase == "idle" else None)
             os.kill(status.worker_pid, signal.SIGKILL)
             status = wait_for_phase(supervisor, "crashed")
-        assert "3 times in a minute; restart" in status.message
+        assert "3 times in a minute; use restart" in status.message
         supervisor.restart()
         assert supervisor.status().phase == "idle"
         assert supervisor.status().incident.number == 4
