@@ -119,6 +119,7 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
 
 def _run(args: Namespace, stopper: _Stopper) -> int:
     from rcilab.cli.report_json import as_json_text
+    from rcilab.conformance.check import check
     from rcilab.execution.session import connect
     from rcilab.execution.start_pose_check import describe_start_mismatch
     from rcilab.model.robot_model import load_model
@@ -137,7 +138,10 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
-        if args.to_start and state.faults:
+            report = check(motion, robot.model, start=motion.q[0])
+            if not report.ok:  # Known before the arm moves to its start.
+                moves, motions = [_refuse(report, args)], []
+        if motions and args.to_start and state.faults:
             _recover(robot, state, args)
         for planned in motions:
             moves.append(_move(planned, robot, stopper, args))
@@ -193,10 +197,9 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
 
     out = _reader(args)
     report = check(motion, robot.model, start=robot.state.q_c)
-    print(report, file=out)
     if not report.ok:
-        print("The motion does not conform; nothing was sent.", file=sys.stderr)
-        return _Move(outcome="not_conforming", report=report)
+        return _refuse(report, args)
+    print(report, file=out)
     print(_what_will_move(motion, robot), file=out, flush=True)
     if not args.yes and not _agreed(out):
         return _Move(outcome="not_agreed", report=report)
@@ -212,6 +215,12 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
             file=sys.stderr,
         )
     return _Move(outcome="stopped" if result.stopped else "done", report=report, run=result)
+
+
+def _refuse(report: Report, args: Namespace) -> _Move:
+    print(report, file=_reader(args))
+    print("The motion does not conform; nothing was sent.", file=sys.stderr)
+    return _Move(outcome="not_conforming", report=report)
 
 
 def _what_will_move(motion: Motion, robot: RobotSession) -> str:

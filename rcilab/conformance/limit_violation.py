@@ -38,7 +38,7 @@ class LimitViolation(NamedTuple):
         if row.signal == "elbow_sign":
             return f"{row.location(0)}: it is flipped to the other side than at the start"
         value, bound = format_pair(self.value, self.bound, min_digits=6)
-        return f"{row.location(self.axis)}: {row.quantity} {value} {row.unit} passes {bound} {row.unit}"
+        return f"{row.location(self.axis)}: {row.quantity} {value} {row.unit} {self._verb} {bound} {row.unit}"
 
     @property
     def remark(self) -> Remark:
@@ -52,8 +52,13 @@ class LimitViolation(NamedTuple):
             return Remark(self.text, "broken", condition=row.id)
         amounts = {"value": self.value, "bound": self.bound, "unit": row.unit}
         if self.axis and row.is_per_joint:
-            return Remark(self.text, "joint_passes", condition=row.id, joint=self.axis, **amounts)
-        return Remark(self.text, "passes", condition=row.id, **amounts)
+            return Remark(self.text, f"joint_{self._verb}", condition=row.id, joint=self.axis, **amounts)
+        return Remark(self.text, self._verb, condition=row.id, **amounts)
+
+    @property
+    def _verb(self) -> str:
+        """What the value does to its bound, which itself is not allowed."""
+        return "reaches" if self.value == self.bound else "passes"
 
 
 def faults_of(violations: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:

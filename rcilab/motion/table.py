@@ -99,7 +99,9 @@ def read_table(content: bytes, name: str, max_rows: int) -> Table:
                 continue
         if len(cells) != columns:
             raise InvalidValueError(
-                f"{name}, line {number}", len(cells), f"columns; the first line has {columns}"
+                f"{name}, line {number}",
+                len(cells),
+                f"{'column' if len(cells) == 1 else 'columns'}; the first line has {columns}",
             ).coded("table_columns", count=columns)
         values.extend(numbers)
         lines.append(number)

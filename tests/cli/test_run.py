@@ -192,6 +192,18 @@ def test_a_motion_that_breaks_a_condition_is_shown_and_not_sent(address, tmp_pat
     assert "does not conform" in capsys.readouterr().err
 
 
+def test_a_motion_that_breaks_a_condition_does_not_move_the_arm_to_its_start(address, tmp_path, capsys):
+    file = tmp_path / "elsewhere.npz"
+    with connect(address, MODEL) as robot:
+        here = robot.state.q_c
+    Motion.from_cycles(np.vstack([here + 0.1, here + 0.6])).save(file)
+    assert main(["run", str(file), "--robot", address, "--to-start", "--yes", "--json"]) == 1
+    answer = json.loads(capsys.readouterr().out)
+    assert [move["outcome"] for move in answer["moves"]] == ["not_conforming"]
+    with connect(address, MODEL) as robot:
+        assert np.array_equal(robot.state.q_c, here)
+
+
 def test_bad_input_is_one_line_and_exit_code_two(motion_file, capsys):
     assert main(["run", motion_file, "--robot", "rci://127.0.0.2:9", "--timeout", "0.5"]) == 2
     assert main(["run", "no-such-file.npz", "--robot", "rci://127.0.0.2:9"]) == 2

@@ -144,3 +144,9 @@ def test_a_value_just_past_its_bound_is_written_with_the_digits_that_differ():
     row = RCI_JOINT_CONDITIONS[0]
     text = LimitViolation(row, 6, 2.09439511, 2.0943951).text
     assert text.endswith("2.09439511 rad passes 2.0943951 rad"), text
+
+
+def test_a_value_at_its_bound_is_said_to_reach_it():
+    at = LimitViolation(RCI_JOINT_CONDITIONS[0], 6, 2.0, 2.0)
+    assert at.text.endswith("2 rad reaches 2 rad")
+    assert at.remark.code == "joint_reaches"

@@ -103,6 +103,7 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("# a\n\nt,q1\n0,1\n0.1,nan\n", {}, "line 5: 'nan' in column 2"),
         ("0;1,5\n1;1,6\n", {}, "line 1: '1,5' in column 2 is no finite number; decimals need a point"),
         ("0,1,2\n0.1,1\n", {}, "line 2: 2 columns; the first line has 3"),
+        ("0,1,2\n0.1\n", {}, "line 2: 1 column; the first line has 3"),
         ("0,1\n0.1,1\n0.1,1\n", {}, "line 3: 0.1 s is not later than the sample before"),
         ("0\n1\n", {}, "line 1 needs a time and the joints.*, got 'a single column'"),
         ("t,q1,q3\n0,1,1\n", {}, r"line 1: .*names the joints 1, 3; needs q1, q2"),
