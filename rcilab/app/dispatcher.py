@@ -58,7 +58,7 @@ class Dispatcher:
         self,
         store: Store,
         session: RobotConnection,
-        deliver: Deliver = lambda page, name, stream, is_unwanted: True,
+        deliver: Deliver = lambda page, name, stream, is_cancelled: True,
         autosave: Autosave | None = None,
         presence: ClientHeartbeat | None = None,
     ) -> None:

@@ -46,15 +46,15 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     lateness                delay of its handling against the robot's own 1 ms grid, [s]; NaN: no deadline
     success_rate            share of commands that arrived in time, as the controller reports it, 0 to 1
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
-    command                 joint angles sent in answer, [rad], shape (n,); NaN when none were sent
+    command                 joint angles sent, [rad], shape (n,); NaN when none were sent
     faults                  the error bits as one number of 64 bits, bit k = fault k of the maker
     lost                    controller cycles between the previous row and this one that were not received
     robot_mode, controller_mode, motion_generator_mode    as on the wire
     braking                 1: the answer is part of a stop, not of the plan
     tau                     measured joint torques, [N m], shape (n,)
-    command_pose            pose of the tool in base sent in answer, [m], shape (4, 4); NaN when none was sent
+    command_pose            pose of the tool in base as sent, [m], shape (4, 4); NaN when none was sent
     command_psi             arm angle sent with it, [rad]; NaN when none was sent
-    command_tau             joint torques sent in answer, [N m], shape (n,); NaN when none were sent
+    command_tau             joint torques sent, [N m], shape (n,); NaN when none were sent
     tau_ext_in_base         external force and moment in the base frame, shape (6,), [N, N m]
     tau_ext_in_stiff        external force and moment in the force-control frame, shape (6,), [N, N m]
     T_base_tool             measured pose of the tool in base, shape (4, 4), [m]

@@ -116,7 +116,7 @@ class MotionRunner:
             run = build_run(
                 recorder.rows(),
                 plan=plan if scaled is None else scaled.as_motion(),
-                paced=scaled is not None and scaled.changed > 0,
+                has_speed_override=scaled is not None and scaled.changed > 0,
                 stopped=stopped,
                 truncated=recorder.truncated,
                 realtime=self._realtime,

@@ -86,7 +86,7 @@ class MotionPlot(Part):
             self._point()
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
-        is_paced = run is not None and run.paced
+        is_paced = run is not None and run.has_speed_override
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
@@ -104,7 +104,7 @@ class MotionPlot(Part):
         self._end = panels[0].frame.end
         write(self._curves, draw(panels, joints, self.text("plot.time"), self.text("legend.limit")))
         delay = 0 if run is None else run.delay
-        kinds = "plot.kinds" if run is None or not run.paced else "plot.kinds_paced"
+        kinds = "plot.kinds" if run is None or not run.has_speed_override else "plot.kinds_paced"
         write(self._kinds, "" if run is None else soft(self.text(kinds, delay=delay)))
         self._point()
 

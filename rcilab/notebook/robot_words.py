@@ -14,7 +14,7 @@ from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import head, table, verdict
-from rcilab.recording.html_facts import tell_stop
+from rcilab.recording.html_facts import describe_stop
 from rcilab.recording.run import describe_end
 
 
@@ -73,7 +73,7 @@ def outcome_html(
     error, run = outcome.error, outcome.run
     stopped = verdict("warn", "▲", text("run.left_alone" if is_left_alone else "run.stopped"))
     if isinstance(error, ControlError) and error.code == SAFETY_STOP:
-        why = tell_stop(describe_end(error), error.faults, text)
+        why = describe_stop(describe_end(error), error.faults, text)
         return verdict("bad", "✗", text("run.safety_stop", why=why))
     if error is not None:
         faults = ", ".join(getattr(fault, "manual_name", str(fault)) for fault in getattr(error, "faults", ()))

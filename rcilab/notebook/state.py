@@ -158,7 +158,7 @@ class LabState:
     def _played(self) -> Plan | None:
         """The plan; as it was run, where its speed override was changed on the way."""
         plan, run = self.now.plan, self.seen_run
-        if plan is None or run is None or run.plan is None or not run.paced:
+        if plan is None or run is None or run.plan is None or not run.has_speed_override:
             return plan
         if self._as_run is None or self._as_run.motion is not run.plan:
             self._as_run = build_plan_view(self.model, run.plan, plan.report, plan.box)
@@ -262,7 +262,7 @@ class LabState:
             self.outcome, run = outcome, outcome.run
             if outcome.what == "cell":
                 self.exhibit(None if run is None else exhibit_run(run, self.model))
-            elif run is not None and run.paced:  # The times of the plan are others now.
+            elif run is not None and run.has_speed_override:  # The times of the plan are others now.
                 self.moment = None
                 self.tell("plan", "moment")
             self.tell("run")

@@ -11,11 +11,11 @@ from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.views.access_control import Gate
+from rcilab.views.access_control import AccessPolicy
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_server import GuardedServer, listen
-from rcilab.views.viser_stage import furnish, place_camera
+from rcilab.views.viser_stage import add_environment, place_camera
 
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
@@ -132,8 +132,8 @@ def open_page(port: int) -> tuple[GuardedServer, int]:
             f"cannot listen on {LOOPBACK} port {port} ({error.strerror}); port=0 takes a free one"
         ) from error
     number = int(bound.getsockname()[1])
-    door = GuardedServer(bound, Gate(host=LOOPBACK, port=number))
+    door = GuardedServer(bound, AccessPolicy(host=LOOPBACK, port=number))
     door.viser.gui.configure_theme(show_logo=False, show_share_button=False)
     place_camera(door.viser)
-    furnish(door.viser, full=False)
+    add_environment(door.viser, full=False)
     return door, number

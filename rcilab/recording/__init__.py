@@ -1,1 +1,1 @@
-"""What became of a motion: the run as a value, its file, and every form in which people take it away."""
+"""Recorded runs: the run as a value, its file, and the export formats."""

@@ -1,4 +1,4 @@
-"""A run as a table: the recording, the plan beside it and the error between them, a row a cycle, units with names."""
+"""A run as a table: recording, plan and error, one row per cycle, with units."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 def run_columns(run: Run) -> list[Column]:
-    """Returns every number of a run as a column: those of the recording, then plan and error.
+    """Returns the numbers of a run as columns: the recording, then plan and error.
 
-    q_plan[j] is what the plan asked of the instant that is measured, the play-out delay taken out; error[j] is
-    measured minus planned (minus commanded, without a plan), nan from `run.stop_time` on; tool_error and tool_turn are
-    the tool's distance and angle from where it was to be.
+    q_plan[j] is the planned angle at the instant of the measurement, corrected for the play-out delay. error[j] is
+    measured minus planned (minus commanded, without a plan), nan from `run.stop_time` on. tool_error and tool_turn are
+    the distance and the angle of the tool from its planned pose.
     """
     columns = cycle_columns(run.cycles)
     if run.plan is not None:
@@ -30,7 +30,7 @@ def run_columns(run: Run) -> list[Column]:
 
 
 def run_facts(run: Run) -> dict[str, Any]:
-    """Returns a run without its cycles, ready for JSON: arm, configuration, end, errors, health, verdict."""
+    """Returns a run without its cycles as JSON data: arm, configuration, end, errors, health, check result."""
     timing, tracking, report = run.timing, run.tracking, run.report
     return {
         "arm": None if run.model is None else run.model.name,
@@ -40,7 +40,7 @@ def run_facts(run: Run) -> dict[str, Any]:
         "cycles": len(run.cycles),
         "stopped": run.stopped,
         "stop_time_s": run.stop_time,
-        "paced": run.paced,
+        "paced": run.has_speed_override,
         "truncated": run.truncated,
         "complete": run.is_complete,
         "faults": [fault.manual_name for fault in run.faults],

@@ -1,4 +1,4 @@
-"""The forms in which people take a run away, by the ending of a file's name."""
+"""Export formats of a run, by file ending."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 Progress: TypeAlias = Callable[[float], None]
-"""Called with the share that is done, 0 to 1."""
+"""Called with the progress, 0 to 1."""
 
 _Writer: TypeAlias = "Callable[[Run, IO[bytes], Progress, Text], None]"
 
@@ -60,7 +60,7 @@ def write_export(
     language: str = "en",
     units: Units = USUAL,
 ) -> None:
-    """Writes a run to a stream in one of the forms of `ENDINGS`; what `progress` raises ends it."""
+    """Writes a run to a stream in one of the formats of `WRITERS`; an exception in `progress` ends it."""
     write = WRITERS[require_ending(ending)]
     report = progress or (lambda share: None)
     text = Text(language, "rcilab.recording")
@@ -70,13 +70,13 @@ def write_export(
 
 
 def require_ending(ending: str) -> str:
-    """Returns an ending that chooses a format.
+    """Returns `ending` if it is that of an export format.
 
     Raises:
-        InvalidValueError: It chooses none; the message lists those that do.
+        InvalidValueError: It is not; the message lists the endings.
     """
     if ending not in WRITERS:
-        raise InvalidValueError("file ending", ending, f"chooses no format; there are {', '.join(WRITERS)}")
+        raise InvalidValueError("file ending", ending, f"is unknown; known: {', '.join(WRITERS)}")
     return ending
 
 

@@ -1,4 +1,4 @@
-"""The folder that runs are recorded in: how much is there, and how old ones are cleared away."""
+"""The folder of recorded runs: its size, and deletion of old runs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.recording.run_file import ENDING
 
 @dataclass(frozen=True, slots=True)
 class FolderStats:
-    """What a folder holds of recorded runs."""
+    """Number and size of the recorded runs in a folder."""
 
     count: int
     size: int
@@ -21,19 +21,19 @@ class FolderStats:
 
 
 def stored_runs(folder: str | PathLike[str]) -> FolderStats:
-    """Returns how many runs a folder holds and how large they are together; none where there is no folder."""
+    """Returns number and total size of the runs in a folder; zeros if the folder does not exist."""
     sizes = [size for _, _, size in _runs(Path(folder))]
     return FolderStats(len(sizes), sum(sizes))
 
 
 def keep_newest(folder: str | PathLike[str], count: int) -> FolderStats:
-    """Deletes all runs of a folder but the newest ones, and returns what was deleted.
+    """Deletes all runs of a folder except the newest ones; returns number and size of the deleted ones.
 
-    Only files that are named as runs are, directly in the folder, are touched.
+    Only files with the ending of a run, directly in the folder, are deleted.
 
     Args:
-        folder: Where runs are recorded.
-        count: How many stay, 0 or more.
+        folder: Folder of the runs.
+        count: Number of runs to keep, 0 or more.
 
     Raises:
         InvalidValueError: The count is negative.
@@ -42,14 +42,14 @@ def keep_newest(folder: str | PathLike[str], count: int) -> FolderStats:
         raise InvalidValueError("count", count, "is negative: 0 keeps none")
     deleted, freed = 0, 0
     for _, path, size in sorted(_runs(Path(folder)), reverse=True)[count:]:
-        with suppress(OSError):  # It is not ours to delete, or another process removed it first.
+        with suppress(OSError):  # No permission, or another process removed it first.
             path.unlink()
             deleted, freed = deleted + 1, freed + size
     return FolderStats(deleted, freed)
 
 
 def _runs(folder: Path) -> list[tuple[int, Path, int]]:
-    """Returns when each run was written last, [ns], where it is, and its size, [bytes]."""
+    """Returns time of the last change, [ns], path and size, [bytes], of each run."""
     found: list[tuple[int, Path, int]] = []
     with suppress(OSError):
         for path in folder.iterdir():

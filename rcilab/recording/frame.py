@@ -1,4 +1,4 @@
-"""A run for pandas, and as Parquet."""
+"""Runs as pandas data frames and as Parquet."""
 
 from __future__ import annotations
 

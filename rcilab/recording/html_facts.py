@@ -1,4 +1,4 @@
-"""What the exported page says of a run beside its errors: when, where and how it went, in words."""
+"""Table of facts of a run on the exported page: when, where and how it ran."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def fact_rows(run: Run, text: Text) -> list[list[str]]:
-    """Returns rows of a table: a name and what there is to say."""
+    """Returns the rows of the table: name and text."""
     setup, report = run.setup, run.report
     rows = [
         ("started", setup.started),
@@ -28,32 +28,32 @@ def fact_rows(run: Run, text: Text) -> list[list[str]]:
         if report.ok:
             verdict = text("facts.conforms", share=100.0 * report.worst.ratio, id=report.worst.id)
         rows.append(("check", verdict))
-    return [[text(f"facts.{name}"), said] for name, said in rows if said]
+    return [[text(f"facts.{name}"), value] for name, value in rows if value]
 
 
-def tell_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
-    """Returns why a motion was stopped before its end, and as which faults a safety stop was reported.
+def describe_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
+    """Returns why a motion was stopped before its end, and the faults as which a safety stop was reported.
 
     Args:
-        stopped: What `Run.stopped` says.
-        faults: Those that the controller reported.
-        text: Words.
+        stopped: Value of `Run.stopped`.
+        faults: Faults that the controller reported.
+        text: Language of the user.
     """
-    key, named = f"stop.{stopped}", name_faults(faults)
+    key, names = f"stop.{stopped}", name_faults(faults)
     why = text(key) if text.has(key) else stopped
-    return text("stop.reported", why=why, faults=named) if named else why
+    return text("stop.reported", why=why, faults=names) if names else why
 
 
 def _ended(run: Run, text: Text) -> str:
     if run.is_safety_stop:
-        return text("facts.stopped", why=tell_stop(run.stopped or "", run.faults, text))
+        return text("facts.stopped", why=describe_stop(run.stopped or "", run.faults, text))
     if run.faults:
         return text("facts.faulted", faults=name_faults(run.faults))
     if not run.is_complete:
         return text("facts.cut")
     if not run.stopped:
         return text("facts.goal" if run.plan is not None else "facts.last")
-    return text("facts.stopped", why=tell_stop(run.stopped or "", run.faults, text))
+    return text("facts.stopped", why=describe_stop(run.stopped or "", run.faults, text))
 
 
 def _health(run: Run, text: Text) -> str:

@@ -1,8 +1,8 @@
-"""A run as one HTML page with 3D, timeline and plots: it opens from a file, without network and without rcilab.
+"""A run as one HTML page with 3D scene, timeline and plots that opens from a file, without network or rcilab.
 
-The page draws with WebGL and canvas by itself. viser and meshcat can write static pages, too, but theirs hold a bundled
-three.js (0.8 to 1.1 MB), a scene only, and nothing that would move plots along with it; our arm is a few thousand
-triangles, for which some pages of script are enough.
+The page draws with WebGL and canvas. viser and meshcat can write static pages too, but those contain a bundled three.js
+(0.8 to 1.1 MB) and only a scene, without plots that move with it. The arm has a few thousand triangles, so a short
+script is enough.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.plot_scale import ERRORS, PlotScale, plot_scale
 from rcilab.i18n.units import plain_number
 from rcilab.recording.html_facts import fact_rows
-from rcilab.recording.tracking_words import error_rows, tracking_notes
+from rcilab.recording.tracking_text import error_rows, tracking_notes
 from rcilab.robots.shapes import ROLE_COLORS, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
 
-_PATH_POINTS = 1200  # Of the drawn tool path; tuning value.
+_PATH_POINTS = 1200  # Of the drawn tool path; tuning value: smooth at the size of a screen.
 _PLOTS = ("q", "dq", "tau", *ERRORS)
 
 
 def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
-    """Writes the page, in the language and the units of `text`."""
+    """Writes the page in the language and the units of `text`."""
     tracking = run.tracking
     packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
@@ -73,39 +73,39 @@ def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
         "PAGE": script,
         "SCRIPTS": " ".join(f"'sha256-{_digest(part)}'" for part in (scene, plots, script)),
     }
-    # In one pass: what a part says is no place for another part.
-    stream.write(re.sub(r"@@(\w+)@@", lambda place: parts[place[1]], page).encode())
+    # In one pass, so that no part is inserted into another part.
+    stream.write(re.sub(r"@@(\w+)@@", lambda found: parts[found[1]], page).encode())
 
 
 def _digest(script: str) -> str:
-    """Returns what the page's content security policy knows a script by; no other one runs in it."""
+    """Returns the hash of a script for the page's content security policy, which allows no other scripts."""
     return base64.b64encode(sha256(script.encode()).digest()).decode("ascii")
 
 
 class _Packed:
-    """Arrays one after the other, compressed together; each is referred to by its offset."""
+    """Concatenated arrays, compressed together; each is referred to by its offset."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
         self._size = 0
 
     def add(self, array: NDArray[Any], kind: str = "<f4") -> dict[str, Any]:
-        """Adds an array and returns how the page finds it."""
+        """Adds an array and returns its reference for the page."""
         flat = np.ascontiguousarray(array, dtype=kind)
-        place = {"at": self._size, "count": int(flat.size), "kind": kind}
+        reference = {"at": self._size, "count": int(flat.size), "kind": kind}
         content = flat.tobytes()
-        content += bytes(-len(content) % 4)  # Typed arrays begin at whole words.
+        content += bytes(-len(content) % 4)  # Typed arrays start at multiples of 4 bytes.
         self._parts.append(content)
         self._size += len(content)
-        return place
+        return reference
 
     def as_text(self) -> str:
-        """Returns everything as base64 of gzip."""
+        """Returns all arrays as base64 of gzip."""
         return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
 
 
 def _words(run: Run, text: Text) -> dict[str, str]:
-    """Returns the words of the page; a run without a plan is compared with its commands, and they say so."""
+    """Returns the texts of the page; those for a run without a plan name the commands as reference."""
     words = dict(load_catalogue("rcilab.recording", text.language))
     if run.plan is None:
         words |= {name: words[f"{name}_commanded"] for name in ("path", "table.title")}
@@ -118,7 +118,7 @@ def _chart(name: str, scale: PlotScale, text: Text, run: Run) -> dict[str, Any]:
 
 
 def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed: _Packed) -> dict[str, Any]:
-    """Columns are laid one after the other, in the units they are drawn in: every signal of a joint is one piece."""
+    """Packs the signals in the units of the plots, column by column: each signal of a joint is contiguous."""
     factor = {name: scale.factor for name, scale in scales.items()}
     packs: dict[str, Any] = {
         "t": packed.add(run.t),
@@ -130,7 +130,7 @@ def _pack_run(run: Run, tracking: Tracking, scales: dict[str, PlotScale], packed
         "fault": packed.add(run.cycles["faults"] != 0, "u1"),
     }
     if run.plan is not None:
-        # As the controller computes it: by backward differences.
+        # Backward differences, as in the controller.
         velocity = np.diff(run.plan.q, axis=0, prepend=run.plan.q[:1]) / CYCLE_TIME
         rows = np.clip(np.rint(run.t / CYCLE_TIME).astype(np.intp) - run.delay, 0, len(velocity) - 1)
         packs["q_plan"] = packed.add(factor["q"] * run.planned.T)
@@ -152,8 +152,8 @@ def _pack_arm(model: RobotModel, packed: _Packed) -> dict[str, Any]:
     meshes = []
     for link, body in enumerate((shape.base, *shape.links)):
         for part in body.parts:
-            place = {"vertices": packed.add(part.mesh.vertices), "faces": packed.add(part.mesh.faces, "<u4")}
-            meshes.append({"link": link, "color": [c / 255.0 for c in ROLE_COLORS[part.role]], **place})
+            arrays = {"vertices": packed.add(part.mesh.vertices), "faces": packed.add(part.mesh.faces, "<u4")}
+            meshes.append({"link": link, "color": [c / 255.0 for c in ROLE_COLORS[part.role]], **arrays})
     return {
         "meshes": meshes,
         "joints": [{"origin": j.origin.tolist(), "axis": j.axis.tolist()} for j in upright_joints(model.description)],
@@ -169,12 +169,12 @@ def _pack_path(
     rows = np.unique(np.linspace(0, len(run.q) - 1, min(_PATH_POINTS, len(run.q))).astype(np.intp))
     error = scale.factor * tracking.position[rows]
     worst = max(float(np.nanmax(error, initial=0.0)), scale.least)
-    place: dict[str, Any] = {
+    path: dict[str, Any] = {
         "points": packed.add(model.position_path(run.q[rows])),
         "error": packed.add(error),
         "worst": worst,
         "worst_text": scale.with_unit(plain_number(worst, 2)),
     }
     if run.plan is not None:
-        place["plan"] = packed.add(model.position_path(run.planned[rows]))
-    return place
+        path["plan"] = packed.add(model.position_path(run.planned[rows]))
+    return path

@@ -1,4 +1,4 @@
-"""A run while it happens: cycles are added as they come, in memory and, where wanted, in a file."""
+"""Recording of a run: cycles are collected in memory and optionally written to a file."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from rcilab.motion import Motion
     from rcilab.recording.run_file import RunFile
 
-_FIRST_CAPACITY = 4096  # Cycles; doubled whenever it is full.
+_FIRST_CAPACITY = 4096  # Cycles; doubled when full.
 _DELAY_WINDOW = (
-    1000  # Cycles that the play-out delay is looked for in; longer than any, and every motion moves by then.
+    1000  # Cycles in which the play-out delay is searched; longer than any delay, and every motion has started by then.
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunFacts:
-    """What is known of a run before its first cycle."""
+    """Facts of a run that are known before its first cycle."""
 
     plan: Motion | None
     model: RobotModel
@@ -32,11 +32,11 @@ class RunFacts:
 
 
 class LiveRecording:
-    """Collects the cycles of one run. Owned by one thread; what it returns stays as it is.
+    """Collects the cycles of one run. Owned by one thread; returned arrays are not changed later.
 
     Args:
-        facts: What is known of the run already.
-        file: Where every cycle goes as well; None keeps them in memory only.
+        facts: Facts of the run.
+        file: File for the cycles; None keeps them in memory only.
     """
 
     def __init__(self, facts: RunFacts, file: RunFile | None = None) -> None:
@@ -46,15 +46,15 @@ class LiveRecording:
         self._count = 0
 
     def add(self, cycles: NDArray[np.void]) -> None:
-        """Adds those cycles that belong to the motion, the ones from its first command on.
+        """Adds the cycles that belong to the motion: those from its first command on.
 
         Raises:
-            InvalidValueError: They cannot be written to the file, which is given up; in memory they are.
+            InvalidValueError: They cannot be written to the file, which is not used any more; they are in memory.
         """
         rows = cycles[np.isfinite(cycles["t"])]
         if not len(rows):
             return
-        self._make_room(rows)
+        self._reserve(rows)
         assert self._memory is not None
         self._memory[self._count : self._count + len(rows)] = rows
         self._count += len(rows)
@@ -82,14 +82,14 @@ class LiveRecording:
         return find_delay(first["q_c"], first["command"])
 
     def finish(self, stopped: str | None = None, plan: Motion | None = None) -> Run | None:
-        """Ends the recording and returns the run; None, and no file, when not one cycle came.
+        """Ends the recording and returns the run; without any cycle, returns None and deletes the file.
 
         Args:
-            stopped: Why the motion did not reach its end; None: it did.
-            plan: What was asked of the arm in the end, where that is not what was planned: another speed override.
+            stopped: Why the motion did not reach its end; None if it did.
+            plan: The motion as executed, if the speed override was changed during the motion.
 
         Raises:
-            InvalidValueError: The end of the file cannot be written; all that came before is in it.
+            InvalidValueError: The end of the file cannot be written; all cycles before it are in the file.
         """
         file, self.file = self.file, None
         cycles = self.cycles
@@ -106,10 +106,10 @@ class LiveRecording:
             stopped=stopped,
             model=facts.model,
             setup=facts.setup,
-            paced=plan is not None,
+            has_speed_override=plan is not None,
         )
 
-    def _make_room(self, rows: NDArray[np.void]) -> None:
+    def _reserve(self, rows: NDArray[np.void]) -> None:
         needed = self._count + len(rows)
         if self._memory is None or needed > len(self._memory):
             larger = np.zeros(max(needed, _FIRST_CAPACITY, 2 * self._count), rows.dtype)

@@ -1,8 +1,8 @@
 """A run as MCAP: messages with JSON schemas, for Foxglove and PlotJuggler.
 
-Topics, one message a cycle: /measured, /commanded, /plan, /error, /health, /state where everything was recorded, and
-/tool as a foxglove.PoseInFrame, which Foxglove draws in 3D. Times are those of the controller's cycles, counted from
-when the run began. The facts of the run stand in the metadata record "rcilab".
+Topics, one message per cycle: /measured, /commanded, /plan, /error, /health, /state if the complete state was recorded,
+and /tool as a foxglove.PoseInFrame, which Foxglove draws in 3D. Times are those of the controller's cycles, counted
+from the start of the run. The facts of the run are in the metadata record "rcilab".
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rcilab.core.arrays import Array
     from rcilab.recording.run import Run
 
-_TOLD = 2000  # Messages between two reports of progress.
+_PROGRESS_INTERVAL = 2000  # Messages between two reports of progress.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,11 +59,11 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
     tool_channel = None if tool is None else _register(writer, "tool", "foxglove.PoseInFrame", _POSE_SCHEMA)
     for row, stamp in enumerate(stamps.tolist()):
         for topic, table in tables.items():
-            message = {name: _clean(values[row]) for name, values in table}
+            message = {name: _without_nan(values[row]) for name, values in table}
             _write(writer, channels[topic], stamp, message)
         if tool is not None and tool_channel is not None:
             _write(writer, tool_channel, stamp, _pose_message(tool[row], stamp))
-        if row % _TOLD == 0:
+        if row % _PROGRESS_INTERVAL == 0:
             progress(row / len(stamps))
     writer.finish()
 
@@ -71,7 +71,7 @@ def write_mcap(run: Run, stream: IO[bytes], progress: Callable[[float], None]) -
 def _topics(run: Run) -> dict[str, list[_Signal]]:
     cycles, tracking = run.cycles, run.tracking
     planned = run.planned
-    wanted = "commanded" if run.plan is None else "planned"
+    reference = "commanded" if run.plan is None else "planned"
     return {
         "measured": [
             _Signal("q", "measured joint angles, [rad]", run.q),
@@ -85,23 +85,23 @@ def _topics(run: Run) -> dict[str, list[_Signal]]:
         ],
         "commanded": [
             _Signal("q_c", "commanded joint angles as the controller reports them, [rad]", run.q_c),
-            _Signal("command", "joint angles sent in answer, [rad]", run.command),
+            _Signal("command", "commanded joint angles as sent, [rad]", run.command),
         ],
         "state": [
             _Signal(name, f"{name} of the robot's state, SI units", cycles[name].reshape(len(cycles), -1))
             for name in OTHER_STATE_FIELDS
             if name in (cycles.dtype.names or ())
         ],
-        "plan": [_Signal("q", "planned joint angles at this instant, [rad]", planned)] if run.plan is not None else [],
+        "plan": [_Signal("q", "planned joint angles, [rad]", planned)] if run.plan is not None else [],
         "error": [
-            _Signal("joint", f"measured minus {wanted} joint angles, [rad]", tracking.joint),
-            _Signal("tool", f"distance of the tool from where it was {wanted} to be, [m]", tracking.position),
-            _Signal("tool_turn", f"angle of the tool from where it was {wanted} to be, [rad]", tracking.rotation),
+            _Signal("joint", f"measured minus {reference} joint angles, [rad]", tracking.joint),
+            _Signal("tool", f"distance of the tool from its {reference} position, [m]", tracking.position),
+            _Signal("tool_turn", f"angle of the tool from its {reference} orientation, [rad]", tracking.rotation),
         ],
         "health": [
             _Signal("success_rate", "share of commands that arrived in time, 0 to 1", run.success_rate),
-            _Signal("lateness", "how late the cycle was handled, [s]", cycles["lateness"]),
-            _Signal("lost", "controller cycles that never arrived before this one", cycles["lost"]),
+            _Signal("lateness", "delay of the handling of the cycle, [s]", cycles["lateness"]),
+            _Signal("lost", "controller cycles lost before this one", cycles["lost"]),
             _Signal("faults", "error bits as one number, bit k is fault k of the manual", cycles["faults"]),
         ],
     }
@@ -126,10 +126,10 @@ def _write(writer: Any, channel: int, stamp: int, message: dict[str, Any]) -> No
     writer.add_message(channel_id=channel, log_time=stamp, publish_time=stamp, data=data)
 
 
-def _clean(value: Any) -> Any:
-    """Returns a number, or a list of them, as JSON can say it: nothing instead of NaN."""
+def _without_nan(value: Any) -> Any:
+    """Returns a number, or a list of numbers, with None instead of NaN, which JSON does not have."""
     if isinstance(value, list):
-        return [_clean(entry) for entry in value]
+        return [_without_nan(entry) for entry in value]
     return None if value != value else value
 
 

@@ -1,4 +1,4 @@
-"""Libraries that only some exports need."""
+"""Optional libraries, which only some exports need."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class MissingExtraError(UsageError):
     """A library of the extra `export` is not installed.
 
     Attributes:
-        library: Its name.
+        library: Name of the library.
     """
 
     def __init__(self, library: str, purpose: str) -> None:

@@ -1,4 +1,4 @@
-"""What became of a motion: every cycle as arrays, plan against actual, and how punctual both sides were."""
+"""A recorded run: every cycle as arrays, plan against actual, and the timing of both sides."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from rcilab.recording.frame import to_pandas
 from rcilab.recording.run_file import decode_content, read_run
 from rcilab.recording.run_html import run_html
 from rcilab.recording.setup import Setup
-from rcilab.recording.tracking import Tracking, compute_tracking, find_stop, last_compared
+from rcilab.recording.tracking import Tracking, compute_tracking, count_compared, find_stop_time
 from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.model.robot_model import RobotModel
 
-_FIRST_ARM = "xMatePro7"  # A recording without a model is of an arm whose controller has the same faults.
-_LONGEST_DELAY = 64  # [cycles] between a command and the state that shows it; more is no play-out buffer any more.
+_FIRST_ARM = "xMatePro7"  # For a recording without a model and maker: all early recordings are of Rokae arms.
+_MAX_DELAY = 64  # [cycles] Between a command and the state that shows it; longer than any play-out buffer.
 
 
 _SAFETY_STOPS = {"estop": "an emergency stop was pressed", "gstop": "the safety gate was opened"}
-"""What `Run.stopped` says of them, by the code of their status."""
+"""Values of `Run.stopped` for safety stops, by the code of their status."""
 
 
 def describe_end(error: BaseException) -> str:
-    """Returns what `Run.stopped` says of a motion that ended with an error; a safety stop is named without its bits."""
+    """Returns `Run.stopped` for a motion that ended with an error; a safety stop is named without its error bits."""
     if isinstance(error, ControlError) and error.code == SAFETY_STOP:
         return _SAFETY_STOPS.get(str(error.facts["status"]), str(error))
     return str(error) or type(error).__name__
@@ -49,18 +49,18 @@ def describe_end(error: BaseException) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """How punctual a run was. Periods are those of the states' arrival; lateness is against the robot's 1 ms grid."""
+    """Timing of a run. Periods are those of the states' arrival; lateness is relative to the robot's 1 ms grid."""
 
     cycles: int
     """States answered."""
     lost: int
-    """Controller cycles that were not answered in their turn: their state never came, or a newer one was there."""
+    """Controller cycles that were not answered: their state did not arrive, or a newer one was there."""
     period_median: float
     """[s]."""
     period_max: float
     """[s]."""
     response_median: float
-    """From a state's arrival to the answer, [s]."""
+    """From a state's arrival to its command, [s]."""
     response_max: float
     """[s]."""
     lateness_median: float
@@ -75,33 +75,33 @@ class Timing:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Run:
-    """A motion as it happened. Arrays have one row a recorded controller cycle and are read-only."""
+    """A recorded motion. Arrays have one row per recorded controller cycle and are read-only."""
 
     plan: Motion | None
-    """What was meant to happen; None for a callback."""
+    """The planned motion; None for a callback."""
     cycles: NDArray[np.void]
-    """Every recorded cycle in full, see `cycle_dtype`. In a session with `record_all=True` a cycle holds the rest of
-    the state, too, by the names of `RobotState`: `run.cycles["tau_filtered"]`."""
+    """Every recorded cycle, see `cycle_dtype`. In a session with `record_all=True` a cycle also has the rest of the
+    state, by the names of `RobotState`: `run.cycles["tau_filtered"]`."""
     stopped: str | None = None
-    """Why the motion was stopped before its end; None when it ran to its end."""
+    """Why the motion was stopped before its end; None if it ran to its end."""
     truncated: bool = False
     """Whether the beginning is missing because the run was longer than the recorder."""
     realtime: bool = True
-    """False in lock-step, where a millisecond lasts as long as it takes and timing means nothing."""
+    """False in lock-step, where the controller waits for the client and timing has no meaning."""
     model: RobotModel | None = None
-    """The arm, with its tool and load; None when it is not known."""
+    """The arm, with its tool and load; None if it is not known."""
     setup: Setup = field(default_factory=Setup)
-    """Where and how it was made."""
+    """Circumstances of the run."""
     maker: str = ""
-    """Name of the maker whose faults the bits of `cycles["faults"]` are; empty: that of the arm."""
-    paced: bool = False
-    """Whether the speed was changed on the way: then `plan` is what was asked of the arm, at the times it was asked."""
+    """Maker whose faults the bits of `cycles["faults"]` are; empty: that of the arm."""
+    has_speed_override: bool = False
+    """Whether the speed override was changed during the motion: then `plan` is the motion as executed."""
     is_complete: bool = True
-    """False when it was read from a file whose end is missing: all that came before is here."""
+    """False if it was read from a file whose end is missing."""
 
     @property
     def is_safety_stop(self) -> bool:
-        """Whether an emergency stop or the safety gate ended it, whatever error bits that set."""
+        """Whether an emergency stop or the safety gate ended it, independent of the error bits."""
         return self.stopped in _SAFETY_STOPS.values()
 
     @property
@@ -126,7 +126,7 @@ class Run:
 
     @property
     def command(self) -> JointPath:
-        """Joint angles sent in answer, shape (N, n), [rad]; NaN where a cycle was not answered with joint angles."""
+        """Joint angles sent, shape (N, n), [rad]; NaN in cycles in which none were sent."""
         return self.cycles["command"]
 
     @property
@@ -156,17 +156,17 @@ class Run:
 
     @property
     def command_pose(self) -> Array:
-        """Tool poses sent in answer, shape (N, 4, 4), [m]; NaN where a cycle was not answered with a pose."""
+        """Tool poses sent, shape (N, 4, 4), [m]; NaN in cycles in which none was sent."""
         return self.cycles["command_pose"]
 
     @property
     def command_psi(self) -> Array:
-        """Arm angles sent in answer, shape (N,), [rad]; NaN where none was sent."""
+        """Arm angles sent, shape (N,), [rad]; NaN in cycles in which none was sent."""
         return self.cycles["command_psi"]
 
     @property
     def command_tau(self) -> JointPath:
-        """Joint torques sent in answer, shape (N, n), [N m]; NaN where a cycle was not answered with torques."""
+        """Joint torques sent, shape (N, n), [N m]; NaN in cycles in which none were sent."""
         return self.cycles["command_tau"]
 
     @property
@@ -176,7 +176,7 @@ class Run:
 
     @property
     def faults(self) -> tuple[FaultCode, ...]:
-        """Every fault that was seen, in wire order."""
+        """All reported faults, in wire order."""
         bits = int(np.bitwise_or.reduce(self.cycles["faults"])) if len(self.cycles) else 0
         if self.model is not None:
             known = self.model.description.faults
@@ -192,42 +192,42 @@ class Run:
     @property
     def delay(self) -> int:
         """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1."""
-        wanted = self.command
-        if self.plan is not None and not np.isfinite(wanted).any():  # Sent as poses: the plan says which angles.
-            wanted = self._planned(0)
+        reference = self.command
+        if self.plan is not None and not np.isfinite(reference).any():  # Poses were sent: take the planned angles.
+            reference = self._planned(0)
             if self.stop_time is not None:
-                wanted[self.t >= self.stop_time] = np.nan
+                reference[self.t >= self.stop_time] = np.nan
         faulty = np.flatnonzero(self.cycles["faults"])
-        shown = self.q_c if not faulty.size else self.q_c[: faulty[0]]  # From there on the controller obeys no command.
-        return find_delay(shown, wanted[: len(shown)])
+        shown = self.q_c if not faulty.size else self.q_c[: faulty[0]]  # After a fault it follows no command.
+        return find_delay(shown, reference[: len(shown)])
 
     @property
     def stop_time(self) -> float | None:
-        """When the arm stopped following its plan, [s]; None: it followed to its end.
+        """When the arm stopped following its plan, [s]; None: it followed the plan to its end.
 
-        That is when a stop began, or when the controller showed a fault or ended the motion.
+        That is when a stop began, or when the controller reported a fault or ended the motion.
         """
-        return find_stop(self.cycles)
+        return find_stop_time(self.cycles)
 
     @property
     def error(self) -> JointPath:
-        """Measured minus planned joint angles, shape (N, n), [rad], with the play-out delay taken out.
+        """Measured minus planned joint angles, shape (N, n), [rad], corrected for the play-out delay.
 
-        NaN from `stop_time` on: an arm that is stopped leaves its plan on purpose. Without a plan, measured
-        minus commanded.
+        NaN from `stop_time` on: an arm that is being stopped does not follow its plan. Without a plan, measured minus
+        commanded.
         """
         if self.plan is None:
             return self._lag()
         delay = self.delay
         error = self.q - self._planned(delay)
-        error[last_compared(self.cycles, delay) :] = np.nan
+        error[count_compared(self.cycles, delay) :] = np.nan
         return error
 
     @property
     def planned(self) -> JointPath:
-        """Planned joint angles that each measurement answers to, the play-out delay taken out, shape (N, n), [rad].
+        """Planned joint angles at each measurement, corrected for the play-out delay, shape (N, n), [rad].
 
-        Without a plan NaN.
+        NaN without a plan.
         """
         return np.full_like(self.q, np.nan) if self.plan is None else self._planned(self.delay)
 
@@ -238,16 +238,16 @@ class Run:
 
     @property
     def report(self) -> Report | None:
-        """The verdict on the plan; None without a plan or an arm. Checked again each time, by the table of today."""
+        """Check of the plan; None without a plan or an arm. Computed at each access, with the current conditions."""
         if self.plan is None or self.model is None:
             return None
         return check(self.plan, self.model)
 
     def commanded(self) -> Motion:
-        """Returns the motion that the controller reports as commanded, on its 1 ms grid, the play-out delay taken out.
+        """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
 
-        It stands in for the plan where a callback moved the arm: to be drawn and checked. Cycles of which no state came
-        lie on straight lines.
+        Used in place of a plan, for drawing and checking, if a callback moved the arm. Lost cycles are interpolated
+        linearly.
 
         Raises:
             UsageError: No cycle was recorded.
@@ -259,39 +259,38 @@ class Run:
         return Motion.from_cycles(np.stack([np.interp(grid, times, column) for column in self.q_c.T], axis=1))
 
     def _planned(self, delay: int) -> JointPath:
-        """The plan at every row, `delay` cycles late, shape (N, n), [rad]."""
+        """Returns the plan at every row, delayed by `delay` cycles, shape (N, n), [rad]."""
         assert self.plan is not None
         rows = np.clip(np.rint(self.t / CYCLE_TIME).astype(np.intp) - delay, 0, len(self.plan.q) - 1)
         return self.plan.q[rows]
 
     def _lag(self) -> JointPath:
-        """Measured minus commanded joint angles, shape (N, n), [rad], with the play-out delay taken out.
+        """Returns measured minus commanded joint angles, shape (N, n), [rad], corrected for the play-out delay.
 
-        Where no joint angles were sent, against those that the controller reports as commanded.
+        If no joint angles were sent, those that the controller reports as commanded are used.
         """
         if not np.isfinite(self.command).any():
             return self.q - self.q_c
         delay = self.delay
-        wanted = np.full_like(self.q, np.nan)
-        if len(wanted) > delay:
-            wanted[delay:] = self.command[:-delay]
-            wanted[:delay] = self.command[0]
-        return self.q - wanted
+        commanded = np.full_like(self.q, np.nan)
+        if len(commanded) > delay:
+            commanded[delay:] = self.command[:-delay]
+            commanded[:delay] = self.command[0]
+        return self.q - commanded
 
     @property
     def largest_error(self) -> float:
-        """The largest joint error, [rad]; 0.0 where nothing is compared."""
+        """The largest joint error, [rad]; 0.0 without anything to compare."""
         return float(np.nanmax(np.abs(self.error), initial=0.0))
 
-    def _told_error(self) -> str:
-        """In words, and until when where it was stopped."""
+    def _describe_error(self) -> str:
         stop = self.stop_time if self.plan is not None else None
         deviation = f"{self.largest_error:.3g} rad ({math.degrees(self.largest_error):.3g} deg)"
         return deviation if stop is None else f"{deviation} until the stop at {stop:.3f} s"
 
     @property
     def timing(self) -> Timing:
-        """How punctual both sides were."""
+        """Timing of both sides."""
         sent = self.cycles[self.cycles["sent_ns"] != 0]
         if len(sent) < 2:
             return Timing(
@@ -323,31 +322,31 @@ class Run:
         language: str = "en",
         units: Units = USUAL,
     ) -> None:
-        """Writes the run to a file; its ending chooses the format.
+        """Writes the run to a file; its ending selects the format.
 
         ==========  ============================================================================================
-        .rcirun     everything, to be loaded with `rcilab.load_run` or shown with `rcilab replay FILE`
-        .csv        a row a cycle, units in the header; with the plan and the error beside the measurements
-        .npz        one numpy array a field of the recording
+        .rcirun     everything; load it with `rcilab.load_run`, show it with `rcilab replay FILE`
+        .csv        one row per cycle, units in the header; with plan and error next to the measurements
+        .npz        one numpy array per field of the recording
         .parquet    the columns of the CSV, for pandas, polars, DuckDB (needs the extra `export`)
         .mcap       messages with JSON schemas, for Foxglove and PlotJuggler (needs the extra `export`)
-        .html       one page with 3D, timeline and plots that needs no network and no rcilab
+        .html       one page with 3D scene, timeline and plots that needs neither network nor rcilab
         ==========  ============================================================================================
 
         Args:
-            file: Its name; an existing file is replaced.
-            progress: Called with the share that is done, 0 to 1.
+            file: Destination; an existing file is replaced.
+            progress: Called with the progress, 0 to 1.
             language: Of the HTML page, "en" or "zh".
-            units: Of the HTML page; numbers for programs are SI.
+            units: Of the HTML page; the other formats are in SI.
 
         Raises:
             InvalidValueError: The ending is unknown, or the file cannot be written.
-            UsageError: The format needs a library that is not installed, or an arm, which this run does not have.
+            UsageError: The format needs a library that is not installed.
         """
         save_run(self, file, progress=progress, language=language, units=units)
 
     def to_pandas(self) -> Any:
-        """Returns the columns of the CSV as a `pandas.DataFrame`, indexed by t; units stand in `.attrs["units"]`.
+        """Returns the columns of the CSV as a `pandas.DataFrame`, indexed by t; `.attrs["units"]` has the units.
 
         Raises:
             UsageError: pandas is not installed.
@@ -357,7 +356,7 @@ class Run:
     def __repr__(self) -> str:
         facts = [f"{self.duration:.3f} s", f"{len(self.cycles)} cycles"]
         if len(self.cycles):
-            facts.append(f"largest error {self._told_error()}")
+            facts.append(f"largest error {self._describe_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
         if self.stopped:
             facts.append(f"stopped: {plain_text(self.stopped)}")
@@ -372,14 +371,14 @@ class Run:
 
 
 def find_delay(q_c: JointPath, command: JointPath) -> int:
-    """Returns how many cycles after a command the controller reports it as commanded; found by comparison, usually 1.
+    """Returns after how many cycles the controller reports a command as commanded; found by comparison, usually 1.
 
     Args:
         q_c: Commanded joint angles as the controller reports them, shape (N, n), [rad].
-        command: Joint angles sent in answer, shape (N, n), [rad]; NaN where a cycle was not answered.
+        command: Joint angles sent, shape (N, n), [rad]; NaN in cycles in which none were sent.
     """
     best, least = 1, math.inf
-    for delay in range(1, min(_LONGEST_DELAY, len(q_c) - 1) + 1):
+    for delay in range(1, min(_MAX_DELAY, len(q_c) - 1) + 1):
         difference = np.abs(q_c[delay:] - command[:-delay])
         if np.isfinite(difference).any():
             size = float(np.nanmax(difference))
@@ -399,10 +398,10 @@ def build_run(
     realtime: bool = True,
     model: RobotModel | None = None,
     setup: Setup | None = None,
-    paced: bool = False,
+    has_speed_override: bool = False,
     maker: str = "",
 ) -> Run:
-    """Returns the run in a recording: the rows from the first command on."""
+    """Returns a run from recorded cycles: the rows from the first command on."""
     rows = cycles[np.isfinite(cycles["t"])]
     rows.flags.writeable = False
     return Run(
@@ -413,23 +412,23 @@ def build_run(
         realtime=realtime,
         model=model,
         setup=setup or Setup(),
-        paced=paced,
+        has_speed_override=has_speed_override,
         maker=maker,
     )
 
 
 def load_run(file: str | PathLike[str], *, max_rows: int = DEFAULT_MAX_ROWS) -> Run:
-    """Returns the run in a `.rcirun` file; of one that was cut off, all up to its last whole block.
+    """Returns the run in a `.rcirun` file; of a truncated file, everything up to its last complete block.
 
     Args:
-        file: The file's name.
-        max_rows: How many cycles it may hold: 17 minutes.
+        file: Path of the file.
+        max_rows: Largest allowed number of cycles; the default is 17 minutes.
 
     Returns:
-        The run. `is_complete` is False when the file was cut off.
+        The run. `is_complete` is False if the file was truncated.
 
     Raises:
-        InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
+        InvalidValueError: The file does not exist, is not a run, is too long, or is damaged at its beginning.
         VersionMismatchError: It was written by another version of this format.
     """
     return read_run(file, max_rows, Run)

@@ -1,22 +1,22 @@
-"""A run in a file, `.rcirun`: written while the arm moves, and readable however the writer ended.
+"""The file of a run, `.rcirun`: written while the arm moves, and readable even after a crash of the writer.
 
-The file is a row of blocks (`blocks.py`), in this order:
+The file is a sequence of blocks (`chunks.py`), in this order:
 
     HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia]} or null,
-            "fields": [[name, type as numpy spells it, shape], ...] of one cycle, "bytes": its size,
+            "fields": [[name, numpy type, shape], ...] of one cycle, "bytes": its size,
             "maker": whose faults the bits of "faults" are; the first versions had 32 bits, of Rokae,
-            "realtime": whether timing means something, "setup": where and how (`Setup`),
-            "report": the verdict on the plan, one object a condition, or null}
-    PLAN    the planned motion as `Motion.save` writes it; missing for a callback. A motion whose speed was changed has
-            another one behind its cycles, as it was asked of the arm in the end; the last one counts
+            "realtime": false in lock-step, "setup": circumstances (`Setup`),
+            "report": the check of the plan, one object per condition, or null}
+    PLAN    the planned motion as `Motion.save` writes it; missing for a callback. After a change of the speed override
+            a second PLAN follows the cycles, with the motion as executed; the last one is valid
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
-            byte of every cycle, and so on (neighbours are then alike and take a quarter of the room). Any number of
-            these
+            byte of every cycle, and so on (adjacent bytes are then similar and compress to a quarter). Any number of
+            these blocks
     TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing,
-            "paced": whether the speed was changed on the way}. A file without it was cut off: by a crash, by a full
-            disk, or because it is still being written
+            "paced": whether the speed override was changed during the motion}. A file without it is incomplete: after
+            a crash, with a full disk, or because it is still being written
 
-All units are SI. Blocks of other kinds are left out by a reader.
+All units are SI. A reader ignores blocks of other kinds.
 """
 
 from __future__ import annotations
@@ -55,25 +55,25 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 ENDING = ".rcirun"
-BLOCK_CYCLES = 256  # Tuning value: what a crash may cost at most, about a quarter of a second.
+BLOCK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
 
-_LATER = {"braking", *STATE_FIELDS}  # What the first versions did not record.
+_OPTIONAL_FIELDS = {"braking", *STATE_FIELDS}  # Not recorded by the first versions.
 _ROWS = struct.Struct("<I")
-_LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with all that the state has takes a third of it.
+_LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with the complete state takes a third of it.
 
 
 class RunWriter:
-    """Writes a run while it happens; what has been written stays readable whatever happens next. Owned by one thread.
+    """Writes a run while the arm moves; the data written so far stay readable after a crash. Owned by one thread.
 
     Args:
-        stream: Where to, binary; closed by `close` when `owns_stream`.
+        stream: Binary stream; the caller closes it.
         dtype: Layout of one cycle.
-        plan: What is meant to happen; None for a callback.
+        plan: The planned motion; None for a callback.
         model: The arm.
-        setup: Where and how.
-        report: The verdict on the plan.
+        setup: Circumstances of the run.
+        report: The check of the plan.
         realtime: False in lock-step.
-        maker: Whose faults the bits are; that of the arm when empty.
+        maker: Maker whose faults the bits are; empty: that of the arm.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class RunWriter:
     ) -> None:
         self._stream = stream
         self._dtype = dtype
-        self._waiting: NDArray[np.void] = np.zeros(0, dtype)
+        self._pending: NDArray[np.void] = np.zeros(0, dtype)
         head = {
             "arm": None if model is None else _arm_facts(model),
             "fields": [[name, field[0].base.str, list(field[0].shape)] for name, field in _fields(dtype)],
@@ -106,11 +106,11 @@ class RunWriter:
         stream.flush()
 
     def add(self, cycles: NDArray[np.void]) -> None:
-        """Adds cycles; every `BLOCK_CYCLES` of them are written at once."""
-        self._waiting = np.concatenate([self._waiting, cycles]) if len(self._waiting) else cycles
-        while len(self._waiting) >= BLOCK_CYCLES:
-            self._write(self._waiting[:BLOCK_CYCLES])
-            self._waiting = self._waiting[BLOCK_CYCLES:]
+        """Adds cycles; they are written in blocks of `BLOCK_CYCLES`."""
+        self._pending = np.concatenate([self._pending, cycles]) if len(self._pending) else cycles
+        while len(self._pending) >= BLOCK_CYCLES:
+            self._write(self._pending[:BLOCK_CYCLES])
+            self._pending = self._pending[BLOCK_CYCLES:]
         self._stream.flush()
 
     def finish(
@@ -119,22 +119,22 @@ class RunWriter:
         stopped: str | None = None,
         truncated: bool = False,
         plan: Motion | None = None,
-        paced: bool = False,
+        has_speed_override: bool = False,
     ) -> None:
-        """Writes what is left, and that the run ended properly.
+        """Writes the remaining cycles and the last block.
 
         Args:
-            stopped: Why it ended early; None: it did not.
+            stopped: Why the motion ended early; None if it did not.
             truncated: Whether the beginning is missing.
-            plan: What was asked of the arm in the end, where that is not what was planned: another speed override.
-            paced: Whether the plan that is written already is such a one.
+            plan: The motion as executed, if the speed override was changed during the motion.
+            has_speed_override: Whether the plan written at the start already is such a motion.
         """
-        if len(self._waiting):
-            self._write(self._waiting)
-            self._waiting = self._waiting[:0]
+        if len(self._pending):
+            self._write(self._pending)
+            self._pending = self._pending[:0]
         if plan is not None:
             self._write_plan(plan)
-        tail = {"stopped": stopped, "truncated": truncated, "paced": paced or plan is not None}
+        tail = {"stopped": stopped, "truncated": truncated, "paced": has_speed_override or plan is not None}
         self._stream.write(encode_block("TAIL", json.dumps(tail).encode()))
         self._stream.flush()
 
@@ -149,15 +149,15 @@ class RunWriter:
 
 
 class RunFile:
-    """A `.rcirun` on disk that grows while the arm moves. Owned by one thread.
+    """A `.rcirun` file that is written while the arm moves. Owned by one thread.
 
     Args:
-        path: Where to; an existing file is replaced.
+        path: Destination; an existing file is replaced.
         dtype: Layout of one cycle.
         facts: `plan`, `model`, `setup`, `report`, `realtime` as for `RunWriter`.
 
     Raises:
-        InvalidValueError: The file cannot be written. The methods raise it, too, and leave what was written.
+        InvalidValueError: The file cannot be written. The methods raise it too and keep the data written so far.
     """
 
     def __init__(self, path: Path, dtype: np.dtype[np.void], **facts: Any) -> None:
@@ -170,17 +170,17 @@ class RunFile:
         try:
             self._writer = RunWriter(self._stream, dtype, **facts)
         except OSError as error:
-            raise self._given_up(error) from error
+            raise self._abandon(error) from error
 
     def add(self, cycles: NDArray[np.void]) -> None:
         """Adds cycles."""
         try:
             self._writer.add(cycles)
         except OSError as error:
-            raise self._given_up(error) from error
+            raise self._abandon(error) from error
 
     def close(self, *, stopped: str | None = None, truncated: bool = False, plan: Motion | None = None) -> None:
-        """Writes the end and closes the file; arguments as of `RunWriter.finish`."""
+        """Writes the end and closes the file; arguments as for `RunWriter.finish`."""
         try:
             with self._stream:
                 self._writer.finish(stopped=stopped, truncated=truncated, plan=plan)
@@ -188,24 +188,24 @@ class RunFile:
         except OSError as error:
             raise _unwritable(self.path, error) from error
 
-    def _given_up(self, error: OSError) -> InvalidValueError:
-        """Closes the file as it is, unless nothing of it was written, and returns what to raise."""
+    def _abandon(self, error: OSError) -> InvalidValueError:
+        """Closes the file, deletes it if it is empty, and returns the error to raise."""
         with suppress(OSError):
-            self._stream.close()  # It tries once more to write, and closes in any case.
+            self._stream.close()  # Flushes once more, and closes in any case.
         with suppress(OSError):
             if self.path.stat().st_size == 0:
                 self.path.unlink()
         return _unwritable(self.path, error)
 
     def discard(self) -> None:
-        """Closes the file and takes it away: nothing was recorded."""
+        """Closes and deletes the file."""
         with suppress(OSError):
             self._stream.close()
             self.path.unlink()
 
 
 def write_run(run: Run, stream: IO[bytes]) -> None:
-    """Writes a whole run."""
+    """Writes a run."""
     writer = RunWriter(
         stream,
         run.cycles.dtype,
@@ -217,19 +217,22 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
         maker=run.maker,
     )
     writer.add(run.cycles)
-    writer.finish(stopped=run.stopped, truncated=run.truncated, paced=run.paced)
+    writer.finish(stopped=run.stopped, truncated=run.truncated, has_speed_override=run.has_speed_override)
 
 
 def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) -> R:
-    """Returns what `build` makes of a `.rcirun` file; of one that was cut off, of all up to its last whole block.
+    """Reads a `.rcirun` file, of a truncated one everything up to its last complete block.
 
     Args:
-        file: The file's name.
-        max_rows: How many cycles it may hold.
-        build: Makes the run; its keyword arguments are those of `Run`.
+        file: Path of the file.
+        max_rows: Largest allowed number of cycles.
+        build: Builds the run; its keyword arguments are those of `Run`.
+
+    Returns:
+        The result of `build`.
 
     Raises:
-        InvalidValueError: There is no such file, it holds no run or too long a one, or not even its beginning is whole.
+        InvalidValueError: The file does not exist, is not a run, is too long, or is damaged at its beginning.
         VersionMismatchError: It was written by another version of this format.
     """
     if not isinstance(file, str | PathLike):
@@ -240,7 +243,7 @@ def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) 
 
 
 def decode_content(content: bytes, name: str, max_rows: int, build: Callable[..., R]) -> R:
-    """Returns what `build` makes of the bytes of a `.rcirun` file; see `read_run`."""
+    """Reads the content of a `.rcirun` file; see `read_run`."""
     blocks = decode_blocks(content, name)
     if not blocks or blocks[0].kind != "HEAD":
         raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
@@ -256,7 +259,7 @@ def decode_content(content: bytes, name: str, max_rows: int, build: Callable[...
 
 
 def report_facts(report: Report) -> list[dict[str, Any]]:
-    """Returns a verdict as plain facts, one object a condition."""
+    """Returns a report as JSON data, one object per condition."""
     return [
         {
             "condition": row.id,
@@ -273,7 +276,7 @@ def report_facts(report: Report) -> list[dict[str, Any]]:
 
 
 def _count_cycles(block: Chunk) -> int:
-    """Returns how many cycles a block says that it holds."""
+    """Returns the number of cycles in the header of a block."""
     return _ROWS.unpack_from(block.payload)[0] if block.kind == "CYCL" and len(block.payload) >= _ROWS.size else 0
 
 
@@ -283,17 +286,17 @@ def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
     if dtype.itemsize > _LARGEST_ROW:
-        raise ValueError(f"a cycle takes {dtype.itemsize} bytes; {_LARGEST_ROW} are the most")
-    _layout_for(dtype)  # Before room is made for the cycles.
+        raise ValueError(f"a cycle takes {dtype.itemsize} bytes, the maximum is {_LARGEST_ROW}")
+    _layout_for(dtype)  # Checked before memory for the cycles is allocated.
     parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
-    cycles = _as_known(np.concatenate(parts) if parts else np.zeros(0, dtype))
+    cycles = _to_current_layout(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
     plans = [block.payload for block in blocks if block.kind == "PLAN"]
     tails = [json.loads(block.payload) for block in blocks if block.kind == "TAIL"]
     tail = tails[-1] if tails else {}
     stopped = tail.get("stopped")
     if not isinstance(stopped, str | None):
-        raise TypeError("why it was stopped is no text")
+        raise TypeError("the reason of the stop is not text")
     return build(
         plan=Motion.load(BytesIO(plans[-1]), max_rows=max_rows) if plans else None,
         cycles=cycles,
@@ -303,47 +306,47 @@ def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
         model=None if head["arm"] is None else _build_arm(head["arm"]),
         setup=Setup.from_dict(head["setup"]),
         maker=str(head.get("maker", "")),
-        paced=bool(tail.get("paced", len(plans) > 1)),
+        has_speed_override=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )
 
 
-def _as_known(cycles: NDArray[np.void]) -> NDArray[np.void]:
-    """Returns cycles of a file in today's layout: 0 or NaN where an earlier version did not record something.
+def _to_current_layout(cycles: NDArray[np.void]) -> NDArray[np.void]:
+    """Converts cycles of a file to the current layout, with 0 or NaN in fields that an earlier version did not record.
 
     Raises:
-        ValueError: Something is missing that every version recorded, or is there that none did.
+        ValueError: A field is missing that every version recorded, or is unknown.
     """
     ours = _layout_for(cycles.dtype)
     if cycles.dtype == ours:
         return cycles
-    theirs = _written(cycles.dtype)
+    theirs = _stored_fields(cycles.dtype)
     wide = np.zeros(len(cycles), ours)
-    for name in _written(ours):
+    for name in _stored_fields(ours):
         wide[name] = cycles[name] if name in theirs else np.nan if name in STATE_FIELDS else 0
     return wide
 
 
 def _layout_for(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
-    """Returns today's layout for cycles of a file.
+    """Returns the current layout for cycles of a file.
 
     Raises:
-        ValueError: Something is missing that every version recorded, or is there that none did.
+        ValueError: A field is missing that every version recorded, or is unknown.
     """
-    theirs = _written(dtype)
-    if theirs.get("faults") == np.dtype("<u4"):  # As the first versions wrote them.
+    theirs = _stored_fields(dtype)
+    if theirs.get("faults") == np.dtype("<u4"):  # Written by the first versions.
         theirs["faults"] = np.dtype("<u8")
     n = theirs["q"].shape[0] if "q" in theirs else 0
     ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
-    known = _written(ours)
-    if not theirs.items() <= known.items() or known.keys() - theirs.keys() - _LATER:
+    known = _stored_fields(ours)
+    if not theirs.items() <= known.items() or known.keys() - theirs.keys() - _OPTIONAL_FIELDS:
         raise ValueError("its cycles have other fields than this version writes")
     if dtype.itemsize > ours.itemsize:
-        raise ValueError(f"a cycle takes {dtype.itemsize} bytes; {ours.itemsize} are the most with its fields")
+        raise ValueError(f"a cycle takes {dtype.itemsize} bytes, the maximum with its fields is {ours.itemsize}")
     return ours
 
 
-def _written(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:
+def _stored_fields(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:
     return {name: field[0] for name, field in _fields(dtype) if name != "reserved"}
 
 

@@ -1,4 +1,4 @@
-"""A run as a small table for notebooks."""
+"""HTML table of a run for notebooks."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 
 def _error(run: Run, words: Mapping[str, str]) -> str:
-    """Returns the largest error, and until when it was compared where the arm was stopped."""
+    """Returns the largest error; of a stopped run, also the time until which it was compared."""
     deviation, stop = f"{math.degrees(run.largest_error):.3g} deg", run.stop_time
     return deviation if stop is None or run.plan is None else words["card.until"].format(error=deviation, time=stop)
 
 
 def run_html(run: Run, language: str = "en") -> str:
-    """Returns a table of how long a run took, how it ended, how near it was and how punctual.
+    """Returns a table with duration, end, largest error and timing of a run.
 
     Raises:
-        InvalidValueError: There is no such language.
+        InvalidValueError: The language is unknown.
     """
     words, timing = load_catalogue("rcilab.recording", require_language(language)), run.timing
     ended = words["card.fault" if run.faults else "card.goal"]

@@ -1,4 +1,4 @@
-"""Where and how a run was made, as far as it is known."""
+"""Circumstances of a run."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """The circumstances of a run. What is not known is empty."""
+    """Circumstances of a run; unknown fields are empty."""
 
     target: str = ""
     """"virtual", or the address of the controller."""
     plant: str = ""
-    """What a virtual controller moved: "ideal" or "mujoco"."""
+    """Plant of a virtual controller: "ideal" or "mujoco"."""
     mode: str = ""
-    """How the controller followed, such as "joint_position"."""
+    """Control mode, such as "joint_position"."""
     started_ns: int = 0
-    """When the run began, nanoseconds since 1970 (UTC); 0: not known."""
+    """Start of the run, nanoseconds since 1970 (UTC); 0: not known."""
 
     @property
     def started(self) -> str:
-        """When it began, as 2026-05-01T12:00:00Z; "" when that is not known."""
+        """Start of the run, such as 2026-05-01T12:00:00Z; "" if it is not known."""
         return (
             time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.started_ns // 1_000_000_000))
             if self.started_ns
@@ -30,10 +30,10 @@ class Setup:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns the fields, ready for JSON."""
+        """Returns the fields as JSON data."""
         return asdict(self)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Setup:
-        """Returns what `as_dict` gave; fields of a later version are left out."""
+        """Returns the setup from the data of `as_dict`; fields of a later version are ignored."""
         return cls(**{field.name: values[field.name] for field in fields(cls) if field.name in values})

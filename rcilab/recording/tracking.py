@@ -1,4 +1,4 @@
-"""How far an arm was from its plan: per joint and at the tool, over time and in a few numbers."""
+"""Tracking error of an arm: per joint and at the tool, over time and in a few numbers."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tracking:
-    """Measured against planned, with the play-out delay taken out. NaN where there is nothing to compare with."""
+    """Measured against planned, corrected for the play-out delay. NaN where there is no reference."""
 
     joint: JointPath
     """Error of every joint, shape (N, n), [rad]."""
     position: Array
-    """Distance of the tool from where it was to be, shape (N,), [m]."""
+    """Distance of the tool from its planned position, shape (N,), [m]."""
     rotation: Array
     """Angle between the tool's orientation and the planned one, shape (N,), [rad]."""
 
     @property
     def joint_rms(self) -> Array:
-        """Root mean square a joint, shape (n,), [rad]."""
+        """Root mean square of each joint, shape (n,), [rad]."""
         return np.array([_rms(column) for column in self.joint.T])
 
     @property
     def joint_max(self) -> Array:
-        """Largest magnitude a joint, shape (n,), [rad]."""
+        """Largest magnitude of each joint, shape (n,), [rad]."""
         return np.array([_max(column) for column in self.joint.T])
 
     @property
@@ -58,7 +58,7 @@ class Tracking:
 
 
 def compute_tracking(model: RobotModel | None, q: JointPath, planned: JointPath) -> Tracking:
-    """Returns the error of measured against planned joint angles, each of shape (N, n), [rad].
+    """Returns the tracking error from measured and planned joint angles, each of shape (N, n), [rad].
 
     Args:
         model: The arm, for the errors at the tool; None leaves them NaN.
@@ -78,26 +78,26 @@ def compute_tracking(model: RobotModel | None, q: JointPath, planned: JointPath)
     return Tracking(joint=q - planned, position=position, rotation=rotation)
 
 
-def find_stop(cycles: NDArray[np.void]) -> float | None:
-    """Returns when an arm was no longer to follow its plan, [s]; None: it followed to its end.
+def find_stop_time(cycles: NDArray[np.void]) -> float | None:
+    """Returns when an arm stopped following its plan, [s]; None: it followed the plan to its end.
 
     Args:
         cycles: See `cycle_dtype`.
     """
-    places = [place for place in (_first_unplanned(cycles), _first(cycles["faults"])) if place is not None]
-    return float(cycles["t"][min(places)]) if places else None
+    rows = [row for row in (_first_unplanned(cycles), _first_set(cycles["faults"])) if row is not None]
+    return float(cycles["t"][min(rows)]) if rows else None
 
 
-def last_compared(cycles: NDArray[np.void], delay: int) -> int:
-    """Returns the number of cycles that still show the plan: what was sent last is seen `delay` cycles later.
+def count_compared(cycles: NDArray[np.void], delay: int) -> int:
+    """Returns the number of cycles that follow the plan; the last command takes effect `delay` cycles later.
 
-    A controller with a fault stops at once, whatever it still has to play.
+    A controller with a fault stops at once and drops the commands in its buffer.
 
     Args:
         cycles: See `cycle_dtype`.
         delay: Between a command and the state that shows it, [cycles].
     """
-    fault, lost = _first(cycles["faults"]), _first_unplanned(cycles)
+    fault, lost = _first_set(cycles["faults"]), _first_unplanned(cycles)
     played = (
         len(cycles) if lost is None else np.searchsorted(cycles["t"], cycles["t"][lost] + (delay - 0.5) * CYCLE_TIME)
     )
@@ -105,16 +105,16 @@ def last_compared(cycles: NDArray[np.void], delay: int) -> int:
 
 
 def _first_unplanned(cycles: NDArray[np.void]) -> int | None:
-    """Returns the first row that was not answered by the plan: with a way to rest, or not at all any more."""
-    braking, answered = _first(cycles["braking"]), np.flatnonzero(cycles["sent_ns"])
+    """Returns the first row whose command was not planned: it belongs to a stop, or nothing was sent from there on."""
+    braking, answered = _first_set(cycles["braking"]), np.flatnonzero(cycles["sent_ns"])
     if braking is not None or not answered.size or answered[-1] + 1 == len(cycles):
         return braking
     return int(answered[-1]) + 1
 
 
-def _first(marks: NDArray[np.integer]) -> int | None:
-    places = np.flatnonzero(marks)
-    return int(places[0]) if places.size else None
+def _first_set(marks: NDArray[np.integer]) -> int | None:
+    rows = np.flatnonzero(marks)
+    return int(rows[0]) if rows.size else None
 
 
 def _rms(values: Array) -> float:

@@ -1,4 +1,4 @@
-"""Who may open a page and who may talk to it, decided from the headers of a request alone."""
+"""Access control of a page and its websockets, from the headers of a request alone."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, quote, unquote, urlsplit
 
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
-_FIRST_DELAY = 0.1  # [s] A tuning value: not noticed after a mistyped token.
-_LONGEST_DELAY = 5.0  # [s] A tuning value: as long as a browser and its user wait without giving up.
-_FORGOTTEN = 60.0  # [s] A tuning value: after so long without a wrong token the next one is the first again.
+_FIRST_DELAY = 0.1  # [s] Tuning value: not noticeable after a mistyped token.
+_LONGEST_DELAY = 5.0  # [s] Tuning value: browsers and users still wait this long.
+_RESET_TIME = 60.0  # [s] Tuning value: without a wrong token for this long, the delay starts again at the first one.
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why a request is not answered."""
+    """Why a request is refused."""
 
     reason: str
-    is_guess: bool = False
-    """Whether it came with a wrong token."""
+    has_wrong_token: bool = False
+    """Whether the request had a wrong token."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gate:
-    """Decides about a request from its headers alone.
+class AccessPolicy:
+    """Accepts or refuses requests by their headers.
 
     Args:
-        host: Address we listen on.
-        port: Port we listen on.
-        token: Secret that every page must bring, or None on loopback.
-        title: What the page is called in a refusal.
+        host: Address of the server.
+        port: Port of the server.
+        token: Secret that every page must send, or None on loopback.
+        title: Name of the page in a refusal.
     """
 
     host: str
@@ -43,7 +43,7 @@ class Gate:
 
     @property
     def names(self) -> frozenset[str]:
-        """What a browser may call us in Host and Origin; empty when any name may lead here (0.0.0.0)."""
+        """Allowed values of Host and Origin; empty if any name is allowed (0.0.0.0)."""
         if self.host in ("0.0.0.0", "::"):
             return frozenset()
         hosts = {self.host, *(_LOOPBACK if self.host in _LOOPBACK else ())}
@@ -51,30 +51,30 @@ class Gate:
 
     @property
     def cookie(self) -> str | None:
-        """What a page that brought the token is to keep: one cookie a port, as browsers share them among ports."""
+        """Cookie for a page that sent the token; its name has the port, because browsers share cookies among ports."""
         return None if self.token is None else f"{self._cookie_name}={quote(self.token, safe='')}"
 
     def refuse_page(self, host: str | None, path: str, cookie: str | None) -> Refusal | None:
-        """Returns why a page may not be served, or None when it may.
+        """Returns why a page must not be served, or None if it may.
 
-        A foreign Host means that another domain's DNS points at this machine (rebinding), so it is refused too.
+        A foreign Host is refused too: it means that the DNS of another domain points to this machine (rebinding).
         """
         if self.names and host not in self.names:
-            return Refusal(f"{self.title} answers to {' and '.join(sorted(self.names))} only")
+            return Refusal(f"{self.title} is available as {' and '.join(sorted(self.names))} only")
         given = [*parse_qs(urlsplit(path).query).get("token", ()), *self._tokens_in(cookie)]
-        if self._is_short_of_token(given):
+        if self._lacks_token(given):
             return Refusal(f"{self.title} needs its token: open the address that rcilab printed", bool(given))
         return None
 
     def refuse_socket(self, host: str | None, origin: str | None, cookie: str | None) -> Refusal | None:
-        """Returns why a websocket may not be opened, or None when it may; a missing Origin is refused."""
+        """Returns why a websocket must not be opened, or None if it may; a missing Origin is refused."""
         if origin is None:
             return Refusal("a websocket needs an Origin")
         scheme, _, name = origin.partition("://")
         if scheme not in ("http", "https") or name != host or (self.names and name not in self.names):
             return Refusal(f"origin {origin!r} is not {self.title}")
         given = list(self._tokens_in(cookie))
-        if self._is_short_of_token(given):
+        if self._lacks_token(given):
             return Refusal("the token is missing or wrong", bool(given))
         return None
 
@@ -82,11 +82,11 @@ class Gate:
     def _cookie_name(self) -> str:
         return f"rcilab_token_{self.port}"
 
-    def _is_short_of_token(self, given: list[str]) -> bool:
+    def _lacks_token(self, given: list[str]) -> bool:
         if self.token is None:
             return False
-        wanted = self.token.encode()
-        return not any([hmac.compare_digest(one.encode(errors="replace"), wanted) for one in given])
+        expected = self.token.encode()
+        return not any([hmac.compare_digest(one.encode(errors="replace"), expected) for one in given])
 
     def _tokens_in(self, cookie: str | None) -> Iterator[str]:
         for part in (cookie or "").split(";"):
@@ -95,8 +95,8 @@ class Gate:
                 yield unquote(value)
 
 
-class Guesses:
-    """Delays the answer to each wrong token: longer each time, until none was tried for a while.
+class WrongTokenDelay:
+    """Delay of the reply to a wrong token: longer each time, reset after a time without wrong tokens.
 
     Args:
         clock: Returns the time, [s].
@@ -107,19 +107,19 @@ class Guesses:
         self._last, self._delay = float("-inf"), 0.0
 
     def delay(self) -> float:
-        """Returns for how long the answer to a wrong token that has just come is to be held back, [s]."""
+        """Returns the delay of the reply to a wrong token received now, [s]."""
         now = self._clock()
-        is_first = now - self._last > _FORGOTTEN
+        is_first = now - self._last > _RESET_TIME
         self._last = now
         self._delay = _FIRST_DELAY if is_first else min(2.0 * self._delay, _LONGEST_DELAY)
         return self._delay
 
 
 def is_loopback(host: str) -> bool:
-    """Returns whether only this machine can reach an address, by what it resolves to.
+    """Returns whether a host resolves to loopback addresses only.
 
     Raises:
-        OSError: It is no address and no name of one.
+        OSError: It is neither an address nor a known name.
     """
     found = {info[4][0] for info in socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)}
     return all(ipaddress.ip_address(str(address).partition("%")[0]).is_loopback for address in found)

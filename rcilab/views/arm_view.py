@@ -1,13 +1,13 @@
-"""An arm in a scene. One class for the live arm, the plan, a candidate of the inverse: they differ in style only.
+"""An arm in a scene: the live arm, the plan or a candidate of the inverse kinematics, which differ in style only.
 
-Node names, on which browser tests and the page rely, for an arm of name NAME:
+Node names, used by the page and the browser tests, for an arm with the name NAME:
 
     /NAME                              the base frame; /NAME/base_shell, /NAME/base_cap, ... its meshes
     /NAME/joint1                       frame of link 1 (`robots/upright.py`); /NAME/joint1/shell, ... its meshes
-    /NAME/joint1/joint2/.../jointN     each link below the one that carries it
+    /NAME/joint1/joint2/.../jointN     each link below its parent link
     .../jointN/flange                  the flange;  .../jointN/flange/tool  the tool
 
-Only the orientation of the joint frames changes when the arm moves: one quaternion a joint.
+When the arm moves, only the orientations of the joint frames change: one quaternion per joint.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class _Look:
     """Colour of the housings; None keeps the arm's own colours."""
     opacity: float
     inset: float
-    """How much thinner it is drawn, [m]: where two arms coincide one hides in the other instead of flickering."""
+    """Inset of the surface, [m]: of two coinciding arms one is hidden in the other instead of flickering."""
 
 
 _LOOKS: dict[ArmStyle, _Look] = {
@@ -51,16 +51,16 @@ _TINTED_ROLE_SHADE: dict[ColorRole, float] = {"shell": 1.0, "cap": 0.75, "dark":
 
 
 class DrawableModel(Protocol):
-    """What a view needs of a `RobotModel`."""
+    """The part of `RobotModel` that a view needs."""
 
     @property
     def description(self) -> RobotDescription:
-        """The arm's data."""
+        """Description of the arm."""
         ...
 
     @property
     def T_flange_tool(self) -> Pose:
-        """Pose of the tool in the flange."""
+        """Pose of the tool in the flange frame."""
         ...
 
 
@@ -68,11 +68,11 @@ class ArmView:
     """An arm drawn in a scene; owned by the thread that draws.
 
     Args:
-        scene: Where to draw.
+        scene: The scene.
         name: Name of the arm's root node, without slashes.
         model: The arm.
-        style: How it looks. A translucent arm has no base of its own: it stands in the live one's.
-        quality: "fine" or "coarse" meshes; default coarse for translucent arms.
+        style: Appearance. A translucent arm is drawn without a base, at the place of the live arm.
+        quality: "fine" or "coarse" meshes; by default coarse for translucent arms.
         axes_length: Length of the axes drawn at the tool, [m]; 0 draws none.
     """
 
@@ -138,7 +138,7 @@ class ArmView:
             q: Joint angles, shape (n,), [rad].
 
         Raises:
-            InvalidValueError: Not n finite numbers; the arm stays as it was.
+            InvalidValueError: Not n finite numbers; the arm is not changed.
         """
         angles = as_vector(q, len(self._axes), "q", "rad").tolist()
         changed = [i for i, angle in enumerate(angles) if angle != self._shown[i]]
@@ -166,7 +166,7 @@ class ArmView:
         self._scene.set_visible(self._root, visible)
 
     def set_look(self, *, color: Color | None = None, opacity: float | None = None) -> None:
-        """Changes tint or opacity; what is None stays."""
+        """Changes tint or opacity; None leaves them unchanged."""
         self._require_present()
         self._tint = self._tint if color is None else color
         self._opacity = self._opacity if opacity is None else opacity
@@ -175,7 +175,7 @@ class ArmView:
                 self._scene.set_style(name, color=self._color(role), opacity=self._opacity)
 
     def remove(self) -> None:
-        """Takes the arm out of the scene; calling it again does nothing."""
+        """Removes the arm from the scene; calling it again does nothing."""
         if not self._removed:
             self._removed = True
             self._scene.remove(self._root)

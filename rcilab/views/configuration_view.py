@@ -1,7 +1,7 @@
-"""What is fixed to an arm and where its tool may be, in a scene: safety box, tool, load, force-control frame.
+"""The configuration of an arm in a scene: safety box, tool, load, force-control frame.
 
 Node names: /safety_box with its faces and edges, and below the flange of the arm setup_tool, setup_load, setup_force.
-Each of the four is shown or hidden on its own, and drawn anew when it has changed.
+Each of the four is shown or hidden separately, and redrawn only after a change.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FORCE_COLOR: Color = (0, 150, 136)
 _AXES = 0.09  # [m] Length of the drawn axes.
 _CONE = (0.018, 0.055)  # [m] Radius and height of the cone along the tool's axis.
 _SPHERE = 0.014  # [m] Radius of the ball at the centre of mass.
-_THINNEST, _WIDEST = 0.004, 0.4  # [m] What is drawn of an ellipsoid of inertia, whatever was typed.
+_THINNEST, _WIDEST = 0.004, 0.4  # [m] Limits of the drawn half-axes of the inertia ellipsoid.
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b) in (1, 2, 4)])
 _FACES = np.array(
     [
@@ -34,14 +34,14 @@ _FACES = np.array(
         (7, 3, 2), (6, 7, 2), (6, 2, 0), (4, 6, 0), (7, 5, 1), (3, 7, 1),
     ]
 )  # fmt: skip
-"""They look inwards: only far walls are drawn. A near one would hide the translucent arms that are drawn after it."""
+"""Oriented inwards, so that only the far walls are drawn: a near one would hide translucent arms drawn after it."""
 
 
 class ConfigurationView:
     """Draws one configuration. Owned by the thread that draws.
 
     Args:
-        scene: Where to draw.
+        scene: The scene.
         flange: Name of the flange's node, see `ArmView`.
     """
 
@@ -60,7 +60,7 @@ class ConfigurationView:
             scene.add_polyline(f"{name}/ring", _ring(0.035), color=color, thickness=0.004)
 
     def show_box(self, box: SafetyBox | None) -> None:
-        """Shows the safety box, grey when it is not active; None hides it."""
+        """Shows the safety box, grey if it is not active; None hides it."""
         if self._is_drawn(self._box, box):
             return
         self._scene.set_visible(self._box, box is not None)
@@ -69,7 +69,7 @@ class ConfigurationView:
         color = BOX_COLOR if box.active else BOX_OFF_COLOR
         corners = _corners(box.size)
         with self._scene.batch():
-            self._place(self._box, box.T_base_box)
+            self._set_pose(self._box, box.T_base_box)
             faces = f"{self._box}/faces"
             self._scene.add_mesh(faces, corners, _FACES, color=color, opacity=0.10 if box.active else 0.0)
             for number, (a, b) in enumerate(_EDGES):
@@ -77,19 +77,19 @@ class ConfigurationView:
                 self._scene.add_polyline(edge, corners[[a, b]], color=color, thickness=0.006 if box.active else 0.003)
 
     def show_tool(self, T_flange_tool: Pose | None) -> None:
-        """Shows the tool's frame, a cone along its z axis and the way to it from the flange; None hides it."""
+        """Shows the tool's frame, a cone along its z axis and a line to it from the flange; None hides it."""
         if self._is_drawn(self._tool, T_flange_tool):
             return
         self._scene.set_visible(self._tool, T_flange_tool is not None)
         if T_flange_tool is None:
             return
         with self._scene.batch():
-            self._place(self._tool, T_flange_tool)
-            way = np.array((T_flange_tool.inverse().position, (0.0, 0.0, 0.0)))
-            self._scene.add_polyline(f"{self._tool}/way", way, color=TOOL_COLOR, thickness=0.006)
+            self._set_pose(self._tool, T_flange_tool)
+            line = np.array((T_flange_tool.inverse().position, (0.0, 0.0, 0.0)))
+            self._scene.add_polyline(f"{self._tool}/line", line, color=TOOL_COLOR, thickness=0.006)
 
     def show_load(self, load: Payload | None) -> None:
-        """Shows the centre of mass as a ball, the inertia as the ellipsoid of even density that has it; None hides."""
+        """Shows the centre of mass as a ball and the inertia as an ellipsoid of uniform density; None hides them."""
         if self._is_drawn(self._load, load):
             return
         self._scene.set_visible(self._load, load is not None)
@@ -98,7 +98,7 @@ class ConfigurationView:
         axes, radii = inertia_ellipsoid(load)
         ball = unit_ball()
         with self._scene.batch():
-            self._place(self._load, Pose(load.center_of_mass))
+            self._set_pose(self._load, Pose(load.center_of_mass))
             self._scene.add_mesh(f"{self._load}/center", ball.vertices * _SPHERE, ball.faces, color=LOAD_COLOR)
             body = ball.vertices * np.clip(radii, _THINNEST, _WIDEST) @ axes.T
             opacity = 0.35 if radii.max() > 0.0 else 0.0
@@ -110,13 +110,13 @@ class ConfigurationView:
             return
         self._scene.set_visible(self._force, T_flange_force is not None)
         if T_flange_force is not None:
-            self._place(self._force, T_flange_force)
+            self._set_pose(self._force, T_flange_force)
 
     def remove_box(self) -> None:
-        """Takes the box out of the scene; the other three go with the arm."""
+        """Removes the box from the scene; the other three are removed with the arm."""
         self._scene.remove(self._box)
 
-    def _place(self, name: str, pose: Pose) -> None:
+    def _set_pose(self, name: str, pose: Pose) -> None:
         self._scene.set_transform(name, wxyz=pose.wxyz.tolist(), position=pose.position.tolist())
 
     def _is_drawn(self, name: str, value: object) -> bool:
@@ -127,11 +127,11 @@ class ConfigurationView:
 
 
 def inertia_ellipsoid(load: Payload) -> tuple[Array, Array]:
-    """Returns the solid ellipsoid of even density with the inertia of a load.
+    """Returns the solid ellipsoid of uniform density with the inertia of a load.
 
     Returns:
         Its axes as columns, flange axes, shape (3, 3), a proper rotation, and its half-axes, shape (3,), [m]; zeros
-        where there is neither mass nor inertia.
+        without mass or inertia.
     """
     moments, axes = np.linalg.eigh(load.inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
@@ -162,11 +162,11 @@ def unit_ball() -> Mesh:
 
 
 def outside_runs(path: Array, box: SafetyBox | None) -> list[Array]:
-    """Returns the parts of a path that leave a box, each at least two points, shape (M, 3), [m].
+    """Returns the parts of a path outside a box, each at least two points, shape (M, 3), [m].
 
     Args:
         path: Positions of the tool, shape (N, 3), [m].
-        box: None, or one that is not active, leaves nothing out.
+        box: The safety box; None or an inactive one gives no parts.
     """
     if box is None or not box.active:
         return []

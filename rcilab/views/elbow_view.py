@@ -1,8 +1,8 @@
-"""The circle of a 7-axis arm's elbow in a scene: a ring of arcs, free or forbidden by pattern and colour.
+"""The elbow circle of a 7-axis arm in a scene: a ring of free and forbidden arcs with their own patterns and colours.
 
-Nodes: ROOT/free, a thick band, blue-green where the tool moves well and amber towards a singularity; ROOT/other, a
-thin line where only another way of standing is free; ROOT/limits, ROOT/singular, ROOT/box, ROOT/reach, forbidden, each
-with dashes of its own length; ROOT/spoke from the elbow to its handle.
+Nodes: ROOT/free, a thick band from blue-green to amber near a singularity; ROOT/other, a thin line where only another
+branch is free; ROOT/limits, ROOT/singular, ROOT/box, ROOT/reach, forbidden, each with its own dashes; ROOT/spoke from
+the elbow to its handle.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from rcilab.model.kinematics.elbow_circle import ElbowCircle
 from rcilab.views.scene import Color, Scene
 
 OUTWARD = 0.105
-"""How far outside the elbow's circle the ring is drawn, [m]: clear of the housings."""
+"""Distance of the drawn ring from the elbow's circle, [m], clear of the housings."""
 ARC_COLORS: dict[str, Color] = {
     "free": (18, 150, 132),
     "other": (120, 175, 205),
@@ -28,19 +28,19 @@ ARC_COLORS: dict[str, Color] = {
     "box": (24, 118, 210),
     "reach": (120, 130, 145),
 }
-"""By kind of arc; each has a pattern of its own as well."""
+"""By kind of arc; each kind also has its own pattern."""
 
 _PIECES = 120  # Three degrees each.
 _THICK = {"free": 0.016, "other": 0.006}  # [m]
 _FORBIDDEN_THICK = 0.009  # [m]
 _DASHES = {"limits": (4.0, 3.0), "singular": (1.2, 2.4), "box": (7.0, 2.5), "reach": (2.0, 5.0)}  # [deg] on, off
-_POOR, _GOOD = 0.03, 0.14  # Smallest singular value that is drawn amber, and from which on it is blue-green.
+_POOR, _GOOD = 0.03, 0.14  # Smallest singular values of the Jacobian that are drawn amber, and blue-green.
 _AMBER = (240, 150, 20)
 _SPOKE = (70, 84, 102)
 
 
 class DrawableArc(Protocol):
-    """What is drawn of an arc."""
+    """The part of an arc that is drawn."""
 
     @property
     def start(self) -> float:
@@ -62,7 +62,7 @@ class ElbowView:
     """Draws one ring. Owned by the thread that draws.
 
     Args:
-        scene: Where to draw.
+        scene: The scene.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -76,9 +76,9 @@ class ElbowView:
         """Draws the ring.
 
         Args:
-            circle: Where the elbow goes round.
-            psi: Where it is, [rad].
-            arcs: All the way round.
+            circle: The circle of the elbow.
+            psi: Arm angle, [rad].
+            arcs: Arcs that cover the whole circle.
             dexterity: Smallest singular values at equally spaced arm angles from -pi on, shape (N,).
         """
         by_kind: dict[str, list[tuple[float, float]]] = {kind: [] for kind in ARC_COLORS}
@@ -86,9 +86,9 @@ class ElbowView:
             by_kind[arc.kind] += _strokes(arc.kind, arc.start, arc.end)
         with self._scene.batch():
             for kind, strokes in by_kind.items():
-                self._see(kind, bool(strokes))
+                self._show_kind(kind, bool(strokes))
                 if not strokes and kind in self._drawn:
-                    continue  # A page would draw lines without length like any others.
+                    continue  # A page would draw dots for lines without length.
                 self._drawn.add(kind)
                 ends = _fill(strokes)
                 points = circle.points(ends.ravel(), OUTWARD).reshape(-1, 2, 3)
@@ -102,23 +102,23 @@ class ElbowView:
             self.set_visible(True)
 
     def set_visible(self, visible: bool) -> None:
-        """Shows or hides it."""
+        """Shows or hides the ring."""
         if visible != self._shown:
             self._shown = visible
             self._scene.set_visible(self.root, visible)
 
     def remove(self) -> None:
-        """Takes it out of the scene."""
+        """Removes the ring from the scene."""
         self._scene.remove(self.root)
 
-    def _see(self, kind: str, visible: bool) -> None:
+    def _show_kind(self, kind: str, visible: bool) -> None:
         if kind in self._drawn and visible == (kind in self._hidden):
             self._hidden ^= {kind}
             self._scene.set_visible(f"{self.root}/{kind}", visible)
 
 
 def free_colors(psi: Array, dexterity: Array) -> Array:
-    """Returns colours from amber (next to a singularity) to blue-green (the tool moves well), shape (*psi.shape, 3).
+    """Returns colours from amber (near a singularity) to blue-green, shape (*psi.shape, 3).
 
     Args:
         psi: Arm angles, [rad].
@@ -129,17 +129,17 @@ def free_colors(psi: Array, dexterity: Array) -> Array:
 
 
 def free_goodness(psi: Array, dexterity: Array) -> Array:
-    """Returns how well the tool moves, from 0 (drawn amber) to 1 (blue-green), for arguments as of `free_colors`."""
+    """Returns the distance from singularities, from 0 (amber) to 1 (blue-green); arguments as for `free_colors`."""
     known = np.nan_to_num(dexterity)
-    place = (psi + math.pi) / math.tau * len(known)
-    low = np.floor(place).astype(np.intp)
-    share = place - low
+    position = (psi + math.pi) / math.tau * len(known)
+    low = np.floor(position).astype(np.intp)
+    share = position - low
     value = (1.0 - share) * known[low % len(known)] + share * known[(low + 1) % len(known)]
     return np.clip((value - _POOR) / (_GOOD - _POOR), 0.0, 1.0)
 
 
 def _strokes(kind: str, start: float, end: float) -> list[tuple[float, float]]:
-    """Returns the pieces that an arc is drawn in, [rad]; all round, a kind has at most `_PIECES` of them."""
+    """Returns the strokes of an arc, [rad]; for the whole circle, at most `_PIECES`."""
     if kind not in _DASHES:
         pieces = max(1, math.ceil((end - start) / math.tau * (_PIECES - 20)))
         marks = np.linspace(start, end, pieces + 1).tolist()
@@ -150,7 +150,7 @@ def _strokes(kind: str, start: float, end: float) -> list[tuple[float, float]]:
 
 
 def _fill(strokes: list[tuple[float, float]]) -> Array:
-    """Returns always as many strokes, shape (_PIECES, 2): the rest have no length. A page then only moves points."""
+    """Pads strokes to shape (_PIECES, 2) with ones of length 0, so that a page only has to move points."""
     some = strokes[:_PIECES] or [(0.0, 0.0)]
     last = some[-1][1]
     return np.array(some + [(last, last)] * (_PIECES - len(some)))

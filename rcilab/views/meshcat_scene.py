@@ -22,19 +22,19 @@ class _Node:
     wxyz: Sequence[float] = NO_TURN
     position: Sequence[float] = ORIGIN
     geometry: Any = None
-    """A mesh's geometry, kept for changes of its material."""
+    """Geometry of a mesh, for changes of its material."""
     color: Color = (0, 0, 0)
     opacity: float = 1.0
 
 
 class MeshcatScene:
-    """Draws into a meshcat page of its own that only this machine can open."""
+    """Draws into its own meshcat page, which only this machine can open."""
 
     def __init__(self) -> None:
         self._server = MeshcatServer()
         self._nodes: dict[str, _Node] = {}
         self.visualizer = import_meshcat().Visualizer(window=self._server)
-        """meshcat's own handle; what it offers beyond `Scene` is there: animations, properties."""
+        """meshcat's handle, for features beyond `Scene`, such as animations."""
         self.visualizer["/Background"].set_property("top_color", [0.78, 0.82, 0.86])
         self.visualizer["/Background"].set_property("bottom_color", [0.98, 0.985, 0.99])
         self.visualizer["/Cameras/default/rotated/<object>"].set_property("position", _CAMERA)
@@ -105,7 +105,7 @@ class MeshcatScene:
         self._at(name).set_property("visible", visible)
 
     def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
-        """Changes a mesh's look by sending it again; see `Scene`."""
+        """Changes the style of a mesh by sending it again; see `Scene`."""
         node = self._node(name)
         node.color = node.color if color is None else color
         node.opacity = node.opacity if opacity is None else opacity
@@ -120,11 +120,11 @@ class MeshcatScene:
 
     @contextmanager
     def batch(self) -> Iterator[None]:
-        """Changes are sent at once: meshcat has no batches, and its page draws at its own rate."""
+        """Does nothing: meshcat has no batches and sends changes at once."""
         yield
 
     def flush(self) -> None:
-        """Returns once everything that was drawn has been sent to every open page."""
+        """Waits until all changes have been sent to every open page."""
         self._server.flush()
 
     def as_html(self) -> str:

@@ -1,9 +1,9 @@
 """A meshcat server that only this machine can reach.
 
-meshcat's own server prints a 127.0.0.1 address and listens on every interface, and no option changes that. This one
-runs meshcat's scene tree and page in a thread of ours, with the web port bound to 127.0.0.1 and without the ZeroMQ
-detour: drawing commands are handed over in memory. Tornado refuses websockets of foreign origin by itself (403).
-Its page looks for the websocket beside itself, so that it works below a path of a proxy; meshcat's own looks at /.
+meshcat's own server prints a 127.0.0.1 address but listens on every interface, and has no option for that. This server
+runs meshcat's scene tree and page in a thread of this process, with the web port bound to 127.0.0.1 and without ZeroMQ:
+drawing commands are passed in memory. Tornado refuses websockets of foreign origin (403). The page opens its websocket
+at a path relative to its own, so that it works behind a proxy with a path prefix; meshcat's own page uses /.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from rcilab.core.errors import ConnectionLostError, DeadlineError
 
 _HOST = "127.0.0.1"
 _CONNECT = "viewer.connect();"
-_CONNECT_BESIDE = """viewer.connect(new URL("../", location.href.split("?")[0]).href.replace(/^http/, "ws"));
+_CONNECT_RELATIVE = """viewer.connect(new URL("../", location.href.split("?")[0]).href.replace(/^http/, "ws"));
 if (location.search === "?plain") {
   document.head.insertAdjacentHTML("beforeend", "<style>.dg { display: none }</style>");
 }"""
-_PATIENCE = 10.0  # [s] for the thread to answer; it does so in milliseconds
+_TIMEOUT = 10.0  # [s] for the thread to answer; it does so in milliseconds
 
 
 def import_meshcat() -> Any:
-    """Returns the module; meshcat 0.3.2 imports a module that pyzmq has declared old, which is not ours to report."""
+    """Returns the module, without the warning that meshcat 0.3.2 imports a deprecated module of pyzmq."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         import meshcat.geometry
@@ -46,11 +46,11 @@ class MeshcatServer:
         self._bridge: Any = None
         self._thread = threading.Thread(target=self._serve, name="meshcat", daemon=True)
         self._thread.start()
-        self.web_url = self._ready.result(_PATIENCE)
+        self.web_url = self._ready.result(_TIMEOUT)
         """Address of the page."""
 
     def send(self, command: Any) -> None:
-        """Takes a drawing command (meshcat's own objects) and passes it on to every open page."""
+        """Sends a drawing command (a meshcat object) to every open page."""
         import umsgpack
 
         content: Mapping[str, Any] = command.lower()
@@ -59,17 +59,17 @@ class MeshcatServer:
 
     def get_scene(self) -> str:
         """Returns the whole scene as one HTML page that needs no server."""
-        return self._ask(self._bridge.scene_html)
+        return self._call(self._bridge.scene_html)
 
     def flush(self) -> None:
-        """Returns once every command so far has been passed on."""
-        self._ask(lambda: "")
+        """Waits until all commands have been sent."""
+        self._call(lambda: "")
 
     def close(self) -> None:
         """Stops serving; open pages keep what they show. Calling it again does nothing."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join(_PATIENCE)
+            self._thread.join(_TIMEOUT)
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -77,7 +77,7 @@ class MeshcatServer:
             self._bridge = _build_bridge()
             http, port = _listen(self._bridge.app)
             self._ready.set_result(f"http://{_HOST}:{port}/static/")
-        except Exception as error:  # Whatever went wrong belongs to the caller that waits for the address.
+        except Exception as error:  # The constructor raises it.
             self._ready.set_exception(error)
             return
         self._loop.run_forever()
@@ -87,23 +87,23 @@ class MeshcatServer:
         self._loop.close()
 
     def _post(self, work: Callable[[], None]) -> None:
-        """Runs something in the server's thread, in order, without waiting for it."""
+        """Runs a function in the server's thread, in order, without waiting for it."""
         try:
             self._loop.call_soon_threadsafe(work)
         except RuntimeError as error:
             raise ConnectionLostError("this meshcat server was closed; make a new MeshcatScene") from error
 
-    def _ask(self, question: Callable[[], str]) -> str:
-        answer: Future[str] = Future()
-        self._post(lambda: answer.set_result(question()))
+    def _call(self, function: Callable[[], str]) -> str:
+        result: Future[str] = Future()
+        self._post(lambda: result.set_result(function()))
         try:
-            return answer.result(_PATIENCE)
+            return result.result(_TIMEOUT)
         except TimeoutError as error:
-            raise DeadlineError(f"the meshcat server did not answer within {_PATIENCE:g} s") from error
+            raise DeadlineError(f"the meshcat server did not answer within {_TIMEOUT:g} s") from error
 
 
 def _listen(app: Any) -> tuple[Any, int]:
-    """Returns the HTTP server and its port, any free one, on the loopback interface alone."""
+    """Returns an HTTP server on a free port of the loopback interface, and the port."""
     from tornado.httpserver import HTTPServer
     from tornado.netutil import bind_sockets
 
@@ -114,12 +114,12 @@ def _listen(app: Any) -> tuple[Any, int]:
 
 
 def _build_bridge() -> Any:
-    """Returns meshcat's bridge, which keeps the scene tree, with its ZeroMQ socket replaced by a variable."""
+    """Returns meshcat's bridge, which owns the scene tree, with a variable in place of its ZeroMQ socket."""
     import tornado.web
     from meshcat.servers import zmqserver
 
     class Page(zmqserver.WebSocketHandler):
-        """One open page; meshcat's own handler prints to stderr at each."""
+        """One open page; meshcat's own handler prints to stderr for each."""
 
         def open(self, *args: str, **kwargs: str) -> None:
             self.bridge.websocket_pool.add(self)
@@ -129,7 +129,7 @@ def _build_bridge() -> Any:
             self.bridge.websocket_pool.discard(self)
 
         def on_message(self, message: str | bytes) -> None:
-            pass  # Pages answer only to picture requests, which this server never makes.
+            pass  # Pages reply only to requests for pictures, which this server never sends.
 
     class Front(tornado.web.RequestHandler):
         """The page itself."""
@@ -163,17 +163,17 @@ def _build_bridge() -> Any:
 
 
 def _front_page(zmqserver: Any) -> str:
-    """Returns meshcat's page with the websocket looked for one folder up; with ?plain without meshcat's own menu."""
+    """Returns meshcat's page with a relative websocket address; with ?plain, without meshcat's menu."""
     page = (Path(zmqserver.VIEWER_ROOT) / zmqserver.VIEWER_HTML).read_text(encoding="utf-8")
-    assert _CONNECT in page, "meshcat has another page; look how it connects"
-    return page.replace(_CONNECT, _CONNECT_BESIDE)
+    assert _CONNECT in page, "meshcat's page has changed; check how it connects"
+    return page.replace(_CONNECT, _CONNECT_RELATIVE)
 
 
 class _Reply:
-    """Where the bridge puts its answer in place of a ZeroMQ socket."""
+    """Stores the bridge's reply in place of a ZeroMQ socket."""
 
     def __init__(self) -> None:
         self.last = b""
 
-    def send(self, answer: bytes) -> None:
-        self.last = answer
+    def send(self, reply: bytes) -> None:
+        self.last = reply

@@ -1,4 +1,4 @@
-"""A scene without a screen: it keeps what was drawn, for headless runs, counting and tests."""
+"""A scene without a display, which stores the drawn nodes, for headless use and tests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends
 
 @dataclass(slots=True)
 class DrawnNode:
-    """One node as it stands now; owned by its scene."""
+    """Current state of one node; owned by its scene."""
 
     kind: Literal["frame", "mesh", "polyline", "segments"]
     wxyz: Sequence[float] = NO_TURN
@@ -30,7 +30,7 @@ class DrawnNode:
 
 
 class NullScene:
-    """Draws nothing and knows everything: nodes by name, and how often each was moved."""
+    """Stores nodes by name and counts moves and batches."""
 
     def __init__(self) -> None:
         self.nodes: dict[str, DrawnNode] = {}
@@ -48,24 +48,24 @@ class NullScene:
         axes_length: float = 0.0,
         visible: bool = True,
     ) -> None:
-        """Keeps a coordinate frame; see `Scene`."""
+        """Adds a coordinate frame; see `Scene`."""
         self.nodes[name] = DrawnNode("frame", tuple(wxyz), tuple(position), visible)
 
     def add_mesh(self, name: str, vertices: ArrayLike, faces: ArrayLike, *, color: Color, opacity: float = 1.0) -> None:
-        """Keeps a mesh; see `Scene`."""
+        """Adds a mesh; see `Scene`."""
         count = len(np.asarray(faces))
         self.nodes[name] = DrawnNode(
             "mesh", color=color, opacity=opacity, points=readonly_copy(vertices), triangles=count
         )
 
     def add_polyline(self, name: str, points: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
-        """Keeps a line; see `Scene`."""
+        """Adds a line; see `Scene`."""
         path, shades = line_points(points, color)
         red, green, blue = (int(value) for value in shades[0])
         self.nodes[name] = DrawnNode("polyline", color=(red, green, blue), points=readonly_copy(path))
 
     def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
-        """Keeps lines; see `Scene`."""
+        """Adds lines; see `Scene`."""
         ends, shades = segment_ends(segments, color)
         red, green, blue = (int(value) for value in shades[0, 0])
         self.nodes[name] = DrawnNode("segments", color=(red, green, blue), points=readonly_copy(ends.reshape(-1, 3)))
@@ -86,13 +86,13 @@ class NullScene:
         self._node(name).visible = visible
 
     def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
-        """Changes a mesh's look; see `Scene`."""
+        """Changes the style of a mesh; see `Scene`."""
         node = self._node(name)
         node.color = node.color if color is None else color
         node.opacity = node.opacity if opacity is None else opacity
 
     def remove(self, name: str) -> None:
-        """Forgets a node and everything below it; see `Scene`."""
+        """Removes a node and everything below it; see `Scene`."""
         self._node(name)
         below = name.rstrip("/") + "/"
         self.nodes = {k: v for k, v in self.nodes.items() if k != name and not k.startswith(below)}

@@ -1,26 +1,26 @@
-"""Which numbers stand beside a plot: as many as its height has room for, and some at every height."""
+"""Axis labels of a plot: as many as fit into its height, and at least some at every height."""
 
 from __future__ import annotations
 
 import math
 
-_ROOMY, _CLOSE = 26.0, 13.0  # [px] From number to number: where there is room, and at least. Numbers are 11 px high.
+_ROOMY, _CLOSE = 26.0, 13.0  # [px] Preferred and smallest distance of two labels; a label is 11 px high.
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
-_SHORT = 6  # Characters that a number has at most for a limit to be written beside the plot.
+_SHORT = 6  # Characters of the longest limit that is labelled.
 
 
 def axis_ticks(low: float, high: float, height: float, limits: tuple[float, ...] = ()) -> tuple[float, ...]:
-    """Returns round numbers between the ends of an axis, zero and both sides among them, and its limits.
+    """Returns the labels of an axis: round numbers, with zero and both signs, and its limits.
 
     Args:
         low: Lower end; `high` is -low, or low is 0.
         high: Upper end, more than `low`.
-        height: Of the axis, [px].
-        limits: Bounds within the axis; the short ones are written, and nothing close to them.
+        height: Height of the axis, [px].
+        limits: Limits within the axis; short ones are labelled, and no number close to them.
     """
     per_pixel = (high - low) / height
     step = round_step(_ROOMY * per_pixel)
-    if step > high:  # Nothing but zero would be written.
+    if step > high:  # Only zero would be labelled.
         step = round_step(_CLOSE * per_pixel)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     written = [limit for limit in limits if low <= limit <= high]
@@ -37,7 +37,7 @@ def round_step(least: float) -> float:
 
 
 def _written(value: float) -> str:
-    """Returns a number as a page writes it."""
+    """Returns a number as the page formats it."""
     return f"{value:,.3f}".rstrip("0").rstrip(".")
 
 

@@ -1,4 +1,4 @@
-"""Curves for a screen: few points, no spike lost, limits and violations as areas. No plotting library in here."""
+"""Curves for a display: few points without losing spikes, limits and violations as areas. Needs no plotting library."""
 
 from __future__ import annotations
 
@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 Quantity = Literal["q", "dq", "ddq", "jerk", "tau"]
 QUANTITIES: tuple[Quantity, ...] = ("q", "dq", "ddq", "jerk")
 ORDERS: dict[Quantity, int] = {quantity: order for order, quantity in enumerate(QUANTITIES)}
-"""How many times the angles are differentiated for a signal."""
-"""What a motion has of every joint; a torque takes an arm and its load as well."""
+"""Order of the time derivative of the joint angles; a torque needs an arm and its load instead."""
 
-_WIDENED = 3  # Points that a marked violation reaches to both sides: one bad cycle is still some pixels wide.
-_FARTHEST = 3.0  # Multiple of the limit that a plot reaches at most; `rcilab.check` gives the number beyond.
-_LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for its ticks to be readable.
+_WIDENED = 3  # Points added on both sides of a marked violation, so that a single cycle is some pixels wide.
+_FARTHEST = 3.0  # Largest range of a plot, in multiples of the limit; `rcilab.check` gives the values beyond.
+_LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for readable ticks.
 _ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
 
 
@@ -39,35 +38,35 @@ class Curves:
     t: Array
     """[s], increasing, shape (N,)."""
     values: Array
-    """One column a signal, shape (N, k)."""
+    """One column per signal, shape (N, k)."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Frame:
-    """What one plot shows: everything on one time axis, shape (M,) each."""
+    """Content of one plot, on one time axis; arrays of shape (M,)."""
 
     t: Array
-    """Two instants a bucket, [s]."""
+    """Two instants per bucket, [s]."""
     plan: tuple[Array, ...]
     actual: tuple[Array, ...]
-    """Empty when nothing was recorded."""
+    """Empty without a recording."""
     upper: float
     lower: float
     """The limit, in the unit of the curves."""
     violated: NDArray[np.bool_]
-    """Where a curve is outside its limits, widened to what an eye can see, boolean."""
+    """Where a curve is outside its limits, widened to be visible, boolean."""
     bound: float
-    """The plot reaches from -bound to bound; a curve far beyond its limit leaves it, so that the limit stays seen."""
+    """The axis reaches from -bound to bound; a curve far beyond its limit leaves the plot."""
     end: float
-    """Where the time axis ends, [s]: a round number, so that the axis stands still while a plan is dragged."""
+    """End of the time axis, [s]: a round number, so that the axis does not move while a plan is dragged."""
 
 
 def mark_moment(frame: Frame, moment: float) -> Frame:
-    """Returns a frame with an instant marked as a violation is, whatever the curves do there.
+    """Returns a frame with an instant marked like a violation.
 
     Args:
-        frame: What to mark.
-        moment: When, [s].
+        frame: The frame.
+        moment: The instant, [s].
     """
     here = int(np.abs(frame.t - moment).argmin())
     marked = frame.violated.copy()
@@ -76,17 +75,17 @@ def mark_moment(frame: Frame, moment: float) -> Frame:
 
 
 def decimate(curves: Curves, edges: Array) -> Array:
-    """Returns the smallest and the largest value of every signal in every bucket, in the order they occur.
+    """Returns the smallest and the largest value of every signal in every bucket, in the order of their occurrence.
 
-    No extreme value is lost: whatever a full plot would have shown as a spike is still there.
+    Extreme values are retained, so that every spike is visible.
 
     Args:
-        curves: What to thin out.
+        curves: The curves.
         edges: Times between the buckets, increasing, shape (B + 1,), [s].
 
     Returns:
-        Two rows a bucket, shape (2 B, k). A bucket without samples repeats the value before it; before the first
-        sample and from one bucket after the last on there is NaN.
+        Two rows per bucket, shape (2 B, k). A bucket without samples repeats the value before it. NaN before the first
+        sample and from one bucket after the last sample on.
     """
     buckets, signals = len(edges) - 1, curves.values.shape[1]
     thin = np.full((2 * buckets, signals), np.nan)
@@ -97,9 +96,9 @@ def decimate(curves: Curves, edges: Array) -> Array:
     if not full.size:
         return thin
     starts, values = ends[full], curves.values[ends[0] : ends[-1]]
-    places = starts - ends[0]
-    smallest, largest = np.minimum.reduceat(values, places), np.maximum.reduceat(values, places)
-    rising = _first(values, smallest, places, counts[full]) <= _first(values, largest, places, counts[full])
+    offsets = starts - ends[0]
+    smallest, largest = np.minimum.reduceat(values, offsets), np.maximum.reduceat(values, offsets)
+    rising = _first(values, smallest, offsets, counts[full]) <= _first(values, largest, offsets, counts[full])
     thin[2 * full] = np.where(rising, smallest, largest)
     thin[2 * full + 1] = np.where(rising, largest, smallest)
     last = int(np.searchsorted(edges, curves.t[-1], side="right")) - 1
@@ -108,18 +107,18 @@ def decimate(curves: Curves, edges: Array) -> Array:
     return thin
 
 
-def _first(values: Array, wanted: Array, places: NDArray[np.intp], counts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Returns the row in which every bucket first has its wanted value."""
+def _first(values: Array, targets: Array, offsets: NDArray[np.intp], counts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Returns the row in which every bucket first has its target value."""
     rows = np.arange(len(values))[:, np.newaxis]
-    is_it = values == np.repeat(wanted, counts, axis=0)
-    return np.minimum.reduceat(np.where(is_it, rows, len(values)), places)
+    is_target = values == np.repeat(targets, counts, axis=0)
+    return np.minimum.reduceat(np.where(is_target, rows, len(values)), offsets)
 
 
 def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = None) -> Curves:
-    """Returns a planned signal, one column a joint; the torque that it takes `model` with its load.
+    """Returns a planned signal, one column per joint; for the torque, `model` with its load is needed.
 
-    Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares, in
-    the cycles behind the end, too: what those show is drawn at the end.
+    Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares,
+    including those in the cycles after the end, which are drawn at the end.
     """
     if quantity == "q":
         return Curves(t=motion.times, values=motion.q)
@@ -132,18 +131,18 @@ def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = N
 
 
 def _differences(path: JointPath, order: int) -> JointPath:
-    """Returns the backward differences of rows that follow on standing still, one a cycle."""
+    """Returns the backward differences of rows, one per cycle, that start at standstill."""
     return np.diff(np.concatenate((np.repeat(path[:1], order, axis=0), path)), n=order, axis=0) / CYCLE_TIME**order
 
 
 def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
-    """Returns a signal of rows that are streamed one a cycle, as the controller computes it: by backward differences.
+    """Returns a signal of rows streamed one per cycle, as the controller computes it: by backward differences.
 
-    What a fitted curve would make of a corner between two rows is more than the controller sees of it.
+    A fitted curve would overshoot at a corner between two rows.
 
     Args:
         q: Commanded joint angles, shape (N, n), [rad].
-        quantity: Which signal.
+        quantity: The signal.
         model: The arm with its load, for the torque.
     """
     t: Array = np.linspace(0.0, CYCLE_TIME * (len(q) - 1), len(q))
@@ -157,14 +156,14 @@ def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None =
 
 
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:
-    """Returns a recorded signal: measured q and dq; ddq and jerk of the commands, as the controller computes them.
+    """Returns a recorded signal: measured q and dq, or ddq and jerk of the commands, as the controller computes them.
 
     Args:
         t: Time since the first command, [s], shape (N,).
         q: Measured joint angles, [rad], shape (N, n).
         q_c: Commanded joint angles, [rad], shape (N, n).
         dq: Measured joint velocities, [rad/s], shape (N, n).
-        quantity: Which signal.
+        quantity: The signal.
     """
     if quantity in ("q", "dq"):
         return Curves(t=t, values=q if quantity == "q" else dq)
@@ -172,10 +171,10 @@ def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantit
 
 
 def backward_differences(t: Array, values: Array, order: int) -> Array:
-    """Returns the derivative of a signal as the controller computes it; zero where a cycle before is missing."""
+    """Returns the derivative of a signal as the controller computes it; zero where an earlier cycle is missing."""
     found = np.zeros_like(values)
     if len(values) > order:
-        # A lost cycle makes a gap: differences across it would be no derivative.
+        # A difference across a lost cycle is not a derivative.
         steps = np.rint(np.diff(t) / CYCLE_TIME)
         whole = np.ones(len(t) - order, dtype=bool)
         for shift in range(order):
@@ -193,14 +192,14 @@ def bounds_of(limits: JointLimits, quantity: Quantity) -> tuple[Array, Array]:
 
 
 def build_error_frame(t: Array, errors: Array, last: float, least: float, buckets: int = 240) -> Frame:
-    """Returns what a plot of errors shows: no limits, and an axis that reaches as far as the largest of them.
+    """Returns the content of a plot of errors, without limits and with an axis that reaches to the largest error.
 
     Args:
         t: Times of the errors, [s], shape (N,).
-        errors: One column a curve, in the unit to be shown, shape (N, k).
-        last: Where the other plots end, [s], so that this one fits below them.
-        least: Smallest range of the axis to each side, in the unit to be shown; see `rcilab.i18n.plot_scale`.
-        buckets: Number of buckets the time is cut into.
+        errors: One column per curve, in the unit shown, shape (N, k).
+        last: End of the other plots, [s], so that this plot fits below them.
+        least: Smallest range of the axis to each side, in the unit shown; see `rcilab.i18n.plot_scale`.
+        buckets: Number of time buckets.
     """
     edges = np.linspace(0.0, last, buckets + 1)
     times = np.repeat(edges[:-1], 2)
@@ -223,7 +222,7 @@ def build_error_frame(t: Array, errors: Array, last: float, least: float, bucket
 
 
 def last_time(*curves: Curves | None) -> float:
-    """Returns when the last of these curves ends, [s]; 1 without any."""
+    """Returns the end of the last of these curves, [s]; 1 without any."""
     return max([0.0] + [float(c.t[-1]) for c in curves if c is not None and len(c.t)]) or 1.0
 
 
@@ -236,19 +235,19 @@ def build_frame(
     buckets: int = 240,
     factor: float = math.degrees(1.0),
 ) -> Frame:
-    """Returns what a plot of one quantity of the joints shows.
+    """Returns the content of a plot of one quantity of the joints.
 
     Args:
         plan: Planned curves of all joints, or None.
         actual: Recorded curves of all joints, or None.
-        limits: The arm's limits; of the angles of a plan that leads back from outside its range, as far as it does.
-        quantity: Which signal.
+        limits: The arm's limits; for the angles of a recovery from outside the range, the widened ones.
+        quantity: The signal.
         joint: The joint to show in its own unit, from 1; 0 shows all, each in percent of its limit (of its range, with
             0 in the middle, for q).
-        buckets: Number of buckets the time is cut into.
-        factor: How many of the unit to be shown one SI unit is; degrees as a rule.
+        buckets: Number of time buckets.
+        factor: Factor from the SI unit to the unit shown; to degrees by default.
     """
-    if quantity == "q" and plan is not None:  # As `check` does: a motion that starts outside may lead back.
+    if quantity == "q" and plan is not None:  # As in `check`: a motion that starts outside may move back inside.
         limits = range_from(limits, plan.values[0], RECOVERY_RANGE)
     low, high = bounds_of(limits, quantity)
 
@@ -262,14 +261,14 @@ def build_frame(
 def build_tool_frame(
     plan: Curves | None, actual: Curves | None, limit: float | None, factor: float, buckets: int = 240
 ) -> Frame:
-    """Returns what a plot of a signal of the tool or the elbow shows.
+    """Returns the content of a plot of a signal of the tool or the elbow.
 
     Args:
-        plan: Planned, one column, or None.
-        actual: Recorded, likewise.
-        limit: Its largest value, in the unit of the curves; None where it has none.
-        factor: How many of the unit to be shown one SI unit is.
-        buckets: Number of buckets the time is cut into.
+        plan: Planned curve, one column, or None.
+        actual: Recorded curve, one column, or None.
+        limit: Limit, in the unit of the curves; None without one.
+        factor: Factor from the SI unit to the unit shown.
+        buckets: Number of time buckets.
     """
     upper = np.nan if limit is None else factor * limit
     return _frame(plan, actual, lambda values: factor * values, np.nan, upper, buckets)
@@ -289,7 +288,7 @@ def _frame(
     t = np.repeat(edges[:-1], 2)
     t[1::2] = 0.5 * (edges[:-1] + edges[1:])
     t[-1] = last
-    t = np.append(t, max(end, last))  # One more point, so that the limits run on to the end of the axis.
+    t = np.append(t, max(end, last))  # One more point, so that the limits extend to the end of the axis.
 
     def thin(curves: Curves | None) -> tuple[Array, ...]:
         if curves is None or not len(curves.t):
@@ -302,7 +301,7 @@ def _frame(
     curves = np.nan_to_num(np.array((*planned, *recorded))) if planned or recorded else np.zeros((1, len(t)))
     outside = ((curves > upper) | (curves < lower)).any(axis=0)
     violated = np.convolve(outside, np.ones(2 * _WIDENED + 1), mode="same") > 0.5
-    violated[-2:] = False  # The last two points span the empty rest of the axis.
+    violated[-2:] = False  # The last two points span the empty end of the axis.
     farthest = float(np.abs(curves).max())
     bounds = [abs(bound) for bound in (upper, lower) if np.isfinite(bound)]
     limit = max(bounds) if bounds else max(farthest, _LEAST_RANGE)

@@ -1,8 +1,8 @@
-"""The little that is needed of a 3D scene, so that what draws an arm need not know what shows it.
+"""The interface of a 3D scene, independent of the library that displays it.
 
 A scene is a tree of named nodes. A name is a path, "/live/joint1/joint2", and a node moves with the nodes above it.
-Three implementations: `ViserScene` (the page), `MeshcatScene` (notebooks), `NullScene` (headless: it keeps what was
-drawn). A scene belongs to the thread that draws; none of its methods may be called from two threads at once.
+Three implementations: `ViserScene` (the page), `MeshcatScene` (notebooks), `NullScene` (headless, stores the nodes). A
+scene belongs to the thread that draws; its methods must not be called from two threads at once.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Scene(Protocol):
             wxyz: Orientation in the node above, unit quaternion.
             position: Origin in the node above, [m].
             axes_length: Length of the drawn axes, [m]; 0 draws none.
-            visible: Whether it and what is below it is shown.
+            visible: Whether the node and everything below it is shown.
         """
         ...
 
@@ -65,26 +65,26 @@ class Scene(Protocol):
         Args:
             name: Path of the node.
             points: Shape (N, 3), N >= 2, in the node above, [m].
-            color: One RGB colour, shape (3,), or one a point, shape (N, 3), 0-255.
+            color: One RGB colour, shape (3,), or one per point, shape (N, 3), 0-255.
             thickness: [m].
         """
         ...
 
     def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
-        """Adds lines that need not be connected, or moves those of that name: as many as before is cheap.
+        """Adds separate lines, or moves those of that name, which is cheap if their number is unchanged.
 
         Args:
             name: Path of the node.
             segments: Start and end of each, shape (N, 2, 3), N >= 1, in the node above, [m].
-            color: One RGB colour, shape (3,), or one an end, shape (N, 2, 3), 0-255.
-            thickness: [m]; stays as it was where only points move.
+            color: One RGB colour, shape (3,), or one per end, shape (N, 2, 3), 0-255.
+            thickness: [m]; unchanged if lines of that name are moved.
         """
         ...
 
     def set_transform(
         self, name: str, *, wxyz: Sequence[float] | None = None, position: Sequence[float] | None = None
     ) -> None:
-        """Moves a node in the node above it; what is None stays."""
+        """Sets the transform of a node in the node above it; None leaves a part unchanged."""
         ...
 
     def set_visible(self, name: str, visible: bool) -> None:
@@ -92,7 +92,7 @@ class Scene(Protocol):
         ...
 
     def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
-        """Changes a mesh's colour or opacity; what is None stays."""
+        """Changes the colour or the opacity of a mesh; None leaves it unchanged."""
         ...
 
     def remove(self, name: str) -> None:
@@ -100,7 +100,7 @@ class Scene(Protocol):
         ...
 
     def batch(self) -> AbstractContextManager[None]:
-        """Returns a context whose changes are shown together, in one frame. Keep it short."""
+        """Returns a context manager whose changes are shown together, in one frame. Keep the block short."""
         ...
 
 
@@ -137,5 +137,5 @@ def segment_ends(segments: ArrayLike, color: ArrayLike) -> tuple[np.ndarray, np.
 
 
 def unknown_node(name: str) -> UsageError:
-    """Returns the error for a node that was never added, or that was removed."""
+    """Returns the error for a node that was never added or was removed."""
     return UsageError(f"the scene has no node {name!r}; add it first, and do not use it after remove()")

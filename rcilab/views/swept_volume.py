@@ -1,4 +1,4 @@
-"""The volume that an arm sweeps, as the capsules of its links at several moments in one mesh."""
+"""The swept volume of an arm: the capsules of its links at several configurations in one mesh."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROUND = 12  # Segments around a capsule.
 
 
 def swept_mesh(model: DrawableModel, q: ArrayLike) -> Mesh:
-    """Returns the moving links, simplified to capsules, at several configurations.
+    """Returns a mesh of the moving links, simplified to capsules, at several configurations.
 
     Args:
         model: The arm.
@@ -29,28 +29,28 @@ def swept_mesh(model: DrawableModel, q: ArrayLike) -> Mesh:
     for row in as_path(q, len(joints), "q", "rad").tolist():
         T = np.eye(4)
         for joint, shape, angle in zip(joints, shapes, row, strict=True):
-            T = T @ _turn(joint.origin, joint.axis, angle)
+            T = T @ _joint_transform(joint.origin, joint.axis, angle)
             found += [Mesh(mesh.vertices @ T[:3, :3].T + T[:3, 3], mesh.faces) for mesh in shape]
     return merge_meshes(found)
 
 
 def _capsule(capsule: Capsule) -> Mesh:
     start, end = np.asarray(capsule.start, dtype=np.float64), np.asarray(capsule.end, dtype=np.float64)
-    way = end - start
-    length = float(np.linalg.norm(way))
+    axis = end - start
+    length = float(np.linalg.norm(axis))
     angles = [0.5 * math.pi * step / 3.0 for step in range(4)]
     low = [(capsule.radius * math.cos(a), -capsule.radius * math.sin(a)) for a in reversed(angles)]
     high = [(capsule.radius * math.cos(a), length + capsule.radius * math.sin(a)) for a in angles]
     profile = [(max(radius, 0.0), height) for radius, height in (*low, *high)]
     mesh = revolve(profile, segments=_ROUND)
-    z = way / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
+    z = axis / length if length > 0.0 else np.array((0.0, 0.0, 1.0))
     x = np.cross(z, (1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0))
     x /= np.linalg.norm(x)
     return Mesh(mesh.vertices @ np.stack((x, np.cross(z, x), z)) + start, mesh.faces)
 
 
-def _turn(origin: Array, axis: Array, angle: float) -> Array:
-    """Returns a shift and then a turn about a unit axis (Rodrigues), shape (4, 4)."""
+def _joint_transform(origin: Array, axis: Array, angle: float) -> Array:
+    """Returns a translation followed by a rotation about a unit axis (Rodrigues), shape (4, 4)."""
     x, y, z = axis
     across = np.array(((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)))
     T = np.eye(4)

@@ -20,23 +20,23 @@ TOOL_QUANTITIES: tuple[ToolQuantity, ...] = ("speed", "acceleration", "psi")
 def tool_curves(model: RobotModel, t: Array, q: JointPath, quantity: ToolQuantity) -> Curves:
     """Returns one column: speed of the tool, [m/s], its acceleration, [m/s^2], or the arm angle, [rad].
 
-    The first two as the controller computes them: the lengths of backward differences of the tool's places.
+    The first two are computed as in the controller: norms of backward differences of the tool's positions.
 
     Args:
         model: The arm with its tool.
         t: [s], shape (N,).
         q: Joint angles, shape (N, n), [rad].
-        quantity: Which; only 7-axis arms have an arm angle.
+        quantity: The signal; only 7-axis arms have an arm angle.
     """
     if quantity == "psi":
         values = model.solver.arm_angle_path(q)
         return Curves(t=t, values=np.asarray(values)[:, np.newaxis])
-    places = model.position_path(q)
-    rates = backward_differences(t, places, 1 if quantity == "speed" else 2)
+    positions = model.position_path(q)
+    rates = backward_differences(t, positions, 1 if quantity == "speed" else 2)
     return Curves(t=t, values=np.sqrt((rates * rates).sum(axis=1))[:, np.newaxis])
 
 
 def tool_limit(limits: Limits, quantity: ToolQuantity) -> float | None:
-    """Returns the largest value that is allowed, in SI units; None where there is no bound."""
+    """Returns the limit of a signal, in SI units; None without one."""
     tool = limits.cartesian
     return {"speed": tool.translation_velocity, "acceleration": tool.translation_acceleration, "psi": None}[quantity]

@@ -1,4 +1,4 @@
-"""How much of the limits a motion uses, as colours along the path of its tool."""
+"""Limit utilisation of a motion as colours along the path of its tool."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcilab.core.arrays import Array
 
 
 def usage_colors(usage: Array) -> Array:
-    """Returns colours from blue-green (little of any limit used) over amber to red (a limit is broken), (N, 3)."""
+    """Returns colours from blue-green (low utilisation) over amber to red (a limit is violated), shape (N, 3)."""
     stops = np.array([0.0, 0.55, 0.9, 0.999, 1.0])
     colors = np.array([[20, 140, 170], [50, 170, 110], [225, 165, 25], [235, 130, 15], [214, 30, 38]], dtype=float)
     shares = np.clip(usage, 0.0, 1.0)

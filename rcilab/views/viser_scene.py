@@ -1,4 +1,4 @@
-"""The scene of the page: a viser server's scene tree."""
+"""The scene of the page: the scene tree of a viser server."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.views.scene import NO_TURN, ORIGIN, Color, line_points, segment_ends, unknown_node
-from rcilab.views.viser_ext.orientation import turn
+from rcilab.views.viser_ext.orientation import set_orientation
 
 if TYPE_CHECKING:
     import viser
 
 
 class ViserScene:
-    """Draws into a viser server (or into one client's private scene).
+    """Draws into a viser server, or into the private scene of one client.
 
-    Meshes go through `add_mesh_simple`: coloured trimesh nodes come out nearly black without an environment map.
+    Meshes are added by `add_mesh_simple`: coloured trimesh nodes are nearly black without an environment map.
 
     Args:
         server: A `viser.ViserServer` or `viser.ClientHandle`.
-        shadows: Whether meshes cast and receive shadows; False is lighter on software rendering.
+        shadows: Whether meshes cast and receive shadows; False is faster with software rendering.
     """
 
     def __init__(self, server: viser.ViserServer | viser.ClientHandle, *, shadows: bool = True) -> None:
@@ -51,8 +51,8 @@ class ViserScene:
             position=np.asarray(position),
             visible=visible,
         )
-        # A page keeps the pose of a removed node of the same name, and viser sends none that equals the default: send
-        # it for certain, by setting another one first.
+        # A page retains the pose of a removed node of the same name, and viser does not send a pose that equals the
+        # default. Setting another pose first makes viser send it.
         handle = self._handles[name]
         handle.wxyz, handle.position = (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0)
         handle.wxyz, handle.position = np.asarray(wxyz), np.asarray(position)
@@ -80,7 +80,7 @@ class ViserScene:
         )
 
     def add_segments(self, name: str, segments: ArrayLike, *, color: ArrayLike, thickness: float = 0.004) -> None:
-        """Adds or moves lines; see `Scene`. What has not changed does not travel."""
+        """Adds or moves lines; see `Scene`. Unchanged arrays are not sent."""
         ends, shades = segment_ends(segments, color)
         points, shades = ends.astype(np.float32), _line_colors(shades)
         handle = self._handles.get(name)
@@ -98,7 +98,7 @@ class ViserScene:
         """Moves a node; see `Scene`."""
         handle = self._handle(name)
         if wxyz is not None:
-            turn(handle, wxyz)
+            set_orientation(handle, wxyz)
         if position is not None:
             handle.position = position
 
@@ -107,33 +107,33 @@ class ViserScene:
         self._handle(name).visible = visible
 
     def set_style(self, name: str, *, color: Color | None = None, opacity: float | None = None) -> None:
-        """Changes a mesh's look; see `Scene`."""
+        """Changes the style of a mesh; see `Scene`."""
         handle = self._handle(name)
         if color is not None:
             handle.color = color
         if opacity is not None:
             handle.opacity = _viser_opacity(opacity)
 
-    def on_drag(self, name: str, act: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
-        """Hears of a mesh that is dragged with the mouse; the camera then stays where it is.
+    def on_drag(self, name: str, callback: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
+        """Registers a callback for a mesh that is dragged with the mouse; such a drag does not move the camera.
 
         Args:
             name: Name of the mesh.
-            act: Called with viser's `SceneNodeDragEvent`, on the server's event loop.
+            callback: Called with viser's `SceneNodeDragEvent`, on the server's event loop.
         """
-        self._handle(name).on_drag(act)
+        self._handle(name).on_drag(callback)
 
-    def on_click(self, name: str, act: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
-        """Hears of a mesh that is clicked.
+    def on_click(self, name: str, callback: Callable[[Any], Coroutine[Any, Any, None]]) -> None:
+        """Registers a callback for a mesh that is clicked.
 
         Args:
             name: Name of the mesh.
-            act: Called with viser's `SceneNodePointerEvent`, on the server's event loop.
+            callback: Called with viser's `SceneNodePointerEvent`, on the server's event loop.
         """
-        self._handle(name).on_click(act)
+        self._handle(name).on_click(callback)
 
     def ignore_drag(self, name: str) -> None:
-        """Lets a drag that begins on this mesh turn the camera again."""
+        """Removes the drag callback of a mesh; a drag on it moves the camera again."""
         self._handle(name).remove_drag_callback()
 
     def remove(self, name: str) -> None:
@@ -144,7 +144,7 @@ class ViserScene:
 
     @contextmanager
     def batch(self) -> Iterator[None]:
-        """Sends the changes together. viser counts these globally: a thread inside stalls every other one's."""
+        """Sends the changes together. viser counts batches globally: a thread in a batch delays those of all others."""
         with self._server.atomic():
             yield
 
@@ -156,10 +156,10 @@ class ViserScene:
 
 
 def _line_colors(colors: np.ndarray) -> np.ndarray:
-    """Returns what viser's lines are to be given: the page takes it for linear light, and draws it paler than meant."""
+    """Returns line colours converted to linear light, as which viser's page interprets them."""
     return np.round(255.0 * (colors / 255.0) ** 2.2).astype(np.uint8)
 
 
 def _viser_opacity(opacity: float) -> float | None:
-    """Returns viser's spelling: None is solid, which also keeps the mesh out of the transparent pass."""
+    """Returns the opacity for viser: None for a solid mesh, which is then not drawn in the transparent pass."""
     return None if opacity >= 1.0 else max(0.0, float(opacity))

@@ -1,4 +1,4 @@
-"""Light, ground, axes and background: the room the arm stands in."""
+"""Light, ground, axes, background and camera of the page."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
 _CAMERA, _LOOK_AT = (1.80, -1.85, 1.22), (0.17, 0.02, 0.49)  # [m]
 _UP = (0.0, 0.0, 1.0)
 _FIELD_OF_VIEW = 0.75  # [rad] from the upper edge to the lower one
-_ROOM = 1.4  # [m] How much of the scene's width the arm and its target's handles take.
+_ROOM = 1.4  # [m] Width of the arm with the handles of its target.
 
 
 def place_camera(server: viser.ViserServer) -> None:
-    """Puts the camera of new pages where the whole arm is seen."""
+    """Sets the initial camera of new pages, with the whole arm in view."""
     camera = server.initial_camera
     camera.position, camera.look_at, camera.fov = _CAMERA, _LOOK_AT, _FIELD_OF_VIEW
 
 
 class ViserEnvironment:
-    """A page's camera, and where it stands at first: further back as the window, or the panels, leave little room.
+    """The camera of a page: its initial position is farther away if the window or the panels leave little room.
 
-    A camera that was moved by hand stays until it is reset.
+    A camera that the user has moved is not changed until it is reset.
 
     Args:
-        camera: Of a page that has just connected.
+        camera: Camera of a page that has just connected.
     """
 
     def __init__(self, camera: viser.CameraHandle) -> None:
@@ -38,39 +38,39 @@ class ViserEnvironment:
 
         @camera.on_update
         async def _(_camera: object) -> None:
-            if self._stands_at(self._placed, _CAMERA) and not self._stands_at(standing_place(camera.aspect)):
-                self.go()
+            if self._is_at(self._placed, _CAMERA) and not self._is_at(camera_position(camera.aspect)):
+                self.reset()
 
-    def go(self) -> None:
-        """Brings the camera there, upright, from wherever it is."""
-        camera, self._placed = self._camera, standing_place(self._camera.aspect)
+    def reset(self) -> None:
+        """Moves the camera to its initial position, upright."""
+        camera, self._placed = self._camera, camera_position(self._camera.aspect)
         with camera.client.atomic():
             camera.position = self._placed
             camera.look_at = np.array(_LOOK_AT)
             camera.up_direction = _UP
 
-    def _stands_at(self, *places: ArrayLike) -> bool:
-        return any(np.allclose(self._camera.position, place, atol=1e-3) for place in places)
+    def _is_at(self, *positions: ArrayLike) -> bool:
+        return any(np.allclose(self._camera.position, position, atol=1e-3) for position in positions)
 
 
-def standing_place(aspect: float) -> np.ndarray:
-    """Returns from where the whole arm is seen, base axes, shape (3,), [m].
+def camera_position(aspect: float) -> np.ndarray:
+    """Returns a camera position with the whole arm in view, base axes, shape (3,), [m].
 
     Args:
-        aspect: Width over height of what is seen of the scene.
+        aspect: Width over height of the visible part of the scene.
     """
     look_at = np.array(_LOOK_AT)
     behind = np.array(_CAMERA) - look_at
-    width = 2.0 * np.linalg.norm(behind) * math.tan(0.5 * _FIELD_OF_VIEW) * aspect  # [m] seen there
+    width = 2.0 * np.linalg.norm(behind) * math.tan(0.5 * _FIELD_OF_VIEW) * aspect  # [m] Visible at the arm.
     return look_at + max(1.0, _ROOM / width) * behind
 
 
-def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:
-    """Lights the scene and lays the ground.
+def add_environment(server: viser.ViserServer, *, full: bool, dark: bool = False) -> None:
+    """Adds light, background, ground and base axes.
 
     Args:
         server: The page.
-        full: Whether with shadows and reflections, which cost software rendering seconds.
+        full: Whether with shadows and reflections, which take seconds with software rendering.
         dark: Whether the page is dark.
     """
     scene = server.scene
@@ -96,7 +96,7 @@ def furnish(server: viser.ViserServer, *, full: bool, dark: bool = False) -> Non
 
 
 def _backdrop(dark: bool) -> np.ndarray:
-    """Returns a soft vertical gradient, so that a white arm stands out, (H, W, 3) uint8."""
+    """Returns a soft vertical gradient as background of a white arm, (H, W, 3) uint8."""
     top, bottom = np.array([222.0, 231.0, 241.0]), np.array([250.0, 251.0, 253.0])
     if dark:
         top, bottom = np.array([20.0, 25.0, 33.0]), np.array([50.0, 58.0, 70.0])

@@ -26,7 +26,7 @@ from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store, UiState
 from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
-from rcilab.views.access_control import Gate
+from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_ext.client_messages import send_file
 from rcilab.views.viser_server import GuardedServer
 from rcilab.views.viser_stage import ViserEnvironment
@@ -119,7 +119,7 @@ class Workbench:
         """Serves the page, then connects to the robot in the background."""
         ask = self.dispatcher.ask
         self.live = live.LiveChannel(self.session.stop, self._receive, lambda: self._door.guard.count_malformed())
-        gate = Gate(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
+        gate = AccessPolicy(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
         self._door = GuardedServer(
             self._bound,
             gate,
@@ -153,10 +153,10 @@ class Workbench:
         self.renderer.close()
         self._door.close()
 
-    def _deliver(self, page: int | None, name: str, stream: IO[bytes], is_unwanted: Callable[[], bool]) -> bool:
+    def _deliver(self, page: int | None, name: str, stream: IO[bytes], is_cancelled: Callable[[], bool]) -> bool:
         """Has a page's browser save a file; a page that has gone wants it no more. Returns whether all was sent."""
         client = self.server.get_clients().get(-1 if page is None else page)
-        return client is not None and send_file(client, name, stream, is_unwanted)
+        return client is not None and send_file(client, name, stream, is_cancelled)
 
     def _follow_pages(self) -> None:
         ask = self.dispatcher.ask
@@ -218,7 +218,7 @@ class Workbench:
     def _bring_back(self, page: int) -> None:
         """Shows a page what it showed at first; what other pages see is theirs."""
         if page in self._views:
-            self._views[page].go()
+            self._views[page].reset()
 
     def _here(self, page: int) -> None:
         """Hears that a page is there; only that of the operator counts for the robot side."""

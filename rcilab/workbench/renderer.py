@@ -196,13 +196,13 @@ class Renderer:
         gui.set_panel_label(self._text("panel.main"))
         self._panels = []
         for tab, (label, _, *kinds) in zip(self._tabs, _TABS, strict=False):
-            with tab.filled_anew(self._text(label)):
+            with tab.rebuild(self._text(label)):
                 for kind in kinds:
                     panel = kind(self._text, self._ask)
                     panel.build(gui, state)
                     self._panels.append(panel)
         self._timeline = TimelinePanel(self._text, self._ask)
-        with self._tabs[-1].filled_anew(self._text("panel.timeline")):
+        with self._tabs[-1].rebuild(self._text("panel.timeline")):
             self._timeline.build(gui, state)
         self._panels.append(self._timeline)
 

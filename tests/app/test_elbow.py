@@ -74,7 +74,7 @@ def test_without_a_free_arm_angle_none_is_called_free():
     for place in (None, box):
         psi, why = nearest_free(model, target, 2.5, box=place)
         goal = goal_toward(model, target, model.home, psi)
-        is_said = "free range" in EN.say(why)
+        is_said = "free range" in EN.render(why)
         assert is_said == bool(free_in_words(look_at_elbow(model, goal.q, place))) == (place is None)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rcilab.views.elbow_view import OUTWARD
-from rcilab.views.viser_stage import standing_place
+from rcilab.views.viser_stage import camera_position
 
 _ASKED = """async () => {
   const ask = window.requestAnimationFrame, began = performance.now();
@@ -89,7 +89,7 @@ def test_words_stay_inside_the_scene_and_a_lost_camera_comes_back(page):
     page.tab.locator("#rl-brand").click()
     page.tab.keyboard.press("h")
     page.wait(
-        lambda: abs(page.tab.evaluate("__viserMutable.camera.position.y") - standing_place(camera.aspect)[2]) < 0.01,
+        lambda: abs(page.tab.evaluate("__viserMutable.camera.position.y") - camera_position(camera.aspect)[2]) < 0.01,
         "the camera where the page opened it",
     )
 

@@ -22,7 +22,7 @@ def test_a_motion_of_a_session_runs_slowly_from_its_first_row_on():
         with pytest.raises(InvalidValueError, match=r"speed.override"):
             robot.execute(motion, speed_override=0.05)
         run = robot.execute(motion, speed_override=0.25)
-    assert run.paced
+    assert run.has_speed_override
     assert run.plan.duration == pytest.approx(motion.duration / 0.25, abs=CYCLE_TIME)
     assert np.abs(run.plan.dq).max() < 0.26 * np.abs(motion.dq).max()
     assert np.nanmax(np.abs(run.error)) < 1e-9

@@ -153,7 +153,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         wait_for(lambda: panel.state.outcome is not None, what="the run")
         run = panel.state.outcome.run
         assert run is not None
-        assert run.paced
+        assert run.has_speed_override
         assert run.stop_time is not None
         assert run.tracking.joint_max.max() < 1e-6  # Against what was asked for: the hold, the pace, until the stop.
         with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:

@@ -36,7 +36,7 @@ def test_a_run_comes_back_as_it_was(tmp_path):
     assert back.model is not None
     assert back.model.fingerprint == MODEL.fingerprint  # Tool and load, too.
     assert (back.setup, back.stopped, back.realtime, back.is_complete) == (SETUP, "on request", True, True)
-    assert not back.paced
+    assert not back.has_speed_override
     assert back.report is not None
     assert back.report.ok
     assert repr(back) == repr(run)
@@ -53,7 +53,7 @@ def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(
     assert run is not None
     rcilab.load_run(path).save(tmp_path / "again.rcirun")
     for kept in (run, rcilab.load_run(path), rcilab.load_run(tmp_path / "again.rcirun")):
-        assert kept.paced
+        assert kept.has_speed_override
         assert kept.plan is not None
         assert np.array_equal(kept.plan.q, PLAN.q)
         assert kept.tracking is not None
@@ -158,7 +158,7 @@ def test_other_files_are_refused_in_words(tmp_path):
         decode_run(MAGIC + struct.pack("<I", 99))
     with pytest.raises(InvalidValueError, match="does not exist"):
         rcilab.load_run(tmp_path / "nothing.rcirun")
-    with pytest.raises(InvalidValueError, match=r"there are \.rcirun, \.csv"):
+    with pytest.raises(InvalidValueError, match=r"known: \.rcirun, \.csv"):
         some_run().save(tmp_path / "a.xls")
     with pytest.raises(InvalidValueError, match="cannot be written"):
         some_run().save(tmp_path / "no" / "folder.rcirun")
@@ -190,7 +190,7 @@ def test_what_a_stranger_wrote_into_a_file_is_shown_and_not_run():
 @pytest.mark.parametrize(
     ("kind", "make", "words"),
     [
-        ("TAIL", lambda: b'{"stopped": 7}', "no text"),
+        ("TAIL", lambda: b'{"stopped": 7}', "not text"),
         ("TAIL", lambda: b"[1]", "is damaged"),
         ("TAIL", lambda: b"[" * 100_000, "is damaged"),
         ("CYCL", lambda: struct.pack("<I", 4_000_000_000) + zlib.compress(b""), "are more than 1000000"),

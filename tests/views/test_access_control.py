@@ -6,9 +6,9 @@ from urllib.parse import quote
 
 import pytest
 
-from rcilab.views.access_control import Gate, Guesses, is_loopback
+from rcilab.views.access_control import AccessPolicy, WrongTokenDelay, is_loopback
 
-LOCAL = Gate(host="127.0.0.1", port=8080)
+LOCAL = AccessPolicy(host="127.0.0.1", port=8080)
 
 
 @pytest.mark.parametrize("origin", [None, "null", "http://evil.example", "http://127.0.0.1:8081", "file://127.0.0.1:8080",
@@ -29,7 +29,7 @@ def test_a_rebound_name_is_refused_even_when_host_and_origin_agree():
 
 
 def test_a_token_is_asked_for_and_kept_in_a_cookie():
-    gate = Gate(host="0.0.0.0", port=80, token="s3cret")
+    gate = AccessPolicy(host="0.0.0.0", port=80, token="s3cret")
     name = "rcilab_token_80"
     assert gate.refuse_page("10.0.0.5:80", "/", None) is not None
     assert gate.refuse_page("10.0.0.5:80", "/?token=wrong", None) is not None
@@ -41,7 +41,7 @@ def test_a_token_is_asked_for_and_kept_in_a_cookie():
 
 @pytest.mark.parametrize("token", ["a+b;c&d#e%20 f/g=h", "四个字的密码很长很长", '"quoted", \\ and , more'])
 def test_a_token_of_any_characters_goes_through_address_and_cookie(token: str) -> None:
-    gate = Gate(host="0.0.0.0", port=80, token=token)
+    gate = AccessPolicy(host="0.0.0.0", port=80, token=token)
     assert gate.refuse_page("10.0.0.5:80", f"/?token={quote(token, safe='')}", None) is None
     assert gate.cookie is not None
     assert gate.cookie.isascii()
@@ -51,17 +51,17 @@ def test_a_token_of_any_characters_goes_through_address_and_cookie(token: str) -
 
 
 def test_only_a_wrong_token_is_a_guess() -> None:
-    gate = Gate(host="0.0.0.0", port=80, token="s3cret")
+    gate = AccessPolicy(host="0.0.0.0", port=80, token="s3cret")
     missing, wrong = (gate.refuse_page("10.0.0.5:80", path, None) for path in ("/", "/?token=x"))
     assert missing is not None
     assert wrong is not None
-    assert (missing.is_guess, wrong.is_guess) == (False, True)
+    assert (missing.has_wrong_token, wrong.has_wrong_token) == (False, True)
     assert "s3cret" not in wrong.reason
 
 
 def test_every_guess_waits_longer_than_the_one_before() -> None:
     now = 0.0
-    guesses = Guesses(lambda: now)
+    guesses = WrongTokenDelay(lambda: now)
     delays = [guesses.delay() for _ in range(10)]
     assert delays == sorted(delays)
     assert (delays[0], delays[1], delays[-1]) == (0.1, 0.2, 5.0)

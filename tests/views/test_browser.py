@@ -13,7 +13,7 @@ import pytest
 from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import furnish
+from rcilab.views.viser_stage import add_environment
 
 pytestmark = pytest.mark.browser
 
@@ -56,7 +56,7 @@ def test_the_page_shows_the_arm_where_our_kinematics_put_it(browser: Any) -> Non
 
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        furnish(server, full=False)
+        add_environment(server, full=False)
         model = load_model("xMatePro7")
         arm = ArmView(ViserScene(server, shadows=False), "live", model)
         arm.show(model.home)

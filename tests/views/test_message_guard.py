@@ -14,8 +14,8 @@ import zstandard
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from rcilab.views.access_control import Gate
-from rcilab.views.viser_ext.message_guard import LARGEST_MESSAGE, LARGEST_UPLOAD, LONGEST_TEXT, for_anyone
+from rcilab.views.access_control import AccessPolicy
+from rcilab.views.viser_ext.message_guard import MAX_MESSAGE, MAX_TEXT, MAX_UPLOAD, allow_spectators
 from rcilab.views.viser_server import GuardedServer, listen
 from tests.waiting import wait_for
 
@@ -32,7 +32,7 @@ class Page:
         self.refused: list[int] = []
         self.guard = GuardedServer(
             bound,
-            Gate(host="127.0.0.1", port=self.port),
+            AccessPolicy(host="127.0.0.1", port=self.port),
             may_act=lambda page: page not in self.watching,
             refuse=self.refused.append,
         )
@@ -108,7 +108,7 @@ def link(page):
 def test_what_is_no_value_of_a_control_never_reaches_it(page, link):
     for value in (NAN, INF, -INF, "0.5", [0.5], None, True, {"a": 1}, 2**63):
         page.update(link, page.slider, value)
-    for value in (1, None, ["x"], "x" * (LONGEST_TEXT + 1)):
+    for value in (1, None, ["x"], "x" * (MAX_TEXT + 1)):
         page.update(link, page.text, value)
     for value in ("c", 0, None):
         page.update(link, page.choice, value)
@@ -163,7 +163,7 @@ def send_part(page, link, name: str, index: int, content: bytes) -> None:
 
 def test_an_upload_is_bounded_before_it_is_kept(page, link):
     states = page.guard.viser.gui._current_file_upload_states
-    start_upload(page, link, "huge", LARGEST_UPLOAD + 1, 4)
+    start_upload(page, link, "huge", MAX_UPLOAD + 1, 4)
     send_part(page, link, "huge", 0, b"x" * 1000)
     start_upload(page, link, "split", 1000, 10**6)
     send_part(page, link, "never announced", 0, b"x" * 1000)
@@ -202,7 +202,7 @@ def test_a_page_that_goes_leaves_no_upload_behind(page):
 def test_a_message_without_an_end_costs_its_sender_the_connection(page):
     with page.open() as link:
         with suppress(ConnectionClosed):
-            link.send(b"x" * (LARGEST_MESSAGE + 1))
+            link.send(b"x" * (MAX_MESSAGE + 1))
         with pytest.raises(ConnectionClosed):
             deque((link.recv(timeout=20) for _ in range(10_000)), maxlen=0)
 
@@ -250,7 +250,7 @@ def test_a_page_that_watches_changes_nothing_and_is_shown_what_all_see(page, lin
         assert (page.text.value, page.slider.value, tuple(page.gizmo.position)) == ("start", 0.5, (0.0, 0.0, 0.0))
         assert page.heard == []
         assert page.refused == [watcher], "said once a second"
-        for_anyone(page.box)
+        allow_spectators(page.box)
         page.update(other, page.box, True)
         wait_for(lambda: page.box.value)
         page.box.value = False

@@ -14,7 +14,7 @@ from rcilab.views.meshcat_scene import MeshcatScene
 from rcilab.views.null_scene import NullScene
 from rcilab.views.scene import Scene
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import furnish, place_camera, standing_place
+from rcilab.views.viser_stage import add_environment, camera_position, place_camera
 
 TRIANGLE = ([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0, 1, 2]])
 
@@ -104,8 +104,8 @@ def test_the_stage_can_be_set_again_while_the_page_is_open() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         place_camera(server)
-        furnish(server, full=True)
-        furnish(server, full=False, dark=True)
+        add_environment(server, full=True)
+        add_environment(server, full=False, dark=True)
         assert server.initial_camera.fov < 1.0  # [rad] a portrait lens
     finally:
         server.stop()
@@ -114,7 +114,7 @@ def test_the_stage_can_be_set_again_while_the_page_is_open() -> None:
 @pytest.mark.parametrize("aspect", [2.0, 1.0, 0.7, 0.4, 0.1])
 def test_the_arm_and_the_handles_of_its_target_fit_beside_the_panels(aspect: float) -> None:
     model = load_model("xMatePro7")
-    camera, look_at = standing_place(aspect), np.array([0.17, 0.02, 0.49])
+    camera, look_at = camera_position(aspect), np.array([0.17, 0.02, 0.49])
     ahead = (look_at - camera) / np.linalg.norm(look_at - camera)
     aside = np.cross(ahead, (0.0, 0.0, 1.0))
     aside /= np.linalg.norm(aside)

@@ -16,9 +16,9 @@ import viser
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from rcilab.views.access_control import Gate
-from rcilab.views.arrivals import MOST_WAITING
-from rcilab.views.viser_ext.message_guard import is_orderly
+from rcilab.views.access_control import AccessPolicy
+from rcilab.views.pending_connections import MAX_PENDING
+from rcilab.views.viser_ext.message_guard import is_bounded
 from rcilab.views.viser_server import GuardedServer, listen
 
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -28,7 +28,7 @@ PROTOCOL = f"viser-v{viser.__version__}"
 def guarded() -> Iterator[tuple[GuardedServer, int]]:
     bound = listen("127.0.0.1", 0)
     port = bound.getsockname()[1]
-    with GuardedServer(bound, Gate(host="127.0.0.1", port=port)) as server:
+    with GuardedServer(bound, AccessPolicy(host="127.0.0.1", port=port)) as server:
         yield server, port
 
 
@@ -76,7 +76,7 @@ def test_a_number_that_is_none_reaches_no_control(guarded) -> None:
 def test_closing_lets_go_of_the_port() -> None:
     bound = listen("127.0.0.1", 0)
     port = bound.getsockname()[1]
-    GuardedServer(bound, Gate(host="127.0.0.1", port=port)).close()
+    GuardedServer(bound, AccessPolicy(host="127.0.0.1", port=port)).close()
     listen("127.0.0.1", port).close()
 
 
@@ -93,13 +93,13 @@ def test_a_taken_port_is_refused_and_nothing_stays_open() -> None:
     [(1.0, True), (float("nan"), False), ([0.0, float("inf")], False), ("nan", True), ([[1], (2.0,)], True)],
 )
 def test_a_message_is_looked_into_to_the_end(value, finite):
-    assert is_orderly(value) is finite
+    assert is_bounded(value) is finite
 
 
 def test_with_an_open_address_every_page_that_brings_the_token_gets_in_and_no_other() -> None:
     bound = listen("127.0.0.1", 0)
     port = bound.getsockname()[1]
-    gate = Gate(host="0.0.0.0", port=port, token="s3cret")
+    gate = AccessPolicy(host="0.0.0.0", port=port, token="s3cret")
     headers = {"Origin": f"http://127.0.0.1:{port}"}
     with GuardedServer(bound, gate, decorate=lambda page: page):
         for secret, status in (("?token=s3cret", 200), ("", 403), ("?token=guessed", 403)):
@@ -166,12 +166,12 @@ def test_text_that_is_no_unicode_ends_no_page(guarded) -> None:
 
 def test_who_only_connects_takes_nobodys_place(guarded) -> None:
     _, port = guarded
-    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MOST_WAITING)]
+    idle = [socket.create_connection(("127.0.0.1", port)) for _ in range(3 * MAX_PENDING)]
     try:
         assert fetch(port, f"127.0.0.1:{port}")[0] == 200
         with open_page(port) as page:
             assert page.recv(timeout=10)
-        for link in idle[: 2 * MOST_WAITING]:  # The oldest are gone.
+        for link in idle[: 2 * MAX_PENDING]:  # The oldest are gone.
             link.settimeout(10.0)
             with suppress(ConnectionResetError):
                 assert link.recv(1) == b""
@@ -183,11 +183,11 @@ def test_who_only_connects_takes_nobodys_place(guarded) -> None:
 def test_a_server_without_a_file_left_says_so_once_and_goes_on() -> None:
     code = """
 import resource, socket, sys, time
-from rcilab.views.access_control import Gate
+from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_server import GuardedServer, listen
 bound = listen("127.0.0.1", 0)
 port = bound.getsockname()[1]
-server = GuardedServer(bound, Gate(host="127.0.0.1", port=port))
+server = GuardedServer(bound, AccessPolicy(host="127.0.0.1", port=port))
 links = [socket.socket() for _ in range(60)]
 resource.setrlimit(resource.RLIMIT_NOFILE, (links[-1].fileno() + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
 for link in links:
@@ -205,6 +205,6 @@ server.close()
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert ran.stdout.strip() == "HTTP/1.1 200"
     assert [line for line in ran.stderr.splitlines() if line] == [
-        "no page can be connected just now: Too many open files; those that are open go on. Close programs, or allow "
-        "more open files (ulimit -n)"
+        "no page can be connected at present: Too many open files; open pages are not affected. Close programs, or "
+        "allow more open files (ulimit -n)"
     ]

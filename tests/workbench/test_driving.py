@@ -168,7 +168,7 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     assert run.plan.duration > motion.duration + 0.5
     assert run.plan.goal == pytest.approx(motion.goal, abs=1e-9)
     assert np.degrees(np.nanmax(np.abs(run.tracking.joint))) < 2.0  # Against what was asked for, pauses and all.
-    assert run.paced
+    assert run.has_speed_override
     assert np.array_equal(played_path(idle.store.state)[1], run.plan.q)  # And so it is drawn.
     assert idle.renderer.place_at(1.0) == 1.0
 

@@ -75,7 +75,7 @@ def test_the_legend_says_so_in_both_languages(slowed):
 
 
 def test_a_run_from_a_file_is_drawn_as_it_was_streamed():
-    run = some_run(paced=True)
+    run = some_run(has_speed_override=True)
     shown = replayed(initial_state(), run)
     assert streamed_rows(shown) is run.plan.q
     assert streamed_rows(replayed(initial_state(), some_run())) is None

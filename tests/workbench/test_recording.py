@@ -107,10 +107,10 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     sent = []
     actions = bench.dispatcher._export
 
-    def deliver(page, name, stream, is_unwanted):
+    def deliver(page, name, stream, is_cancelled):
         stream.seek(0)
         sent.append((page, name, stream.read()))
-        return not is_unwanted()
+        return not is_cancelled()
 
     monkeypatch.setattr(actions, "_deliver", deliver)
     bench.dispatcher.ask(ExportRun(page=8, ending=".csv"))  # A page that only watches gets none.
@@ -128,7 +128,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
     wait(lambda: told(bench) == "export.missing", "what is missing")
     wait(lambda: bench.store.state.export is None, "the end of the export")
     monkeypatch.setattr(
-        actions, "_deliver", lambda page, name, stream, is_unwanted: bool(wait(is_unwanted, "a cancel"))
+        actions, "_deliver", lambda page, name, stream, is_cancelled: bool(wait(is_cancelled, "a cancel"))
     )
     bench.dispatcher.ask(ExportRun(page=7, ending=".csv"))
     wait(lambda: bench.store.state.export is not None, "an export")

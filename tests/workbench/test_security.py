@@ -14,7 +14,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from rcilab.core.errors import UsageError
-from rcilab.views.access_control import Gate
+from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.workbench import security
 from rcilab.workbench.live import LIVE_PATH, Answer, Here, LiveChannel, PageMessage, Seek, Take
@@ -86,7 +86,10 @@ class Door:
         bound = bind("127.0.0.1", 0)
         self.port = bound.getsockname()[1]
         self.guard = GuardedServer(
-            bound, Gate(host="127.0.0.1", port=self.port), decorate=decorate, routes={LIVE_PATH: self.live.serve}
+            bound,
+            AccessPolicy(host="127.0.0.1", port=self.port),
+            decorate=decorate,
+            routes={LIVE_PATH: self.live.serve},
         )
         self.server = self.guard.viser
 

@@ -23,7 +23,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.notebook.robot_words import outcome_html as notebook_outcome
-from rcilab.recording.html_facts import tell_stop
+from rcilab.recording.html_facts import describe_stop
 from rcilab.recording.run import build_run, describe_end
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html
@@ -80,7 +80,7 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
     said = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
     assert f"{name} (reported as kInstabilityDetection)" in said
-    chinese = tell_stop(name, FAULTS, Text("zh"))
+    chinese = describe_stop(name, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese
     told = notebook_outcome(
         Outcome(what="execute", error=error), load_model("xMatePro7"), None, translator.Text("en", "rcilab.notebook")

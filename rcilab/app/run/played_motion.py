@@ -25,7 +25,7 @@ def streamed_rows(state: UiState) -> JointPath | None:
     paced, run = paced_of(state), None if state.recording is None else state.recording.run
     if paced is not None:
         return paced.q
-    is_it = run is not None and run.paced and state.plan is not None and run.plan is state.plan.motion
+    is_it = run is not None and run.has_speed_override and state.plan is not None and run.plan is state.plan.motion
     return state.plan.motion.q if is_it and state.plan is not None else None  # Read from a file.
 
 

@@ -1,12 +1,12 @@
-// Plots that share one time axis. Every pixel column shows the smallest and the largest value in it: no spike is lost.
+// Plots that share one time axis. Every pixel column shows its smallest and largest value, so that no spike is lost.
 "use strict";
 
 const COLORS = ["#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a"];
-const LEFT = 58, RIGHT = 14, TITLE = 20, AXIS = 22, BETWEEN = 22;  // [px] The last one: from tick to tick, at least.
+const LEFT = 58, RIGHT = 14, TITLE = 20, AXIS = 22, BETWEEN = 22;  // [px] BETWEEN: smallest distance of two ticks.
 
 class Plots {
   constructor(box, rows, t, faults, onSeek) {
-    Object.assign(this, { box, rows, t, faults, onSeek, joint: 0, place: 0 });
+    Object.assign(this, { box, rows, t, faults, onSeek, joint: 0, cursor: 0 });
     this.end = t.length ? Math.max(t[t.length - 1], 1e-3) : 1;
     this.range = [0, this.end];
     this.canvas = document.createElement("canvas"); this.over = document.createElement("canvas");
@@ -56,7 +56,7 @@ class Plots {
     const each = (height - AXIS) / this.rows.length;
     this.rows.forEach((row, i) => this.drawRow(g, row, i * each + TITLE, each - TITLE - 5, edges));
     this.drawTimes(g, height - AXIS);
-    this.show(this.place);
+    this.show(this.cursor);
   }
 
   drawRow(g, row, top, height, edges) {
@@ -72,7 +72,7 @@ class Plots {
     low = ticks[0]; high = ticks[ticks.length - 1];
     const y = (v) => top + height * (high - v) / (high - low);
     g.save();
-    g.beginPath(); g.rect(LEFT, top - 1, this.columns, height + 2); g.clip();  // A curve at the very end is seen whole.
+    g.beginPath(); g.rect(LEFT, top - 1, this.columns, height + 2); g.clip();  // Margin for the width of a curve at the edge.
     g.fillStyle = "#fbfcfe"; g.fillRect(LEFT, top, this.columns, height);
     g.lineWidth = 1; g.strokeStyle = "#e6ebf2";
     for (const v of ticks) line(g, LEFT, y(v), LEFT + this.columns, y(v));
@@ -117,13 +117,13 @@ class Plots {
     g.fillStyle = "#6b7a90"; g.textAlign = "center";
     const most = this.columns + LEFT + RIGHT;
     for (let v = Math.ceil(a / step) * step; v <= b + 1e-9; v += step) {
-      const said = `${label(v, step)} s`, half = g.measureText(said).width / 2 + 2;
-      g.fillText(said, Math.min(LEFT + (v - a) / (b - a) * this.columns, most - half), top + 11);
+      const text = `${label(v, step)} s`, half = g.measureText(text).width / 2 + 2;
+      g.fillText(text, Math.min(LEFT + (v - a) / (b - a) * this.columns, most - half), top + 11);
     }
   }
 
-  show(time) {  // The cursor and the values under it, over curves that stay as they are.
-    this.place = time;
+  show(time) {  // Draws the cursor and the values at it on the upper canvas; the curves are not drawn again.
+    this.cursor = time;
     const g = this.over.getContext("2d"), ratio = window.devicePixelRatio || 1, width = this.box.clientWidth, height = this.box.clientHeight;
     g.setTransform(ratio, 0, 0, ratio, 0, 0); g.clearRect(0, 0, width, height);
     const [a, b] = this.range, x = LEFT + (time - a) / (b - a) * this.columns;
@@ -142,13 +142,13 @@ class Plots {
 
 function line(g, x0, y0, x1, y1) { g.beginPath(); g.moveTo(x0, y0); g.lineTo(x1, y1); g.stroke(); }
 function nice(step) { const p = 10 ** Math.floor(Math.log10(step)), m = step / p; return p * (m <= 1 ? 1 : m <= 2 ? 2 : m <= 5 ? 5 : 10); }
-function fixed(v, digits) { const said = v.toFixed(digits); return Number(said) === 0 ? said.replace("-", "") : said; }
+function fixed(v, digits) { const text = v.toFixed(digits); return Number(text) === 0 ? text.replace("-", "") : text; }
 function label(v, step) { return fixed(v, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))); }
-function scale(low, high, row, height) {  // The ticks of a plot: as many as fit, one at either end, around all its curves.
+function scale(low, high, row, height) {  // Ticks of a plot: as many as fit, with one at each end, around all curves.
   if (!(low <= high)) low = high = 0;
   if (row.error) { high = Math.max(Math.abs(low), Math.abs(high), row.least); low = row.positive ? 0 : -high; }
   else if (high - low < 2 * row.least) { const middle = (low + high) / 2; low = middle - row.least; high = middle + row.least; }
-  const most = Math.max(2, Math.floor(height / BETWEEN));  // Around zero there are two parts, however large.
+  const most = Math.max(2, Math.floor(height / BETWEEN));  // An axis around zero always has two intervals.
   let step = nice((high - low) / most);
   while (count(low, high, step) > most) step = nice(step * 1.01);
   const first = Math.floor(low / step + 1e-6);

@@ -1,4 +1,4 @@
-// Puts the page together: arrays out of the file, scene, plots, tables, and one clock for all of them.
+// Builds the page: unpacks the arrays, creates scene, plots and tables, and drives them by one clock.
 (async () => {
   "use strict";
   const $ = (id) => document.getElementById(id);
@@ -6,9 +6,9 @@
   const packed = Uint8Array.from(atob($("arrays").textContent), (c) => c.charCodeAt(0));
   const bytes = await new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   const types = { "<f4": Float32Array, "<u4": Uint32Array, "u1": Uint8Array };
-  const array = (place) => new types[place.kind](bytes, place.at, place.count);
-  const rows = run.arrays.t.count, pieces = (place, n) => {
-    const all = array(place);
+  const array = (ref) => new types[ref.kind](bytes, ref.at, ref.count);
+  const rows = run.arrays.t.count, pieces = (ref, n) => {
+    const all = array(ref);
     return Array.from({ length: n }, (_, j) => all.subarray(j * rows, (j + 1) * rows));
   };
 

@@ -1,4 +1,4 @@
-// The arm in 3D: WebGL 2, matrices column by column as it wants them. Names follow T_a_b, the pose of b in a.
+// The arm in 3D with WebGL 2; matrices are column-major. Names follow T_a_b, the pose of b in a.
 "use strict";
 
 const mat = {
@@ -10,7 +10,7 @@ const mat = {
     return m;
   },
   identity: () => new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]),
-  turn([x, y, z], angle, [px, py, pz]) {  // A rotation about an axis at a place.
+  turn([x, y, z], angle, [px, py, pz]) {  // Rotation about an axis through the point p.
     const c = Math.cos(angle), s = Math.sin(angle), k = 1 - c;
     return new Float32Array([
       k * x * x + c, k * x * y + s * z, k * x * z - s * y, 0, k * x * y - s * z, k * y * y + c, k * y * z + s * x, 0,
@@ -119,7 +119,7 @@ class Scene {
     const points = array(path.points), error = array(path.error);
     const stops = [[20, 150, 160], [60, 175, 90], [240, 150, 20], [214, 48, 38]];
     const tint = (i) => {
-      if (error[i] !== error[i]) return [0.55, 0.58, 0.63];  // Compared with nothing.
+      if (error[i] !== error[i]) return [0.55, 0.58, 0.63];  // No reference.
       const x = Math.min(Math.max(error[i] / path.worst, 0), 1) * 3, k = Math.min(Math.floor(x), 2), f = x - k;
       return stops[k].map((c, d) => (c + (stops[k + 1][d] - c) * f) / 255);
     };
@@ -156,7 +156,7 @@ class Scene {
     gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     const { yaw, pitch, distance, at } = this.camera;
     const eye = [at[0] + distance * Math.cos(pitch) * Math.cos(yaw), at[1] + distance * Math.cos(pitch) * Math.sin(yaw), at[2] + distance * Math.sin(pitch)];
-    const shift = mat.identity(); shift[13] = 0.27;  // The tables lie over the lower edge.
+    const shift = mat.identity(); shift[13] = 0.27;  // The tables cover the lower edge.
     const view = mat.mul(shift, mat.mul(mat.perspective(0.62, width / height, 0.05, 20), mat.look(eye, at)));
     const poses = this.links(q);
     gl.enable(gl.DEPTH_TEST); gl.enable(gl.BLEND); gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
@@ -170,7 +170,7 @@ class Scene {
     gl.depthMask(false);
     this.paths.forEach((path) => this.drawPath(path, view, width, height));
     if (planned && q.some((angle, i) => Math.abs(angle - planned[i]) > 2e-3)) {
-      gl.depthMask(true); gl.colorMask(false, false, false, false);  // Only its nearest surface is to shine through.
+      gl.depthMask(true); gl.colorMask(false, false, false, false);  // Draw only its nearest surface.
       this.drawArm("arm", view, this.links(planned), eye, [0.27, 0.55, 1, 0.34]);
       gl.colorMask(true, true, true, true); gl.depthFunc(gl.EQUAL);
       this.drawArm("arm", view, this.links(planned), eye, [0.27, 0.55, 1, 0.34]);

@@ -1,8 +1,8 @@
-"""Setting a property of a viser handle to what it is already costs next to nothing.
+"""Cached property types, so that setting a property of a viser handle to its current value is cheap.
 
-A page sets hundreds of properties many times a second, nearly all of them to what they are. viser 1.1 builds four
-types anew at each, to see whether the value is an array of one of them, and reads the types of a handle's properties
-anew for every handle. That was a fifth of what the page's process did.
+A page sets hundreds of properties many times per second, nearly all of them to their current values. viser 1.1 builds
+four types for each assignment, to check whether the value is an array of one of them, and reads the property types
+again for every handle. That took a fifth of the page process's time.
 
 Unnecessary once viser caches the types of the properties of a handle.
 """
@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 _CONVERTED = (npt.NDArray[np.float16], npt.NDArray[np.float32], npt.NDArray[np.float64], npt.NDArray[np.uint8])
-"""Types of properties that viser converts a value to. It also looks into tuples of any length."""
+"""Property types to which viser converts values. It also converts the elements of tuples of any length."""
 
 
 def install() -> None:
-    """Has every handle look at its types once; values, conversions and messages stay viser's. May be called again."""
+    """Patches viser; values, conversions and messages are unchanged. May be called again."""
     from viser._assignable_props_api import AssignablePropsBase
 
     base: Any = AssignablePropsBase
@@ -37,7 +37,7 @@ def install() -> None:
 
 @cache
 def converted_properties(props: type) -> frozenset[str]:
-    """Returns the names of a handle's properties whose values viser may convert; all others it takes as they are."""
+    """Returns the names of a handle's properties whose values viser may convert."""
     return frozenset(name for name, hint in _hints(props).items() if _is_converted(hint))
 
 

@@ -1,7 +1,7 @@
-"""Messages to one page for which viser has no public call.
+"""Messages to one page for which viser has no public function.
 
-Unnecessary once `viser.ClientHandle` runs JavaScript, once a node of the shared scene can be hidden for one client, and
-once `ClientHandle.send_file_download` takes a stream.
+Unnecessary once `viser.ClientHandle` can run JavaScript, can hide a node of the shared scene for one client, and
+accepts a stream in `send_file_download`.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     import viser
 
 _PART = 1024 * 1024  # [bytes] As viser.
-_WAITING = 8  # Messages to a page that may be queued while a file is sent.
+_MAX_QUEUED = 8  # Messages to a page that may be queued while a file is sent.
 _PAUSE = 0.005  # [s]
 
 
 def run_javascript(client: viser.ClientHandle, source: str) -> None:
-    """Has one page run a script."""
+    """Runs a script on one page."""
     from viser import _messages
 
     client.gui._websock_interface.queue_message(_messages.RunJavascriptMessage(source=source))
@@ -36,16 +36,16 @@ def show_node(client: viser.ClientHandle, name: str, *, visible: bool) -> None:
     client.gui._websock_interface.queue_message(_messages.SetSceneNodeVisibilityMessage(name, visible))
 
 
-def send_file(client: viser.ClientHandle, name: str, stream: IO[bytes], is_unwanted: Callable[[], bool]) -> bool:
-    """Hands a file to a page's browser, part by part, so that it need not fit into memory; returns whether all went.
+def send_file(client: viser.ClientHandle, name: str, stream: IO[bytes], is_cancelled: Callable[[], bool]) -> bool:
+    """Sends a file to a page's browser in parts, so that it need not fit into memory; returns whether it is complete.
 
-    `client.send_file_download` takes all of it at once.
+    `client.send_file_download` needs the whole file in memory.
 
     Args:
         client: The page.
-        name: What the browser saves it as.
-        stream: Read from its beginning.
-        is_unwanted: Asked between the parts; True gives up.
+        name: File name in the browser.
+        stream: Content, read from its beginning.
+        is_cancelled: Called between the parts; True cancels the transfer.
     """
     from viser import _messages
 
@@ -62,11 +62,11 @@ def send_file(client: viser.ClientHandle, name: str, stream: IO[bytes], is_unwan
         )
     )  # fmt: skip
     for index in range(math.ceil(size / _PART)):
-        while len(buffer.message_from_id) > _WAITING and not buffer.done:
-            if is_unwanted():
+        while len(buffer.message_from_id) > _MAX_QUEUED and not buffer.done:
+            if is_cancelled():
                 return False
             time.sleep(_PAUSE)
-        if buffer.done or is_unwanted():
+        if buffer.done or is_cancelled():
             return False
         part = _messages.FileTransferPart(None, transfer_uuid=transfer, part_index=index, content=stream.read(_PART))
         connection.queue_message(part)

@@ -1,11 +1,12 @@
-"""The buttons' icons, out of an archive that is opened once; and their hints, which travel in the icons.
+"""Icons of buttons from an archive that is opened once, with the hints of the buttons in them.
 
-viser 1.1 remembers 32 icons and opens its archive of 6000 anew for every other one, which takes 30 ms; a page like
-ours has more than 32, so each time it was built that was a second and a half.
+viser 1.1 caches 32 icons and opens its archive of 6000 icons for every other one, which takes 30 ms. A page with more
+than 32 icons took one and a half seconds to build.
 
-It takes a hint for every control, and its page shows none over a button. Ours finds it in the icon (`names.js`).
+viser accepts a hint for every control, but its page shows none for a button. Here the hint is an attribute of the icon,
+which `names.js` reads.
 
-Unnecessary once viser keeps every icon that it has read, and shows the hint of a button.
+Unnecessary once viser caches all icons and shows the hints of buttons.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ from typing import Any
 from zipfile import ZipFile
 
 HINT = "data-rl-hint"
-"""The attribute of an icon that says what its button does."""
+"""Attribute of an icon with the hint of its button."""
 
-_hint: ContextVar[str | None] = ContextVar("hint", default=None)  # Of the button that is being made.
+_hint: ContextVar[str | None] = ContextVar("hint", default=None)  # Of the button that is being added.
 
 
 def install() -> None:
-    """Makes viser's buttons take their icons from here; may be called again."""
+    """Patches viser's buttons to use these icons. May be called again."""
     from viser import _gui_api, _gui_handles
 
-    users: tuple[Any, ...] = (_gui_api, _gui_handles)  # Where viser 1.1 looks the function up.
+    users: tuple[Any, ...] = (_gui_api, _gui_handles)  # The modules that import the function in viser 1.1.
     if users[0].svg_from_icon is _hinting_svg_of:
         return
     for module in users:
@@ -39,7 +40,7 @@ def install() -> None:
 
 
 def _hinting(add: Callable[..., Any]) -> Callable[..., Any]:
-    """Returns a method that adds a button, with its hint known to who draws the icon."""
+    """Wraps a method that adds a button, to pass its hint to `_hinting_svg_of`."""
 
     @wraps(add)
     def add_hinted(self: Any, *args: Any, **options: Any) -> Any:
@@ -57,7 +58,7 @@ def svg_of(icon: str) -> str:
     """Returns an icon as an <svg> element.
 
     Args:
-        icon: Its name, such as "player-play".
+        icon: Name of the icon, such as "player-play".
 
     Raises:
         KeyError: No icon has this name.
@@ -66,7 +67,7 @@ def svg_of(icon: str) -> str:
 
 
 def _hinting_svg_of(icon: str) -> str:
-    """Returns an icon, with the hint of the button that is being made."""
+    """Returns an icon with the hint of the button that is being added."""
     hint, svg = _hint.get(), svg_of(icon)
     return svg if hint is None else svg.replace("<svg", f'<svg {HINT}="{escape(hint)}"', 1)
 
@@ -75,5 +76,5 @@ def _hinting_svg_of(icon: str) -> str:
 def _archive() -> ZipFile:
     from viser import _icons
 
-    # In memory, so that no file stays open as long as the program lives.
+    # In memory, so that no file stays open.
     return ZipFile(BytesIO((_icons.ICONS_DIR / "tabler-icons.zip").read_bytes()))

@@ -1,9 +1,9 @@
-"""Writing to a page from any thread: wakes viser's event loop only from inside it, and only when it waits.
+"""Thread-safe events for viser's message buffers, which wake the event loop only if it waits.
 
-viser 1.1 pushes a message by calling `set()` of an asyncio event in whatever thread writes, which walks the event's
-waiters while the loop may be changing them ("deque mutated during iteration"), and wakes them in the wrong thread. It
-also wakes the loop for every message, though what has come is looked at 60 times a second anyway: two thirds of the
-times there is nothing to do, and a wake costs as much as all the rest of a message.
+viser 1.1 calls `set()` of an asyncio event in the thread that sends a message. It iterates over the event's waiters
+while the loop may change them ("deque mutated during iteration"), and wakes them in the wrong thread. It also wakes the
+loop for every message, although the loop sends only 60 times per second: two thirds of the wake-ups find nothing to do,
+and a wake-up takes as long as the rest of sending a message.
 
 Unnecessary once viser wakes its event loop with `call_soon_threadsafe`, at most once per pass of its sender.
 """
@@ -21,29 +21,29 @@ if TYPE_CHECKING:
 
 
 class LoopEvent:
-    """What `asyncio.Event` is, but it belongs to one loop and may be set from any thread.
+    """An `asyncio.Event` of one loop that may be set from any thread.
 
     Args:
-        loop: The loop whose tasks wait for it.
-        is_held: Whether it shall stay as it is now, because it will be set once more.
+        loop: The loop whose tasks wait for the event.
+        is_held: Whether `set` has no effect for now, because another call will follow.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop, is_held: Callable[[], bool] = lambda: False) -> None:
         self._loop, self._is_held = loop, is_held
-        self._lock = threading.Lock()  # Between a look at the flag and the beginning of a wait it must not be set.
+        self._lock = threading.Lock()  # The flag must not be set between its check and the start of a wait.
         self._is_set = False
         self._waiting: list[asyncio.Future[None]] = []
 
     def is_set(self) -> bool:
-        """Returns whether it was set since it was cleared."""
+        """Returns whether the event is set."""
         return self._is_set
 
     def clear(self) -> None:
-        """Lets the next `wait` wait."""
+        """Clears the event."""
         self._is_set = False
 
     def set(self) -> None:
-        """Wakes who waits: at once on the loop, else as soon as the loop comes to it."""
+        """Sets the event and wakes the waiting tasks."""
         if self._is_held():
             return
         with self._lock:
@@ -53,11 +53,11 @@ class LoopEvent:
         if _running_loop() is self._loop:
             self._wake()
         else:
-            with suppress(RuntimeError):  # The loop is closed: nothing waits any more.
+            with suppress(RuntimeError):  # The loop is closed.
                 self._loop.call_soon_threadsafe(self._wake)
 
     async def wait(self) -> bool:
-        """Returns once it is set; on the loop only."""
+        """Waits until the event is set. Must run on the loop."""
         with self._lock:
             if self._is_set:
                 return True
@@ -76,7 +76,7 @@ class LoopEvent:
 
 
 def install() -> None:
-    """Has every message buffer that viser makes from now on use such events. May be called again."""
+    """Patches the message buffers that viser creates from now on. May be called again."""
     from viser.infra import _infra as module
     from viser.infra._async_message_buffer import AsyncMessageBuffer
 
@@ -94,7 +94,7 @@ def install() -> None:
             self.flush_event = LoopEvent(event_loop)
 
         def push(self, message: Message) -> None:
-            """Takes a message as a batch of one."""
+            """Adds a message as a batch of one."""
             self.atomic_start()
             try:
                 super().push(message)
@@ -102,7 +102,7 @@ def install() -> None:
                 self.atomic_end()
 
         def atomic_end(self) -> None:
-            """Ends a batch; the end of the last one informs the loop that there is something to send."""
+            """Ends a batch; the end of the last batch wakes the loop."""
             with self.buffer_lock:
                 self.atomic_counter -= 1
             self.message_event.set()

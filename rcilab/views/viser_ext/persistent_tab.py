@@ -1,6 +1,6 @@
-"""A tab of viser's that stays, open or not, while everything in it is made anew.
+"""A viser tab whose contents can be rebuilt.
 
-Unnecessary once viser's tabs have a public call that removes their children.
+Unnecessary once viser's tabs have a public function that removes their children.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from typing import Any
 
 
 class PersistentTab:
-    """Keeps its place: a tab that is taken away and comes back is another one, to hands, layout and keyboard.
+    """A tab that is retained while its contents are replaced, so that position, selection and focus are unchanged.
 
     Args:
-        add: Adds a tab, `add(label, icon)`: that of a tab group or of a panel.
-        icon: Its picture.
+        add: Function of a tab group or a panel that adds a tab, `add(label, icon)`.
+        icon: Icon of the tab.
     """
 
     def __init__(self, add: Callable[[str, Any], Any], icon: str) -> None:
@@ -23,15 +23,15 @@ class PersistentTab:
         self._tab: Any = None
 
     @contextmanager
-    def filled_anew(self, label: str) -> Iterator[None]:
-        """Puts what is added inside the block into the tab, then takes out what was there before.
+    def rebuild(self, label: str) -> Iterator[None]:
+        """Returns a context manager: controls added in its block replace the previous contents of the tab.
 
         Args:
-            label: Its name from now on.
+            label: New label of the tab.
         """
         if self._tab is None:
             self._tab = self._add(label, self._icon)
-        elif self._tab._label != label:  # viser 1.1 has no public spelling for a tab's name and what it holds.
+        elif self._tab._label != label:  # viser 1.1 has no public attributes for the label and the children of a tab.
             self._tab._label = label
             self._tab.icon = self._icon
         former = tuple(self._tab._children.values())

@@ -1,8 +1,8 @@
-r"""No text can end a page: what is no Unicode travels with its escapes.
+r"""Escaping of text that cannot be encoded, which would otherwise close the connection to a page.
 
-A lone surrogate (half a character, as `json` reads from "\ud800" and Python makes of a file name that is no UTF-8)
-cannot be encoded. viser 1.1 meets it while it sends, closes the connection, and does so again with every page that
-comes, because it repeats to a new page what it said to the others.
+A lone surrogate (half a character, which `json` reads from "\ud800", and which Python puts into a file name that is not
+UTF-8) cannot be encoded. viser 1.1 fails when it sends the text and closes the connection, also for every new page,
+because it sends previous messages to new pages.
 
 Unnecessary once viser encodes text with `errors="backslashreplace"`.
 """
@@ -13,7 +13,7 @@ from typing import Any
 
 
 def install() -> None:
-    """Has viser send such text with its escapes; everything else is encoded as ever. May be called again."""
+    """Patches viser's encoder; other text is encoded as before. May be called again."""
     from viser.infra import _infra
 
     infra: Any = _infra
@@ -22,7 +22,7 @@ def install() -> None:
 
 
 def sendable(value: Any) -> Any:
-    """Returns a message, its lists and dictionaries included, with the escapes of what is no Unicode."""
+    """Returns a message, including its lists and dictionaries, with lone surrogates escaped."""
     if isinstance(value, str):
         return value.encode("utf-8", "backslashreplace").decode()
     if isinstance(value, dict):
@@ -33,7 +33,7 @@ def sendable(value: Any) -> Any:
 
 
 class _Encoders:
-    """Stands for the module `msgspec` where viser sends."""
+    """Replaces the module `msgspec` in viser's sender."""
 
     def __init__(self, real: Any) -> None:
         self._real, self.msgpack = real, self
@@ -42,7 +42,7 @@ class _Encoders:
         return getattr(self._real.msgpack, name)
 
     def encode(self, message: Any) -> bytes:
-        """Returns a message in the format of msgpack."""
+        """Returns a message in msgpack format."""
         try:
             return self._real.msgpack.encode(message)
         except UnicodeEncodeError:

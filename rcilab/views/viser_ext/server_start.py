@@ -1,11 +1,10 @@
-"""Starts a viser server whose websocket server is adapted by us, without the share tunnel and without printing.
+"""Starts a viser server with an adapted websocket server, without share tunnel and without printing.
 
-viser 1.1 takes neither a bound socket nor options for the `serve` of websockets that it calls, opens a public tunnel
-when a client asks for it, and prints a box of addresses and a farewell through rich, which in a notebook does not go
-through stdout.
+viser 1.1 accepts neither a bound socket nor options for websockets' `serve`, opens a public tunnel when a client
+requests it, and prints addresses and a closing message through rich, which in a notebook bypasses stdout.
 
-Unnecessary once `viser.ViserServer` takes a socket and options for its websocket server, refuses requests for a tunnel
-unless it was asked to share, and prints nothing with `verbose=False`.
+Unnecessary once `viser.ViserServer` accepts a socket and options for its websocket server, refuses requests for a
+tunnel by default, and prints nothing with `verbose=False`.
 """
 
 from __future__ import annotations
@@ -21,17 +20,17 @@ if TYPE_CHECKING:
     import viser
 
 Adapt: TypeAlias = Callable[[Any, dict[str, Any]], tuple[Any, dict[str, Any]]]
-"""Takes the handler of connections and the options that viser gives to `serve`, and returns those to use. The options
-name a socket; viser would take the next port where the one that we want is busy."""
+"""Receives the connection handler and the options that viser passes to `serve`, and returns those to use. The options
+contain a socket, because viser would take the next port if the requested one is busy."""
 
 
 def start_server(host: str, port: int, adapt: Adapt) -> viser.ViserServer:
     """Returns a running server with the patches of this package.
 
     Args:
-        host: What viser takes for its address.
-        port: What viser takes for its port.
-        adapt: Called on the server's event loop, before it listens.
+        host: Address that viser reports as its own.
+        port: Port that viser reports as its own.
+        adapt: Called on the server's event loop before it listens.
 
     Raises:
         UsageError: Another version of viser is installed.
@@ -57,7 +56,7 @@ def stop_server(server: viser.ViserServer) -> None:
 
 @contextmanager
 def _adapted(adapt: Adapt) -> Iterator[None]:
-    """Replaces the `serve` that viser's server thread is about to call."""
+    """Replaces the `serve` that viser's server thread will call."""
     import websockets.asyncio.server as serving
 
     original = serving.serve

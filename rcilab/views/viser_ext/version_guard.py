@@ -1,4 +1,4 @@
-"""The versions of viser whose internals this package knows: one check for every patch in it."""
+"""The supported versions of viser, checked once for all patches in this package."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ KNOWN = "1.1."
 
 
 def require_known_viser() -> None:
-    """Refuses a viser whose internals may differ from those that are replaced here.
+    """Raises an error for a viser version whose internals may differ from those that are patched here.
 
     Raises:
         UsageError: Another version is installed.
@@ -16,4 +16,6 @@ def require_known_viser() -> None:
     import viser
 
     if not viser.__version__.startswith(KNOWN):
-        raise UsageError(f"viser {viser.__version__} is installed, but rcilab needs viser {KNOWN}x: install that one")
+        raise UsageError(
+            f"viser {viser.__version__} is installed, but rcilab needs viser {KNOWN}x: install that version"
+        )

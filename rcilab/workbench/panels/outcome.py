@@ -10,7 +10,7 @@ from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import LiteralText
-from rcilab.recording.html_facts import tell_stop
+from rcilab.recording.html_facts import describe_stop
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 
 def _tell_stop(run: Run, text: Text) -> str:
-    return tell_stop(run.stopped or "", run.faults, text)
+    return describe_stop(run.stopped or "", run.faults, text)
 
 
 def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.run.export_actions import ENDINGS, CancelExport, ExportRun
 from rcilab.app.text import Text
 from rcilab.app.view_actions import SetRecording
-from rcilab.recording.tracking_words import error_rows, tracking_notes
+from rcilab.recording.tracking_text import error_rows, tracking_notes
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.robots import ROBOT_NAMES
-from rcilab.views.viser_ext.message_guard import for_anyone
+from rcilab.views.viser_ext.message_guard import allow_spectators
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class SettingsPanel:
                 text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
             on_press(self._take, ask, lambda page: TakeControls(page=page))
-            for_anyone(self._take)
+            allow_spectators(self._take)
         source = explain_limit(state.model.limits.source("joint.velocity"), text.language)
         gui.add_html(f'<p class="rl-note">{esc(text("settings.limits", source=source))}</p>')
 

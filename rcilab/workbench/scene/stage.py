@@ -13,7 +13,7 @@ from rcilab.app.text import Text
 from rcilab.core.arrays import JointVector
 from rcilab.views.arm_view import ArmView
 from rcilab.views.viser_scene import ViserScene
-from rcilab.views.viser_stage import furnish, place_camera
+from rcilab.views.viser_stage import add_environment, place_camera
 from rcilab.workbench.scene.configuration_view import ConfigurationSceneView
 from rcilab.workbench.scene.drag_handle import DragHandle
 from rcilab.workbench.scene.elbow_view import ElbowSceneView
@@ -67,7 +67,7 @@ class Stage:
             self._build(state)
             self._built = wanted
         elif state.theme != self._theme:
-            furnish(self._server, full=state.quality == "full", dark=state.theme == "dark")
+            add_environment(self._server, full=state.quality == "full", dark=state.theme == "dark")
         self._theme = state.theme
         if state.model.T_flange_tool is not self._tool:
             self._tool = state.model.T_flange_tool
@@ -98,7 +98,7 @@ class Stage:
                 part.remove()
             for ghost in self._ghosts.values():
                 ghost.remove()
-        furnish(server, full=full, dark=state.theme == "dark")
+        add_environment(server, full=full, dark=state.theme == "dark")
         drawing = self._drawing = ViserScene(server, shadows=full)
         self._model = model = state.model
         self._live = ArmView(drawing, "live", model, "live", quality="fine" if full else "coarse")

@@ -1,4 +1,4 @@
-"""How far an arm was from its plan, in words: the same table and the same sentences on the page and in its exports."""
+"""Tracking errors as table rows and notes, the same on the page and in its exports."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
     from rcilab.recording.tracking import Tracking
 
-_EXACT = 1e-6  # [rad] Less is rounding.
+_EXACT = 1e-6  # [rad] Smaller errors are rounding.
 
 
 def error_rows(run: Run, tracking: Tracking, text: Text) -> list[list[str]]:
-    """Returns how far joints and tool were from the plan: where, RMS and largest."""
+    """Returns the rows of the error table: joint or tool, RMS and largest error."""
     units = text.units
     pairs = zip(tracking.joint_rms, tracking.joint_max, strict=True)
     rows = [[f"J{j}", *(units.format_angle(value, 4) for value in pair)] for j, pair in enumerate(pairs, start=1)]
@@ -25,11 +25,11 @@ def error_rows(run: Run, tracking: Tracking, text: Text) -> list[list[str]]:
 
 
 def tracking_notes(run: Run, tracking: Tracking, text: Text) -> list[str]:
-    """Returns what one has to know to read that table: what was compared, and why there may be no error at all."""
+    """Returns the notes to the error table: the compared time, and why the errors may be zero."""
     notes = []
     if run.plan is not None and run.stop_time is not None:
         notes.append(text("tracking.until", time=f"{run.stop_time:.3f}"))
-    if run.paced:
+    if run.has_speed_override:
         notes.append(text("tracking.paced"))
     if run.setup.plant == "ideal" and tracking.joint_max.max(initial=0.0) < _EXACT:
         notes.append(text("tracking.ideal"))

@@ -10,7 +10,7 @@ import pytest
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.text import Text as PageText
 from rcilab.i18n.translator import Text
-from rcilab.recording.tracking_words import tracking_notes
+from rcilab.recording.tracking_text import tracking_notes
 from rcilab.workbench.panels.recording import summary_html
 from tests.recording.runs import SETUP, export_run, some_ideal_run, some_run, some_stopped_run
 
@@ -47,5 +47,5 @@ def test_a_stopped_run_says_until_when_it_is_compared(language, words):
 
 @pytest.mark.parametrize(("language", "word"), [("en", "speed override"), ("zh", "运行速度")])
 def test_a_run_at_another_pace_says_that_its_plan_has_other_times(language, word):
-    (note,) = notes(some_run(paced=True), language)
+    (note,) = notes(some_run(has_speed_override=True), language)
     assert word in note
