@@ -21,7 +21,7 @@ world port, and ends on Ctrl-C.
 
 MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, and answers whatever it finds then.
 
-_OPTIONS = {"limit_table": "--limits", "client_host": "--client", "client_port": "--client"}
+_OPTIONS = {"limit table": "--limits", "client_host": "--client", "client_port": "--client"}
 """Where an option is not called as what it sets."""
 
 
@@ -121,10 +121,9 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.makers.virtual_controller import build_virtual_controller
 
     try:
-        config = _config(args)
+        server = build_virtual_controller(_config(args))
     except InvalidValueError as error:
         raise _named(error, args) from error
-    server = build_virtual_controller(config)
     signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
     if args.exit_with_parent is None:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())

@@ -31,7 +31,7 @@ from rcilab.execution.speed_override import SpeedOverride, StreamRows
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import ConfiguredArm, ExpectedArm, LimitTable, StreamingDriver, open_driver, require_timeout
+from rcilab.makers.driver import ConfiguredArm, ExpectedArm, StreamingDriver, open_driver, require_timeout
 from rcilab.makers.maker import require_driver, require_feature, require_parts
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
@@ -459,7 +459,7 @@ class RobotSession(Closeable):
         mode: Mode = "joint_position",
         *,
         cut_off: float | None = None,
-        rate_limit: LimitTable | None = None,
+        rate_limit: str | None = None,
     ) -> Run:
         """Runs a callback in every controller cycle until it returns a command with `finished=True`.
 

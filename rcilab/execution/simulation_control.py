@@ -28,7 +28,6 @@ from rcilab.sim.api import (
     Floor,
     GetStatus,
     Limits,
-    LimitTable,
     LineReader,
     LoopBack,
     Mount,
@@ -115,7 +114,7 @@ class SimulationControl(Closeable):
         """Makes commands stop inside the soft joint limits instead of raising a fault beyond them, or not."""
         self.ask(AutoLimit(on))
 
-    def set_limits(self, table: LimitTable) -> None:
+    def set_limits(self, table: str) -> None:
         """Selects the Cartesian limits of commands: "manual", or "sdk" for those of the vendor's SDK."""
         self.ask(Limits(table))
 

@@ -25,8 +25,6 @@ from rcilab.robots import DhRow
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-LimitTable: TypeAlias = Literal["manual", "sdk"]
-"""Which published bounds of the tool: those of the maker's manual, or of its client library."""
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
 """Where constraints of hand guiding hold; without effect in joint space."""
 GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
@@ -263,7 +261,7 @@ class StreamingDriver(Driver, Protocol):
         """Returns whether one of the faults means that commands came too late or not at all."""
         ...
 
-    def select_limits(self, limits: Limits, table: LimitTable) -> Limits:
+    def select_limits(self, limits: Limits, table: str) -> Limits:
         """Returns the limits with the tool's bounds of a table: "manual", or another that the maker publishes."""
         ...
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.sim.api import LIMIT_TABLES, LimitTable, NetworkFaults, Stall
+from rcilab.sim.api import NetworkFaults, Stall
 from rcilab.sim.streamed_motion import PREFILL
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
@@ -58,7 +58,7 @@ class ControllerConfig:
     """Whether commanded joint angles are led to rest inside the soft limits, instead of raising a fault beyond them."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
-    limit_table: LimitTable = "manual"
+    limit_table: str = "manual"
     """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
     """What is wrong with the network, from power-up on."""
@@ -85,8 +85,6 @@ class ControllerConfig:
             raise InvalidValueError("host", self.host, "is no address; use 127.0.0.2 for this machine only")
         if self.plant not in PLANT_KINDS:
             raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
-        if self.limit_table not in LIMIT_TABLES:
-            raise InvalidValueError("limit_table", self.limit_table, f"is unknown; known: {', '.join(LIMIT_TABLES)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.patience is not None and not 0.01 <= self.patience <= 3600.0:

@@ -12,7 +12,7 @@ from typing import Protocol
 from rcilab.core.fault import FaultCode
 from rcilab.core.safety_box import SafetyBox
 from rcilab.i18n.translator import Remark
-from rcilab.sim.api import LimitTable, SafetyButton
+from rcilab.sim.api import SafetyButton
 from rcilab.sim.channels import Channel, Link, Peer
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -22,8 +22,6 @@ class SimulatedController(Protocol):
 
     ignored: int
     """Commands that came while none was expected."""
-    limit_table: LimitTable
-    """Whose limits of the tool's motion apply."""
 
     @property
     def loop_back(self) -> bool:
@@ -40,6 +38,14 @@ class SimulatedController(Protocol):
 
     @auto_limit.setter
     def auto_limit(self, on: bool) -> None: ...
+
+    @property
+    def limit_table(self) -> str:
+        """Whose limits of the tool's motion apply: "manual", or another of the maker's tables."""
+        ...
+
+    @limit_table.setter
+    def limit_table(self, table: str) -> None: ...
 
     @property
     def arm(self) -> VirtualArm:

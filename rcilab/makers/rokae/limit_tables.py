@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 
-LimitTable: TypeAlias = Literal["manual", "sdk"]
+LIMIT_TABLES = ("manual", "sdk")
 
 SDK_TRANSLATION_VELOCITY = 1.5  # [m/s] Vendor SDK, rate limiter.
 SDK_ROTATION_ACCELERATION = 25.0  # [rad/s^2] Vendor SDK, rate limiter.
@@ -18,7 +17,7 @@ SDK_ROTATION_JERK = 12500.0  # [rad/s^3] Vendor SDK, rate limiter.
 _SDK = "vendor SDK, rate limiter"
 
 
-def cartesian_limits(limits: Limits, table: LimitTable = "manual") -> Limits:
+def cartesian_limits(limits: Limits, table: str = "manual") -> Limits:
     """Returns the limits with the Cartesian bounds of a table.
 
     A program that limits its rates with the vendor's SDK may legally exceed the manual's numbers (4.4); "sdk" lets it
@@ -31,9 +30,7 @@ def cartesian_limits(limits: Limits, table: LimitTable = "manual") -> Limits:
     Raises:
         InvalidValueError: There is no such table; the message lists those that exist.
     """
-    if table not in get_args(LimitTable):
-        raise InvalidValueError("limit table", table, f"is unknown; known: {', '.join(get_args(LimitTable))}")
-    if table == "manual":
+    if require_table(table) == "manual":
         return limits
     changes = {
         "translation_velocity": SDK_TRANSLATION_VELOCITY,
@@ -42,3 +39,14 @@ def cartesian_limits(limits: Limits, table: LimitTable = "manual") -> Limits:
     }
     sources = {**limits.sources, **{f"cartesian.{name}": _SDK for name in changes}}
     return replace(limits, cartesian=replace(limits.cartesian, **changes), sources=MappingProxyType(sources))
+
+
+def require_table(table: str) -> str:
+    """Returns the name of a table.
+
+    Raises:
+        InvalidValueError: There is no such table; the message lists those that exist.
+    """
+    if table not in LIMIT_TABLES:
+        raise InvalidValueError("limit table", table, f"is unknown; known: {', '.join(LIMIT_TABLES)}")
+    return table

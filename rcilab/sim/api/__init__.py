@@ -11,13 +11,11 @@ from rcilab.sim.api.lines import (
     encode_world_request,
 )
 from rcilab.sim.api.requests import (
-    LIMIT_TABLES,
     REQUESTS,
     AutoLimit,
     Floor,
     GetStatus,
     Limits,
-    LimitTable,
     LoopBack,
     Mount,
     Network,
@@ -35,7 +33,6 @@ from rcilab.sim.api.requests import (
 
 __all__ = [
     "DIRECTIONS",
-    "LIMIT_TABLES",
     "LONGEST_LINE",
     "LONGEST_STALL",
     "REQUESTS",
@@ -44,7 +41,6 @@ __all__ = [
     "Done",
     "Floor",
     "GetStatus",
-    "LimitTable",
     "Limits",
     "LineReader",
     "LoopBack",

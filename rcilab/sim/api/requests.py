@@ -11,10 +11,8 @@ from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_n
 
 Floats: TypeAlias = tuple[float, ...]
 SafetyButton: TypeAlias = Literal["none", "estop", "gstop"]
-LimitTable: TypeAlias = Literal["manual", "sdk"]
 
 _BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
-LIMIT_TABLES: tuple[LimitTable, ...] = get_args(LimitTable)
 _LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here withstands: it catches wrong units.
 _FARTHEST = 100.0  # [m] Likewise.
 _LAST_SIGNAL = 31  # The status of the control process has 32 bits for them; a controller refuses what it lacks.
@@ -111,11 +109,12 @@ class Limits:
     """Chooses the Cartesian limits that commands are checked against: the manual's, or those of the vendor's SDK."""
 
     name: ClassVar[str] = "limits"
-    table: LimitTable
+    table: str
+    """One of the maker's; "manual" is that of its manual."""
 
     def __post_init__(self) -> None:
         """Checks the word."""
-        _put(self, "table", as_word(self.table, "table", LIMIT_TABLES))
+        _put(self, "table", as_name(self.table, "table"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ from rcilab.makers.rokae.controller.request_handlers import (
 from rcilab.makers.rokae.controller.settings import Settings, apply_request, guided_freedom
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.limit_tables import LimitTable, cartesian_limits
+from rcilab.makers.rokae.limit_tables import cartesian_limits, require_table
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
@@ -83,7 +83,6 @@ class RciController:
         state: The last reported state.
         ignored: Commands that came while none was wanted.
         safety_stop: Which emergency stop is pressed.
-        limit_table: Whose limits of the tool's motion apply, from the next motion on.
 
     Args:
         arm: What moves, as it is after power-up.
@@ -99,7 +98,7 @@ class RciController:
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
         model = arm.model
-        self.limit_table: LimitTable = "manual"
+        self._limit_table = "manual"
         self.settings = Settings.of(model.description)
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
@@ -198,6 +197,15 @@ class RciController:
     @loop_back.setter
     def loop_back(self, on: bool) -> None:
         self.settings = self.settings.with_loop_back(on)
+
+    @property
+    def limit_table(self) -> str:
+        """Whose limits of the tool's motion apply, from the next motion on: "manual" or "sdk"."""
+        return self._limit_table
+
+    @limit_table.setter
+    def limit_table(self, table: str) -> None:
+        self._limit_table = require_table(table)
 
     @property
     def auto_limit(self) -> bool:

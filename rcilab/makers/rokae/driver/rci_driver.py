@@ -15,7 +15,6 @@ from rcilab.makers.driver import (
     ExpectedArm,
     GuideKind,
     GuideSpace,
-    LimitTable,
     RequestLock,
     SafetyStopReason,
 )
@@ -217,7 +216,7 @@ class RciDriver:
         """Returns whether the controller lacked commands: it reports an instability then."""
         return Fault.INSTABILITY_DETECTION in faults
 
-    def select_limits(self, limits: Limits, table: LimitTable) -> Limits:
+    def select_limits(self, limits: Limits, table: str) -> Limits:
         """Returns the limits with the tool's bounds of the manual, or of the vendor's limiter ("sdk")."""
         return cartesian_limits(limits, table)
 
