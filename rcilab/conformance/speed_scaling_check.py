@@ -81,9 +81,9 @@ def plan_speed_override(
         if not _violations(candidate, model, mode):
             return candidate
     raise PlanningError(
-        f"at t = {paced.place_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan there is no way within the "
-        f"limits to go on with {100 * speed_override:.0f} % of its speed; the motion goes on as it is, stop() always "
-        "works"
+        f"at t = {paced.plan_time_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan no change to "
+        f"{100 * speed_override:.0f} % of its speed is possible within the limits; the motion continues "
+        "unchanged, and stop() always works"
     ).coded("no_way_to_pace", speed_override=f"{100 * speed_override:.0f}")
 
 

@@ -81,7 +81,7 @@ class SharedRows:
                 raise _too_long_error(changed)
             self._block.motion[start : start + len(rows)] = rows
             pending = self._send(
-                SwitchRows(first=first, start=start, rows=len(rows), holds=changed.holds, duration=changed.duration)
+                SwitchRows(first=first, start=start, rows=len(rows), holds=changed.is_held, duration=changed.duration)
             )
             self._last = pending, self._in_use
             self._in_use = [*self._in_use[-2:], _Region(first, start, len(rows))]

@@ -640,7 +640,7 @@ class Supervisor(Closeable):
         scaled = self._override.motion
         if scaled is None or shown.motion_time is None:
             return {}
-        plan_time = scaled.place_at(round(shown.motion_time / CYCLE_TIME))
+        plan_time = scaled.plan_time_at(round(shown.motion_time / CYCLE_TIME))
         return {"motion_plan_time": plan_time, "speed_override": scaled.override, "mode": self._override.mode}
 
     def _is_operator_overdue(self) -> bool:

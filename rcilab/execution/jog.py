@@ -87,7 +87,7 @@ class JogCallback:
         q = self._jog.q
         for _ in range(cycle - self._cycle):
             q = self._jog.step()
-        is_free = self._command is None and self._jog.is_at_rest
+        is_free = self._command is None and self._jog.is_stationary
         self._resting = self._resting + cycle - self._cycle if is_free else 0
         self._cycle = cycle
         is_over = is_free and (not self.is_enabled or self._resting * CYCLE_TIME >= LINGER)

@@ -416,7 +416,7 @@ class RobotSession(Closeable):
         return MotionProgress(
             time=cycle * CYCLE_TIME,
             duration=scaled.duration,
-            place=scaled.place_at(cycle),
+            place=scaled.plan_time_at(cycle),
             planned=scaled.motion.duration,
             speed_override=scaled.override,
             mode=override.mode,

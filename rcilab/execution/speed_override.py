@@ -56,7 +56,7 @@ class StreamRows:
 
     def switch(self, first: int, changed: SpeedScaledMotion) -> bool | None:
         """Continues with the rows of a changed motion; None: too late for that."""
-        return self._stream.switch(first, changed.q[first:], holds=changed.holds) or None
+        return self._stream.switch(first, changed.q[first:], holds=changed.is_held) or None
 
     def was_refused(self) -> bool:
         """Returns False: a stream decides at once."""

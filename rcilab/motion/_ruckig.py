@@ -23,8 +23,8 @@ from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 
 _FACTORIALS = (1.0, 1.0, 2.0, 6.0)
 _POSITION, _VELOCITY = ruckig.ControlInterface.Position, ruckig.ControlInterface.Velocity
-_NO_MISS = 1e-13  # [rad] Rounding of the angles themselves.
-_ASIDE = 1e-12  # [rad/s, rad/s^2] Rounding of the derivatives of a motion that is on its straight way.
+_GOAL_TOLERANCE = 1e-13  # [rad] A larger difference from the goal is not rounding.
+_LINE_TOLERANCE = 1e-12  # [rad/s, rad/s^2] Rounding of the derivatives of a motion along its line.
 
 
 def plan_profile(
@@ -54,19 +54,23 @@ def plan_profile(
     Raises:
         PlanningError: ruckig found no curve; the message says why.
     """
-    way = goal - start
-    longest = int(np.abs(way).argmax())
-    parts = way / (way[longest] or 1.0)
+    distance = goal - start
+    longest = int(np.abs(distance).argmax())
+    ratios = distance / (distance[longest] or 1.0)
     states = np.stack((start_velocity, start_acceleration))
-    if way[longest] != 0.0 and np.allclose(states, np.outer(states[:, longest], parts), rtol=0.0, atol=_ASIDE):
+    if distance[longest] != 0.0 and np.allclose(
+        states, np.outer(states[:, longest], ratios), rtol=0.0, atol=_LINE_TOLERANCE
+    ):
         with np.errstate(divide="ignore", over="ignore"):
-            v, a, j = [(bound / np.abs(parts)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
+            v, a, j = [(bound / np.abs(ratios)).min(keepdims=True) for bound in (velocity, acceleration, jerk)]
         one = slice(longest, longest + 1)
-        line = _timed(np.zeros(1), way[one], v, a, j, start_velocity[one], start_acceleration[one])
-        coefficients = parts[:, np.newaxis] * line.coefficients
+        line = _plan_synchronized(np.zeros(1), distance[one], v, a, j, start_velocity[one], start_acceleration[one])
+        coefficients = ratios[:, np.newaxis] * line.coefficients
         coefficients[:, :, 0] += start
-        return _arriving_at(goal, PiecewisePolynomial(line.breaks, coefficients))
-    return _arriving_at(goal, _timed(start, goal, velocity, acceleration, jerk, start_velocity, start_acceleration))
+        return _corrected_to(goal, PiecewisePolynomial(line.breaks, coefficients))
+    return _corrected_to(
+        goal, _plan_synchronized(start, goal, velocity, acceleration, jerk, start_velocity, start_acceleration)
+    )
 
 
 def plan_standstill(
@@ -77,7 +81,7 @@ def plan_standstill(
     Args:
         q: Joint angles, shape (n,), [rad].
         dq: Joint velocities, shape (n,), [rad/s]; any finite value.
-        ddq: Joint accelerations, shape (n,), [rad/s^2]; outside the bounds they are first led back inside.
+        ddq: Joint accelerations, shape (n,), [rad/s^2]; values outside the bounds are first reduced to them.
         acceleration: Bounds, shape (n,), [rad/s^2].
         jerk: Bounds, shape (n,), [rad/s^3].
 
@@ -98,13 +102,12 @@ def plan_standstill(
 class Stepper:
     """Moves every axis independently and time-optimally towards a velocity or a position, one cycle per call.
 
-    Owned by the thread that runs the cycle. Ruckig computes a new curve only after a change; a call without one follows
-    the last curve.
+    Owned by the thread that runs the cycle. Ruckig computes a new curve only after a change of target or state.
 
     Attributes:
-        q: Positions now, plain floats, [rad].
-        dq: Velocities now, [rad/s].
-        ddq: Accelerations now, [rad/s^2].
+        q: Current positions, plain floats, [rad].
+        dq: Current velocities, [rad/s].
+        ddq: Current accelerations, [rad/s^2].
 
     Args:
         q: Positions at the start, [rad].
@@ -131,31 +134,31 @@ class Stepper:
         self._by_velocity = True
         self._standstill = [0.0] * n
         self._problem = problem
-        self.place(q, dq, ddq)
-        self.limit(acceleration, jerk)
+        self.set_state(q, dq, ddq)
+        self.set_limits(acceleration, jerk)
 
-    def place(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
-        """Goes on from another state, [rad], [rad/s], [rad/s^2]."""
+    def set_state(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
+        """Continues from another state, [rad], [rad/s], [rad/s^2]."""
         self.q, self.dq, self.ddq = list(q), list(dq), list(ddq)
         problem = self._problem
         problem.current_position, problem.current_velocity, problem.current_acceleration = self.q, self.dq, self.ddq
 
-    def limit(self, acceleration: Sequence[float], jerk: Sequence[float]) -> None:
-        """Sets the bounds from now on, all of them above zero, [rad/s^2] and [rad/s^3]."""
+    def set_limits(self, acceleration: Sequence[float], jerk: Sequence[float]) -> None:
+        """Sets the bounds, all above zero, [rad/s^2] and [rad/s^3]."""
         self._problem.max_acceleration = acceleration
         self._problem.max_jerk = jerk
 
-    def towards_velocity(self, dq: Sequence[float]) -> None:
-        """Goes on for one cycle towards velocities, to keep them, [rad/s]."""
-        self._lead_by_velocity(dq)
+    def step_to_velocity(self, dq: Sequence[float]) -> None:
+        """Advances one cycle towards constant velocities, [rad/s]."""
+        self._set_velocity_target(dq)
         self._step()
 
-    def towards_ends(self, ends: Sequence[float | None], dq: Sequence[float]) -> None:
-        """Goes on for one cycle towards positions, to be at rest there.
+    def step_to_positions(self, ends: Sequence[float | None], dq: Sequence[float]) -> None:
+        """Advances one cycle towards standstill at positions.
 
         Args:
-            ends: Positions, [rad]; an axis without one goes on towards its velocity.
-            dq: The bound of the velocity on the way to a position, above zero, or else the velocity to keep, [rad/s].
+            ends: Positions, [rad]; None for an axis that moves towards its velocity instead.
+            dq: Velocity bound of an axis with a position, above zero; target velocity of any other, [rad/s].
         """
         problem = self._problem
         self._by_velocity = False
@@ -166,16 +169,18 @@ class Stepper:
         self._step()
 
     def _step(self) -> None:
-        """Goes on by one cycle; where ruckig finds no curve, every axis brakes for this cycle instead."""
+        """Advances one cycle; if ruckig finds no curve, every axis brakes in this cycle."""
         if not self._update():
-            self._lead_by_velocity(self._standstill)
+            self._set_velocity_target(self._standstill)
             if not self._update():
-                raise PlanningError("no stop exists from this state; its values are beyond any robot's")
+                raise PlanningError(
+                    "no stop exists from this state; its velocities or accelerations are far beyond any robot's"
+                )
         out = self._out
         self.q, self.dq, self.ddq = out.new_position, out.new_velocity, out.new_acceleration
         out.pass_to_input(self._problem)
 
-    def _lead_by_velocity(self, dq: Sequence[float]) -> None:
+    def _set_velocity_target(self, dq: Sequence[float]) -> None:
         if not self._by_velocity:
             self._problem.per_dof_control_interface = None
             self._by_velocity = True
@@ -193,15 +198,15 @@ _REASONS: dict[Any, str] = {
     Result.ErrorInvalidInput: "the request is not valid",
     Result.ErrorPositionalLimits: "a joint would pass its position limits",
     Result.ErrorExecutionTimeCalculation: "no profile reaches this goal from this start state",
-    Result.ErrorSynchronizationCalculation: "the joints cannot be brought into step",
+    Result.ErrorSynchronizationCalculation: "the joints cannot be synchronized",
 }
 
 
-def _timed(
+def _plan_synchronized(
     start: Array, goal: Array, velocity: Array, acceleration: Array, jerk: Array, start_velocity: Array,
     start_acceleration: Array,
 ) -> PiecewisePolynomial:  # fmt: skip
-    """Returns ruckig's curve to rest at the goal, all coordinates in phase where it can."""
+    """Returns ruckig's curve to standstill at the goal, with all coordinates in phase where possible."""
     problem = ruckig.InputParameter(len(start))
     problem.synchronization = ruckig.Synchronization.Phase
     problem.current_position = start.tolist()
@@ -222,16 +227,16 @@ def _solve(problem: Any) -> Any:
         reason = str(error).replace("[ruckig]", "").strip()
         raise PlanningError(f"no motion: {reason}; choose another start, goal or speed").coded("no_motion") from error
     except ValueError as error:  # Its Python binding does not know all of ruckig's results, such as -101.
-        reason = "the motion would last longer than the planner can count"
+        reason = "the motion would last longer than the planner can represent"
         raise PlanningError(f"no motion: {reason}; choose a higher speed").coded("too_long") from error
     if result not in (Result.Working, Result.Finished):
-        reason = _REASONS.get(result, f"the planner answered {result!r}")
+        reason = _REASONS.get(result, f"the planner returned {result!r}")
         raise PlanningError(f"no motion: {reason}; choose another start, goal or speed").coded("no_motion")
     return trajectory
 
 
 def _polynomial(trajectory: Any) -> PiecewisePolynomial:
-    """Returns the curve of a trajectory: for each joint up to two brake steps, seven steps, then rest."""
+    """Returns the curve of a trajectory: for each joint up to two brake steps, seven steps, then standstill."""
     profiles: list[Any] = trajectory.profiles[0]
     dt = np.array([[*p.brake.t, *p.t] for p in profiles])
     steps = [
@@ -244,20 +249,20 @@ def _polynomial(trajectory: Any) -> PiecewisePolynomial:
     return join_pieces(starts, coefficients, float(trajectory.duration))
 
 
-def _arriving_at(goal: JointVector, curve: PiecewisePolynomial) -> PiecewisePolynomial:
-    """Returns the curve led to `goal` exactly.
+def _corrected_to(goal: JointVector, curve: PiecewisePolynomial) -> PiecewisePolynomial:
+    """Returns the curve, corrected so that it ends exactly at `goal`.
 
-    ruckig accepts profiles that miss by up to 1e-8 rad. A jump of that size in the last cycle would be a jerk of some
-    10 rad/s^3, so the miss is spread over the whole motion as a cubic that starts and ends at rest.
+    ruckig accepts profiles that error the goal by up to 1e-8 rad. A jump of that size in the last cycle would be a jerk
+    of about 10 rad/s^3, so the error is spread over the whole motion as a cubic that starts and ends at standstill.
     """
-    miss = goal - curve.at_end()[0]
-    if np.abs(miss).max() < _NO_MISS:
+    error = goal - curve.at_end()[0]
+    if np.abs(error).max() < _GOAL_TOLERANCE:
         return curve
     total = curve.duration
     u = curve.breaks[:-1, np.newaxis] / total
     coefficients = curve.coefficients.copy()
-    coefficients[:, :, 0] += miss * u**2 * (3.0 - 2.0 * u)
-    coefficients[:, :, 1] += miss * 6.0 * u * (1.0 - u) / total
-    coefficients[:, :, 2] += miss * (3.0 - 6.0 * u) / total**2
-    coefficients[:, :, 3] += miss * -2.0 / total**3
+    coefficients[:, :, 0] += error * u**2 * (3.0 - 2.0 * u)
+    coefficients[:, :, 1] += error * 6.0 * u * (1.0 - u) / total
+    coefficients[:, :, 2] += error * (3.0 - 6.0 * u) / total**2
+    coefficients[:, :, 3] += error * -2.0 / total**3
     return PiecewisePolynomial(curve.breaks, coefficients)

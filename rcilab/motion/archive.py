@@ -1,4 +1,4 @@
-"""Safe reading of numpy's files: untrusted bytes of unknown size."""
+"""Safe reading of NumPy files: untrusted bytes of unknown size."""
 
 from __future__ import annotations
 
@@ -20,10 +20,17 @@ SINGLE_ARRAY = "a single array"
 """Name for the array of a file that stores an unnamed one."""
 
 _DAMAGE = (
-    *(BadZipFile, zlib.error, EOFError, OSError, RuntimeError, struct.error),  # The archive; encrypted; other methods.
-    *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError),  # A header of an array.
+    *(
+        BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        RuntimeError,
+        struct.error,
+    ),  # Of the archive: damaged, encrypted, unknown compression.
+    *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError),  # Of an array's header.
 )
-"""Exceptions of numpy and its readers for foreign or damaged bytes."""
+"""Exceptions that NumPy and zipfile raise on foreign or damaged bytes."""
 
 
 Shapes: TypeAlias = Mapping[str, tuple[int, ...]]
@@ -40,20 +47,20 @@ def read_arrays(
     """Returns the arrays in the bytes of an .npz or .npy, by name.
 
     Args:
-        content: The file's.
+        content: Bytes of the file.
         what: Kind of file, for the error.
-        name: The file's name.
+        name: Name of the file, for the error.
         problem: Text of the error.
         max_rows: Bound of the content, see `file_bounds`.
-        require_shapes: Called with the arrays' shapes by name before anything is unpacked; raises where they do not
-            fit.
+        require_shapes: Called with the arrays' shapes by name before anything is unpacked; raises an error if they do
+            not fit.
 
     Raises:
-        InvalidValueError: The bytes are damaged, something else, too many unpacked, or hold objects of Python's.
+        InvalidValueError: The bytes are damaged, not a NumPy file, too many when unpacked, or contain Python objects.
     """
     try:
         size, shapes = _read_headers(content)
-    except (*_DAMAGE, MemoryError) as error:  # Of the parser, on a header with too many brackets.
+    except (*_DAMAGE, MemoryError) as error:  # MemoryError: the parser, on a header with too many brackets.
         raise InvalidValueError(what, name, problem) from error
     require_bytes(size, max_rows, what, name)
     require_shapes(shapes)
@@ -68,7 +75,7 @@ def read_arrays(
 
 
 def _read_headers(content: bytes) -> tuple[int, Shapes]:
-    """Returns the unpacked size of the arrays, [bytes], and their shapes, from the headers of archive and arrays."""
+    """Returns the unpacked size of the arrays, [bytes], and their shapes."""
     if not content.startswith(b"PK"):
         size, shape = _read_header(BytesIO(content))
         return size, {SINGLE_ARRAY: shape}
@@ -83,7 +90,6 @@ def _read_headers(content: bytes) -> tuple[int, Shapes]:
 
 
 def _read_header(stream: IO[bytes]) -> tuple[int, tuple[int, ...]]:
-    """Returns the size of an array, [bytes], and its shape, from its header."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = read(stream)

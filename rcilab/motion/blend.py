@@ -1,10 +1,10 @@
 """Blends: the smooth curves that round the corners of a program.
 
-A corner is cut where the tool is a radius away from it, on either side, and a quintic leads from cut to cut with the
-segments' own direction and curvature there. Between paths of the tool it runs in position, orientation (as rotation
-vector from that of the corner, in which both slerps are straight) and arm angle: in the plane of two lines, inside
-their triangle. Next to a joint move it runs in joint space. In both cases it must stay inside the sphere around the
-corner; this is checked, and the cuts are moved closer if necessary.
+Each of the two segments is cut where the tool is one radius away from the corner, and a quintic joins the cuts with the
+segments' own direction and curvature there. Between paths of the tool the quintic is in position, orientation (the
+rotation vector relative to the corner, in which both slerps are straight) and arm angle; between two lines it stays in
+their plane, inside their triangle. Next to a joint move it is in joint space. In both cases it must stay inside the
+sphere around the corner; this is checked, and the cuts are moved closer if necessary.
 """
 
 from __future__ import annotations
@@ -21,36 +21,36 @@ from rcilab.motion.hermite import State, evaluate, quintic
 from rcilab.motion.path import Path
 from rcilab.motion.segment import Segment
 
-_LOOKS = 33
-"""Places at which a segment's half, or a blend, is looked at; tuning value."""
-_STANDS = 1e-6
-"""A tool that moves less than this turns on the spot, [m]."""
-_NUDGE = 3e-4
-"""Share of the way over which derivatives are formed. Tuning value: both their errors are below 1e-7."""
-_INSIDE = 0.999
-"""Part of the radius to stay in, so that what happens between the looks is inside, too."""
+_SAMPLES = 33
+"""Number of points at which half a segment, or a blend, is sampled; tuning value."""
+_MIN_TRAVEL = 1e-6
+"""A tool that moves less than this only rotates, [m]."""
+_DIFFERENCE_STEP = 3e-4
+"""Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
+_RADIUS_MARGIN = 0.999
+"""Part of the radius within which the samples must be, so that the curve between them is inside, too."""
 
 LENGTH = 1.0
-"""Length of every blend in the chain's own measure: the corner is in the middle."""
+"""Length of every blend in the spline's parameter s; the corner is in the middle."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Blend:
-    """The curve from a share of one segment to a share of the next."""
+    """The curve from a point on one segment to a point on the next."""
 
-    leave: float
-    """Share of the segment before, from 1/2 to 1."""
-    join: float
-    """Share of the segment after, from 0 to 1/2."""
+    exit_share: float
+    """Share of the previous segment at which the blend begins, from 1/2 to 1."""
+    entry_share: float
+    """Share of the next segment at which the blend ends, from 0 to 1/2."""
     radius: float
-    """How far from the corner the tool is at the cuts, at most, [m]."""
+    """Largest distance of the cuts from the corner, [m]."""
     corner: Pose | None
-    """Pose of the tool at the corner; None where the curve runs in joint space."""
+    """Pose of the tool at the corner; None if the curve is in joint space."""
     powers: tuple[Array, ...]
     """Coefficients of the quintic: joint angles, (n,), or position, rotation vector and arm angle, (7,)."""
 
     def poses(self, parts: Array) -> tuple[Array, Array]:
-        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), at parts of the blend."""
+        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), at shares of the blend, shape (N,)."""
         assert self.corner is not None
         values = evaluate(self.powers, parts)
         T = np.zeros((len(parts), 4, 4))
@@ -61,20 +61,20 @@ class Blend:
 
 
 def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
-    """Returns the blend at the waypoint of `before`, with the radius that it asks for or the longest that fits.
+    """Returns the blend at the waypoint of `before`, with the requested radius or the largest that fits.
 
-    A blend takes at most half of either segment, as on an industrial controller; the radius is then the same on both
-    sides of the corner, unless the tool does not move on one.
+    A blend takes at most half of either segment, as on an industrial controller. The radius is the same on both sides
+    of the corner, unless the tool does not move on one of them.
     """
     radius = before.waypoint.blend
     corner = after.positions(model, np.zeros(1))[0]
     halves = _distances(model, before, corner, -1.0), _distances(model, after, corner, 1.0)
-    moving = [float(half.max()) for half in halves if half.max() > _STANDS]
+    moving = [float(half.max()) for half in halves if half.max() > _MIN_TRAVEL]
     radius = min([radius, *moving])
     back, ahead = _cut(halves[0], radius), _cut(halves[1], radius)
     while True:
         blend = _blend(model, before, after, 1.0 - back, ahead, radius)
-        excess = _farthest(model, blend, corner) / (_INSIDE * radius)
+        excess = _largest_distance(model, blend, corner) / (_RADIUS_MARGIN * radius)
         if excess <= 1.0:
             return blend
         closer = max(0.5, 0.99 / excess)
@@ -82,7 +82,7 @@ def build_blend(model: RobotModel, before: Segment, after: Segment) -> Blend:
 
 
 def rotations(vectors: Array) -> Array:
-    """Returns the rotations of rotation vectors, shape (N, 3) to (N, 3, 3): Rodrigues' formula."""
+    """Returns the matrices, shape (N, 3, 3), of rotation vectors, shape (N, 3), [rad], by Rodrigues' formula."""
     square = (vectors * vectors).sum(axis=1)
     angle = np.sqrt(square)
     safe = np.where(angle > 1e-8, angle, 1.0)
@@ -96,13 +96,13 @@ def rotations(vectors: Array) -> Array:
 
 
 def _distances(model: RobotModel, segment: Segment, corner: Array, side: float) -> Array:
-    """Returns how far the tool is from the corner, from there to the middle of a segment, shape (N,), [m]."""
-    shares = np.linspace(0.0, 0.5, _LOOKS) if side > 0.0 else np.linspace(1.0, 0.5, _LOOKS)
+    """Returns the tool's distances from the corner, from there to the middle of a segment, shape (N,), [m]."""
+    shares = np.linspace(0.0, 0.5, _SAMPLES) if side > 0.0 else np.linspace(1.0, 0.5, _SAMPLES)
     return np.sqrt(((segment.positions(model, shares) - corner) ** 2).sum(axis=1))
 
 
 def _cut(distances: Array, radius: float) -> float:
-    """Returns the share, from the corner, at which the tool is first a radius away; 1/2 where it never is."""
+    """Returns the share, from the corner, at which the tool is first a radius away; 1/2 if it never is."""
     beyond = np.flatnonzero(distances > radius)
     if not beyond.size:
         return 0.5
@@ -111,18 +111,25 @@ def _cut(distances: Array, radius: float) -> float:
     return float(i - 1 + part) * 0.5 / (len(distances) - 1)
 
 
-def _blend(model: RobotModel, before: Segment, after: Segment, leave: float, join: float, radius: float) -> Blend:
-    rates = 2.0 * (1.0 - leave) / LENGTH, 2.0 * join / LENGTH
+def _blend(
+    model: RobotModel, before: Segment, after: Segment, exit_share: float, entry_share: float, radius: float
+) -> Blend:
+    rates = 2.0 * (1.0 - exit_share) / LENGTH, 2.0 * entry_share / LENGTH
     if before.path is not None and after.path is not None:
         corner = before.path.goal
-        left = _scaled(_tool_state(before.path, corner, leave), rates[0])
-        right = _scaled(_tool_state(after.path, corner, join), rates[1])
-        right[0][6] += math.tau * round((left[0][6] - right[0][6]) / math.tau)  # The same arm angle, next to the other.
+        left = _scaled(_tool_state(before.path, corner, exit_share), rates[0])
+        right = _scaled(_tool_state(after.path, corner, entry_share), rates[1])
+        right[0][6] += math.tau * round(
+            (left[0][6] - right[0][6]) / math.tau
+        )  # The equivalent angle nearest to the other.
     else:
         corner = None
-        left, right = _scaled(before.state(model, leave), rates[0]), _scaled(after.state(model, join), rates[1])
+        left, right = (
+            _scaled(before.state(model, exit_share), rates[0]),
+            _scaled(after.state(model, entry_share), rates[1]),
+        )
     powers = quintic(left, right, LENGTH)
-    return Blend(leave=leave, join=join, radius=radius, corner=corner, powers=powers)
+    return Blend(exit_share=exit_share, entry_share=entry_share, radius=radius, corner=corner, powers=powers)
 
 
 def _scaled(state: State, rate: float) -> State:
@@ -130,18 +137,18 @@ def _scaled(state: State, rate: float) -> State:
 
 
 def _tool_state(path: Path, corner: Pose, share: float) -> State:
-    """Returns position, rotation vector from the corner and arm angle with two derivatives by the share, shape (7,)."""
-    T, psi = path.sample(share + _NUDGE * np.array([-1.0, 0.0, 1.0]))
+    """Returns position, rotation vector from the corner and arm angle, (7,), with two derivatives by the share."""
+    T, psi = path.sample(share + _DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
     rows = np.zeros((3, 7))
     rows[:, :3] = T[:, :3, 3]
     rows[:, 3:6] = [_rotation_vector(R) for R in corner.rotation.T @ T[:, :3, :3]]
     if psi is not None:
         rows[:, 6] = psi
-    for row in (0, 2):  # Half a turn away from the corner the vector may be either of two, and must not change.
+    for row in (0, 2):  # Half a turn from the corner the vector is ambiguous; keep the one of the middle row.
         if rows[row, 3:6] @ rows[1, 3:6] < 0.0 and (size := float(np.linalg.norm(rows[row, 3:6]))) > math.pi / 2.0:
             rows[row, 3:6] *= 1.0 - math.tau / size
     before, here, after = rows
-    return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+    return here, (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
 
 
 def _rotation_vector(R: Array) -> Array:
@@ -154,7 +161,7 @@ def _rotation_vector(R: Array) -> Array:
     return np.array([factor * x, factor * y, factor * z])
 
 
-def _farthest(model: RobotModel, blend: Blend, corner: Array) -> float:
-    values = evaluate(blend.powers, np.linspace(0.0, 1.0, _LOOKS))
+def _largest_distance(model: RobotModel, blend: Blend, corner: Array) -> float:
+    values = evaluate(blend.powers, np.linspace(0.0, 1.0, _SAMPLES))
     positions = values[:, :3] if blend.corner is not None else model.position_path(values)
     return float(np.sqrt(((positions - corner) ** 2).sum(axis=1).max()))

@@ -1,4 +1,4 @@
-"""The bounds of planners: joint ranges, and the margin of planned motions to the limits."""
+"""Joint ranges and limit margin of planned motions."""
 
 from __future__ import annotations
 
@@ -14,74 +14,74 @@ from rcilab.core.limits import JointLimits
 LIMIT_MARGIN = 0.999
 """Part of each velocity, acceleration and jerk limit that a planned motion uses.
 
-Tuning value. The manual's conditions are strict, and a time-optimal curve sits on its bounds: its backward differences
-at 1 ms are means of the derivative, so they reach the bound itself. Angles as doubles add rounding of 4e-6 rad/s^3 to a
-third difference. A part in a thousand covers both, and a start that is 1 nrad off, for 0.1 % of the time. It is not a
-margin for lost packets: that one belongs to the side that streams.
+Tuning value. The manual's conditions are strict, and a time-optimal curve runs on its bounds: its backward differences
+at 1 ms are means of the derivative, so they reach the bound itself. Rounding of angles to doubles adds 4e-6 rad/s^3 to
+a third difference. One part in a thousand covers both, and a start that is 1 nrad off, and costs 0.1 % of the time. It
+is not a margin for lost packets; the streaming client adds that.
 """
 
 RECOVERY_RANGE = radians(20.0)
 """Largest distance of a joint from its range at which a recovery may start, [rad]. The arms stop within 18 degrees from
-full speed, so a larger distance has another cause than a late stop."""
-_ROUNDING = 1e-6  # [rad] How far outwards rounding may move a joint that starts outside.
+full speed, so a larger distance is not caused by a late stop."""
+_ROUNDING = 1e-6  # [rad] Widening that covers rounding at the start.
 
 
 def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
     """Requires joint angles to be strictly inside their limits.
 
     Args:
-        what: Name of the angles: "start", for which the error mentions `plan_recovery`, or another one.
+        what: Name of the angles for the error; for "start" the error mentions `plan_recovery`.
         q: Joint angles, shape (n,), [rad].
-        limits: Of each joint.
+        limits: Limits of the joints.
 
     Raises:
-        PlanningError: One is not.
+        PlanningError: A joint is not inside.
     """
     outside = np.flatnonzero(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         i = int(outside[0])
         angle, low, high = float(q[i]), float(limits.lower[i]), float(limits.upper[i])
         facts = {"joint": i + 1, "angle": angle, "low": low, "high": high}
-        said = (
+        message = (
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
         soft, back = limits.exceeded_soft_limit(i + 1, angle), "plan_recovery(model, q) moves back inside"
         if soft is None and what == "start":
-            raise PlanningError(f"{said}where the arm is there, {back}").coded("range_start", **facts)
+            raise PlanningError(f"{message}if the arm is there, {back}").coded("range_start", **facts)
         if soft is None:
-            raise PlanningError(f"{said}choose an angle between them").coded("range", **facts)
-        said += f"{degrees(soft):.2f}° is the soft limit that was set; "
+            raise PlanningError(f"{message}choose an angle between them").coded("range", **facts)
+        message += f"{degrees(soft):.2f}° is the soft limit that was set; "
         facts["limit"] = soft
         widen = "widen the soft limit"
         if what == "start":
-            raise PlanningError(f"{said}where the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
-        raise PlanningError(f"{said}choose an angle between them, or {widen}").coded("range_soft", **facts)
+            raise PlanningError(f"{message}if the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
+        raise PlanningError(f"{message}choose an angle between them, or {widen}").coded("range_soft", **facts)
 
 
 def limit_passed(limits: JointLimits, joint: int, angle: float, advice: str) -> PlanningError:
-    """Returns the error that says which bound a way of the tool passes: the joint's own, or the soft limit set there.
+    """Returns the error for a tool path that would pass a joint's range: its own limit, or a soft limit.
 
     Args:
-        limits: Of each joint.
-        joint: Which one, counted from 1.
-        angle: Where it would be, [rad].
-        advice: What helps, for people.
+        limits: Limits of the joints.
+        joint: Number of the joint, from 1.
+        angle: Angle outside its range, [rad].
+        advice: Remedy, for the message.
     """
-    said, facts = _crossed("pass", limits, joint, angle)
-    error = PlanningError(f"{said}; {advice}")
+    message, facts = _describe_crossing("pass", limits, joint, angle)
+    error = PlanningError(f"{message}; {advice}")
     return error.coded("path_limit_soft", **facts) if "limit" in facts else error.coded("path_limit", **facts)
 
 
 def limit_touched(limits: JointLimits, joint: int, angle: float, advice: str = "") -> PlanningError:
-    """Returns the error that says which bound a planned motion touches; see `limit_passed`."""
-    said, facts = _crossed("touch", limits, joint, angle)
-    error = PlanningError(f"{said}; {advice}" if advice else said)
+    """Returns the error for a planned motion that touches a bound; see `limit_passed`."""
+    message, facts = _describe_crossing("touch", limits, joint, angle)
+    error = PlanningError(f"{message}; {advice}" if advice else message)
     return error.coded("touches_soft", **facts) if "limit" in facts else error.coded("touches", **facts)
 
 
-def _crossed(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[str, dict[str, float]]:
-    """Returns which bound is crossed and where, in words and as facts: with a limit where a soft one was set."""
+def _describe_crossing(verb: str, limits: JointLimits, joint: int, angle: float) -> tuple[str, dict[str, float]]:
+    """Returns the message and the facts of a crossed bound; the facts have "limit" for a soft limit."""
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
     facts: dict[str, float] = {"joint": joint, "angle": angle, "low": low, "high": high}
     soft = limits.exceeded_soft_limit(joint, angle)
@@ -96,9 +96,9 @@ def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointL
     """Returns the limits of a motion that starts at `q`: a joint that starts outside may only move inwards.
 
     Args:
-        limits: Of each joint.
-        q: Where the arm is, shape (n,), [rad].
-        most: How far outside a joint may be for this, [rad]; the range of one that is farther out stays.
+        limits: Limits of the joints.
+        q: Joint angles at the start, shape (n,), [rad].
+        most: Largest distance outside, [rad]; the range of a joint farther outside is not widened.
     """
     beyond = np.maximum(limits.lower - q, q - limits.upper)
     if (beyond < 0.0).all():
@@ -110,5 +110,5 @@ def range_from(limits: JointLimits, q: JointVector, most: float = inf) -> JointL
 
 
 def angle_text(value: float) -> str:
-    """Returns an angle, [rad], for an error: in degrees and radians."""
+    """Returns an angle, [rad], as text in degrees and radians."""
     return f"{degrees(value):.2f}° ({value:.4f} rad)"

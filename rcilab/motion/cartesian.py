@@ -16,18 +16,18 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.bounds import require_inside
 from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw
-from rcilab.motion.motion import Motion, standing
+from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.path import (
     ArcOrientation,
     CircleOrientation,
+    ElbowDirection,
     Path,
-    Way,
     build_arc,
     build_circle,
     build_line,
     circle_through,
 )
-from rcilab.motion.path_infeasibility import examine, refusal
+from rcilab.motion.path_infeasibility import path_error, solve_path
 from rcilab.motion.path_timing import curve_through, plan_along, require_path
 from rcilab.motion.piecewise import join_pieces
 from rcilab.motion.s_curve import plan_s_curve
@@ -38,18 +38,18 @@ PathLaw: TypeAlias = JointLaw
 """Time law of a path: the same as for a joint motion; the S profile is that of MOVEL (manual 3.5)."""
 
 
-_WAYS: tuple[Way, ...] = get_args(Way)
+_ELBOW_DIRECTIONS: tuple[ElbowDirection, ...] = get_args(ElbowDirection)
 
 S_PROFILE_PATH_VELOCITY = 1.0
 """Speed of the vendor's path generator at speed 1, [m/s]; of a pure rotation, [rad/s]."""
 S_PROFILE_PATH_ACCELERATION = 2.5
 """Acceleration of the vendor's path generator at speed 1, [m/s^2] or [rad/s^2]."""
 
-_JUMP = 4.0
-"""Times the velocity limit, and times the turn of the tool, within a cycle: beyond it a joint does not follow the tool
-but changes branches at a singularity. Tuning value; what is slower is a motion, and `check` checks it."""
-_LEVER = 0.1
-"""Length that makes a turn of the tool's way, [m]; tuning value."""
+_JUMP_FACTOR = 4.0
+"""A joint that turns more in a cycle than this factor times its velocity limit and the tool's rotation allow changes
+branches at a singularity. Tuning value; slower motions are planned, and `check` checks them."""
+_LEVER_LENGTH = 0.1
+"""Length that converts the tool's translation to a rotation, [m]; tuning value."""
 
 
 def plan_line(
@@ -63,16 +63,16 @@ def plan_line(
 ) -> Motion:
     """Returns the motion on which the tool moves in a straight line from its pose at `start` to `goal`.
 
-    Position and arm angle are linear and the orientation a slerp in the path length, from standstill to standstill.
+    Position and arm angle are linear in the path length, the orientation is a slerp. Starts and ends at standstill.
 
     Args:
         model: The arm, with its tool.
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         goal: Pose of the tool in base at the end.
-        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
-            0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
-            +-pi too. None holds the one of the start.
+        speed: Part of the velocity and acceleration limits to use, or of those of the vendor's generator, from
+            `MIN_SPEED` = 0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there in the shorter direction,
+            across +-pi too. None holds the one of the start.
         law: "jerk_limited": as fast as the limits on joints, tool and arm angle allow, with a margin of `LIMIT_MARGIN`,
             as the controller checks them; the jerk limits are used in full. "torque_rate_limited": the same with lower
             jerk limits, see `plan_joint`. "s_profile": the vendor's MOVEL, with at most `speed` times 1 m/s and 2.5
@@ -81,7 +81,7 @@ def plan_line(
             rotation about any axis uses its angle as path length.
 
     Raises:
-        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way; the message
+        PlanningError: A pose on the path is out of reach, or a joint limit or a singularity is in the way; the message
             says where and why.
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
@@ -100,7 +100,7 @@ def plan_arc(
     law: PathLaw = "jerk_limited",
     orientation: ArcOrientation = "through_via",
 ) -> Motion:
-    """Returns the motion on which the tool moves on the arc from its pose at `start` over `via` to `goal`.
+    """Returns the motion on which the tool moves on the arc from its pose at `start` through `via` to `goal`.
 
     As on the vendor's MOVEC, the path length is that of the arc.
 
@@ -109,19 +109,19 @@ def plan_arc(
         start: Joint angles at the start, shape (n,), [rad]. Plan from the commanded angles (`state.q_c`).
         via: A pose on the arc.
         goal: Pose of the tool in base at the end.
-        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
-            0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
-            +-pi too. None holds the one of the start.
+        speed: Part of the velocity and acceleration limits to use, or of those of the vendor's generator, from
+            `MIN_SPEED` = 0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there in the shorter direction,
+            across +-pi too. None holds the one of the start.
         law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         orientation: "through_via": the tool passes exactly the orientation of `via` where it passes its position, and
-            turns there and back the shorter way each, with continuous angular velocity and acceleration.
+            turns there and on in the shorter direction, with continuous angular velocity and acceleration.
             "start_to_goal": it turns by slerp from start to goal, and the orientation of `via` is ignored, as on the
             vendor's MOVEC.
 
     Raises:
-        PlanningError: The three positions make no circle, or a pose on the way is out of reach, or a joint limit or a
-            singularity is in the way; the message says where and why.
+        PlanningError: The three positions do not define a circle, a pose on the path is out of reach, or a joint limit
+            or a singularity is in the way; the message says where and why.
         InvalidValueError: An argument is of the wrong shape or kind, not finite, or out of range.
     """
     q = _require_start(model, start, law)
@@ -154,17 +154,17 @@ def plan_circle(
         center: Centre of the circle in base, shape (3,), [m].
         axis: Direction of its axis in base, shape (3,), of any length; the tool goes around it by the right-hand rule.
         angle: How far, more than 0 and up to 2 pi (all around), [rad].
-        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
-            0.001 to 1.
-        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there the shorter way round, across
-            +-pi too. None holds the one of the start.
+        speed: Part of the velocity and acceleration limits to use, or of those of the vendor's generator, from
+            `MIN_SPEED` = 0.001 to 1.
+        psi: Arm angle of a 7-axis arm at the end, from -pi to pi, [rad]; it goes there in the shorter direction,
+            across +-pi too. None holds the one of the start.
         law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
-        orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
+        orientation: "held": that of the start, constant. "turning": the tool turns with the circle, about its axis
             and by the same angle, so that the same side of it faces the centre.
 
     Raises:
-        PlanningError: The positions make no circle, start is not on it, a pose on the way is out of reach, or a joint
-            limit or a singularity is in the way; the message says where and why.
+        PlanningError: The positions do not define a circle, start is not on it, a pose on the path is out of reach, or
+            a joint limit or a singularity is in the way; the message says where and why.
         InvalidValueError: An argument is missing, of the wrong shape or kind, not finite, or out of range.
     """
     q = _require_start(model, start, law)
@@ -188,7 +188,7 @@ def plan_nullspace(
     *,
     speed: float = 0.2,
     law: PathLaw = "jerk_limited",
-    way: Way = "shorter",
+    way: ElbowDirection = "shorter",
 ) -> Motion:
     """Returns the motion on which the tool keeps its pose at `start` and only the elbow moves, to arm angle `psi`.
 
@@ -196,39 +196,39 @@ def plan_nullspace(
         model: A 7-axis arm, with its tool.
         start: Joint angles at the start, shape (7,), [rad]. Plan from the commanded angles (`state.q_c`).
         psi: Arm angle at the end, from -pi to pi, [rad].
-        speed: Part of the velocity and acceleration limits to use, or of the vendor's generator's, from `MIN_SPEED` =
-            0.001 to 1.
+        speed: Part of the velocity and acceleration limits to use, or of those of the vendor's generator, from
+            `MIN_SPEED` = 0.001 to 1.
         law: "jerk_limited", "torque_rate_limited" or "s_profile", see `plan_line`.
         way: Direction of the elbow, "shorter" or "longer"; both may cross +-pi, where the arm angle wraps around. The
-            longer way to the arm angle of the start is a full turn.
+            longer direction to the arm angle of the start is a full turn.
 
     Raises:
         PlanningError: The arm angle has no meaning at the start, or a joint limit or a singularity is in the way; the
-            message says where and why, and whether the other way is free.
+            message says where and why, and whether the other direction is free.
         InvalidValueError: The arm has 6 axes, or an argument is of the wrong shape or kind, not finite, or out of
             range.
     """
     q = _require_start(model, start, law)
-    if way not in _WAYS:
-        raise InvalidValueError("way", described(way), f"is unknown; known: {', '.join(_WAYS)}")
+    if way not in _ELBOW_DIRECTIONS:
+        raise InvalidValueError("way", described(way), f"is unknown; known: {', '.join(_ELBOW_DIRECTIONS)}")
     T, psi = model.forward(q), as_number(psi, "psi", "rad")
     try:
         return plan_path(model, q, build_line(T, T, *arm_angles(model, q, psi, way)), speed, law)
     except PlanningError as error:
         if error.share is None:
             raise
-        other: Way = "longer" if way == "shorter" else "shorter"
+        other: ElbowDirection = "longer" if way == "shorter" else "shorter"
         try:
             require_path(model, q, build_line(T, T, *arm_angles(model, q, psi, other)))
         except PlanningError:
-            advice = f"the {other} way round is not free either; model.feasible_arcs returns the feasible arm angles"
+            advice = f"the {other} direction is not free either; model.feasible_arcs returns the feasible arm angles"
         else:
-            advice = f'the {other} way round is free: way="{other}"'
+            advice = f'the {other} direction is free: way="{other}"'
         raise PlanningError(f"{error}; {advice}", share=error.share).coded(error.code, **error.facts) from error
 
 
 def arm_angles(
-    model: RobotModel, q: JointVector, psi: float | None, way: Way | None = None
+    model: RobotModel, q: JointVector, psi: float | None, way: ElbowDirection | None = None
 ) -> tuple[float | None, float | None]:
     """Returns the arm angles at the start and at the end of a path from q, [rad]; None twice for a 6-axis arm.
 
@@ -236,7 +236,7 @@ def arm_angles(
         model: The arm.
         q: Joint angles at the start, shape (n,), [rad].
         psi: Arm angle at the end, from -pi to pi, [rad]; None holds the one of the start.
-        way: Direction; the angle at the end is beyond +-pi if the way crosses it. None is the direction that never
+        way: Direction; the angle at the end is beyond +-pi if it crosses that. None is the direction that never
             crosses it, as in the vendor's generator.
 
     Raises:
@@ -249,18 +249,18 @@ def arm_angles(
             raise InvalidValueError("psi", psi, problem).coded("six_axes", model=model.name)
         return None, None
     try:
-        here = model.arm_angle(q)
+        current = model.arm_angle(q)
     except SingularError as error:
-        refused = PlanningError(f"at the start {error}; move to a bent pose in joint space first")
-        raise refused.coded("stretched_start") from error
-    wanted = here if psi is None else as_number(psi, "psi", "rad")
-    if not abs(wanted) <= math.pi:
+        failure = PlanningError(f"at the start {error}; move to a bent pose in joint space first")
+        raise failure.coded("stretched_start") from error
+    requested = current if psi is None else as_number(psi, "psi", "rad")
+    if not abs(requested) <= math.pi:
         raise InvalidValueError("psi", psi, "must be from -pi to pi [rad]").coded("span", low="-pi", high="pi")
     if way is None or psi is None:
-        return here, wanted
-    shorter = math.remainder(wanted - here, math.tau)
+        return current, requested
+    shorter = math.remainder(requested - current, math.tau)
     turn = shorter if way == "shorter" else shorter - math.copysign(math.tau, shorter)
-    return here, wanted + math.tau * round((here + turn - wanted) / math.tau)
+    return current, requested + math.tau * round((current + turn - requested) / math.tau)
 
 
 def schedule(path: Path, speed: float) -> Array:
@@ -273,11 +273,11 @@ def schedule(path: Path, speed: float) -> Array:
     Raises:
         InvalidValueError: The speed is out of range.
     """
-    return _s_law(path, speed).s
+    return _s_profile_timing(path, speed).s
 
 
 def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
-    """Returns the motion along a path: the inverse of every pose, each next to the one before.
+    """Returns the motion along a path by the S profile: the inverse of every pose, without a change of branch.
 
     Args:
         model: The arm, with its tool.
@@ -286,27 +286,29 @@ def follow_path(model: RobotModel, q: JointVector, path: Path, speed: float) -> 
         speed: Part of the generator's velocity and acceleration to use, from `MIN_SPEED` to 1.
 
     Raises:
-        PlanningError: A pose on the way is out of reach, a joint limit or a singularity is in the way.
+        PlanningError: A pose on the path is out of reach, a joint limit or a singularity is in the way.
         InvalidValueError: The speed is out of range.
     """
     require_inside("start", q, model.limits.joint)
-    law = _s_law(path, speed)
+    law = _s_profile_timing(path, speed)
     shares = law.s
     if len(shares) == 1:
-        return standing(q, law="s_profile", speed=speed)
-    whole_turn = path.turn + (path.distance / _LEVER if path.unit == "m" else path.distance)
-    longest = _JUMP * (model.limits.joint.velocity * CYCLE_TIME + whole_turn * np.diff(shares)[:, np.newaxis])
-    rows, obstacle = examine(model, q, path, shares, longest, "within one cycle")
-    if obstacle is not None:
-        when = f"t = {obstacle.row * CYCLE_TIME:.3f} s, "
-        raise refusal(path, float(shares[obstacle.row]), obstacle.reason, when)
+        return stationary_motion(q, law="s_profile", speed=speed)
+    whole_turn = path.turn + (path.distance / _LEVER_LENGTH if path.unit == "m" else path.distance)
+    longest = _JUMP_FACTOR * (model.limits.joint.velocity * CYCLE_TIME + whole_turn * np.diff(shares)[:, np.newaxis])
+    rows, infeasible = solve_path(model, q, path, shares, longest, "within one cycle")
+    if infeasible is not None:
+        when = f"t = {infeasible.row * CYCLE_TIME:.3f} s, "
+        raise path_error(path, float(shares[infeasible.row]), infeasible.reason, when)
     return Motion(polynomial=curve_through(model, path, rows, law), goal=rows[-1], law="s_profile", speed=speed)
 
 
-def _s_law(path: Path, speed: float) -> TimeParametrization:
+def _s_profile_timing(path: Path, speed: float) -> TimeParametrization:
     speed = as_number(speed, "speed")
     if not MIN_SPEED <= speed <= 1.0:
-        raise InvalidValueError("speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed")
+        raise InvalidValueError(
+            "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the generator's speed to use"
+        )
     if path.distance == 0.0:
         return TimeParametrization(np.ones(1), np.zeros(1), np.zeros(1))
     curve = plan_s_curve(path.distance, S_PROFILE_PATH_VELOCITY * speed, S_PROFILE_PATH_ACCELERATION * speed)
@@ -319,17 +321,17 @@ def _s_law(path: Path, speed: float) -> TimeParametrization:
 
 
 def plan_path(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:
-    """Returns the motion along a path by a law.
+    """Returns the motion along a path with a time law.
 
     Args:
         model: The arm, with its tool.
         q: Joint angles at the start of the path, shape (n,), [rad]: they choose the branch.
         path: The path.
-        speed: Part of the limits to use, or of the vendor's generator's, from `MIN_SPEED` to 1.
+        speed: Part of the limits to use, or of those of the vendor's generator, from `MIN_SPEED` to 1.
         law: See `plan_line`.
 
     Raises:
-        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+        PlanningError: A pose on the path is out of reach, or a joint limit or a singularity is in the way.
     """
     if law == "s_profile":
         return follow_path(model, q, path, speed)

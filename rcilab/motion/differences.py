@@ -22,7 +22,7 @@ def derivatives_from_differences(
     Args:
         dq: First backward difference over one cycle, shape (n,), [rad/s].
         ddq: Second backward difference, shape (n,), [rad/s^2].
-        jerk: Third backward difference, shape (n,), [rad/s^3]; 0 takes the acceleration as constant.
+        jerk: Third backward difference, shape (n,), [rad/s^3]; 0 assumes a constant acceleration.
     """
     h = CYCLE_TIME
     jerk = np.asarray(jerk, dtype=np.float64)
@@ -33,7 +33,7 @@ def derivatives_from_differences(
 def differences_from_derivatives(
     dq: ArrayLike, ddq: ArrayLike, jerk: ArrayLike = 0.0
 ) -> tuple[JointVector, JointVector]:
-    """Returns the first and second backward difference that a controller holds where a curve has these derivatives.
+    """Returns the first and second backward differences of a curve with these derivatives, as a controller forms them.
 
     Args:
         dq: Velocity, shape (n,), [rad/s].

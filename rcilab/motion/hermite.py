@@ -1,4 +1,4 @@
-"""Quintics between states: given value, slope and bend at both ends of an interval."""
+"""Quintic Hermite interpolation: given value, first and second derivative at both ends of an interval."""
 
 from __future__ import annotations
 
@@ -13,37 +13,37 @@ State: TypeAlias = tuple[Array, Array, Array]
 
 
 def quintic(left: State, right: State, length: float | Array) -> tuple[Array, ...]:
-    """Returns the coefficients, ascending powers of the part of the interval, 0 to 1, each of the values' shape.
+    """Returns the coefficients in ascending powers of u, which runs from 0 to 1, each of the values' shape.
 
     Args:
-        left: State at the start; many at once where the first axis counts intervals.
+        left: State at the start; for many intervals at once, the first axis counts them.
         right: State at the end.
-        length: Of the interval, one number or of a shape that multiplies with the values.
+        length: Length of the interval; a number, or an array that broadcasts with the values.
     """
     slope = left[1] * length
     bend = left[2] * (length * length / 2.0)
     rise = right[0] - left[0] - slope - bend
-    steeper = right[1] * length - slope - 2.0 * bend
-    bent = right[2] * (length * length) - 2.0 * bend
+    slope_change = right[1] * length - slope - 2.0 * bend
+    bend_change = right[2] * (length * length) - 2.0 * bend
     return (
         left[0],
         slope,
         bend,
-        10.0 * rise - 4.0 * steeper + bent / 2.0,
-        -15.0 * rise + 7.0 * steeper - bent,
-        6.0 * rise - 3.0 * steeper + bent / 2.0,
+        10.0 * rise - 4.0 * slope_change + bend_change / 2.0,
+        -15.0 * rise + 7.0 * slope_change - bend_change,
+        6.0 * rise - 3.0 * slope_change + bend_change / 2.0,
     )
 
 
-def evaluate(powers: tuple[Array, ...], part: Array) -> Array:
-    """Returns the values of one quintic at many parts of its interval, shape (N, *shape)."""
-    u = part.reshape(-1, *([1] * powers[0].ndim))
-    value = np.broadcast_to(powers[-1], (len(part), *powers[0].shape)).copy()
-    for power in reversed(powers[:-1]):
-        value = value * u + power
+def evaluate(coefficients: tuple[Array, ...], parameters: Array) -> Array:
+    """Returns the values of one quintic at many parameters u, shape (N,) to (N, *shape)."""
+    u = parameters.reshape(-1, *([1] * coefficients[0].ndim))
+    value = np.broadcast_to(coefficients[-1], (len(parameters), *coefficients[0].shape)).copy()
+    for coefficient in reversed(coefficients[:-1]):
+        value = value * u + coefficient
     return value
 
 
-def derived(powers: tuple[Array, ...], length: float | Array) -> tuple[Array, ...]:
-    """Returns the coefficients of the derivative, still in powers of the part of the interval."""
-    return tuple(float(p) * powers[p] / length for p in range(1, len(powers)))
+def derivative(coefficients: tuple[Array, ...], length: float | Array) -> tuple[Array, ...]:
+    """Returns the coefficients of the derivative, also in powers of u."""
+    return tuple(float(p) * coefficients[p] / length for p in range(1, len(coefficients)))

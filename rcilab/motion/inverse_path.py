@@ -1,4 +1,4 @@
-"""The inverse along a path of the tool: `rcilab.model.kinematics.solvers.spherical.branch` for an arm with its tool."""
+"""Inverse kinematics along a path of the tool."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from rcilab.model.robot_model import RobotModel
 def inverse_path(
     model: RobotModel, T: Array, psi: Array | None, start: JointVector
 ) -> tuple[JointPath, BranchEnd | None]:
-    """Returns the joint angles along a path of the tool on one branch, without a jump from row to row.
+    """Returns the joint angles along a path of the tool, on one branch and without jumps.
 
-    Joint limits are not checked. About 2 us per row; 20 us with offsets, without a closed-form inverse.
+    Joint limits are not checked. About 2 us per row; 20 us for an arm with offsets, which has no closed-form inverse.
 
     Args:
         model: The arm, with its tool.
-        T: Poses of the tool in base, shape (N, 4, 4), close enough to each other to be followed.
+        T: Poses of the tool in base, shape (N, 4, 4), each close to the next.
         psi: Arm angles of a 7-axis arm, shape (N,), [rad]; None for 6 axes.
-        start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
+        start: Joint angles at row 0, shape (n,), [rad]; they select the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None; the angles are
-        meaningless from that row on.
+        Joint angles, shape (N, n), [rad], and the first row that is out of reach or singular, or None. From that row on
+        the angles have no meaning.
     """
     (rotation, (x, y, z)), R, p = model.T_flange_tool.inverse().parts, T[:, :3, :3], T[:, :3, 3]
     if not model.T_flange_tool.is_close(IDENTITY, 0.0):

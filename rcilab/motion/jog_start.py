@@ -13,7 +13,7 @@ from rcilab.motion.stop import plan_stop
 
 
 def require_stoppable(limits: JointLimits, q: JointVector, dq: JointVector, ddq: JointVector) -> None:
-    """Refuses a state that is outside the limits, or from which the fastest stop leads outside.
+    """Requires a state inside the limits, from which the fastest stop stays inside them.
 
     Args:
         limits: Bounds of the joints.
@@ -24,14 +24,14 @@ def require_stoppable(limits: JointLimits, q: JointVector, dq: JointVector, ddq:
     Raises:
         PlanningError: The message names the joint, the value and the bound.
     """
-    # Until the acceleration is gone, at full jerk, the velocity still changes by ddq^2 / (2 jerk).
+    # While full jerk removes the acceleration, the velocity still changes by ddq^2 / (2 jerk).
     peak = dq + ddq * np.abs(ddq) / (2.0 * limits.jerk)
     (lowest, _), (highest, _) = plan_stop(limits, q, dq, ddq).polynomial.extremes()
     for name, value, lower, upper, unit in (
         ("angle", q, limits.lower, limits.upper, "rad"),
         ("velocity", dq, -limits.velocity, limits.velocity, "rad/s"),
         ("acceleration", ddq, -limits.acceleration, limits.acceleration, "rad/s^2"),
-        ("velocity a moment later", peak, -limits.velocity, limits.velocity, "rad/s"),
+        ("velocity once the acceleration is zero", peak, -limits.velocity, limits.velocity, "rad/s"),
         ("angle after the fastest stop", lowest, limits.lower, limits.upper, "rad"),
         ("angle after the fastest stop", highest, limits.lower, limits.upper, "rad"),
     ):

@@ -14,7 +14,7 @@ from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN, angle_text, require_inside
-from rcilab.motion.motion import Motion, standing
+from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
 from rcilab.motion.torque_rate import plan_within_torque_rate
@@ -33,7 +33,7 @@ S_PROFILE_ACCELERATION = 2.5
 
 
 class Arm(Protocol):
-    """What planning needs of a robot; implemented by RobotModel and RobotDescription."""
+    """What a planner needs of an arm; implemented by RobotModel and RobotDescription."""
 
     @property
     def n(self) -> int:
@@ -66,10 +66,10 @@ def plan_joint(
             jerk limit is used in full.
         law: "jerk_limited": the fastest motion inside the limits, with a margin of `LIMIT_MARGIN`. From standstill, or
             moving straight towards or away from `goal`, it is the fastest one on the straight line in joint space; with
-            another start velocity or acceleration there is no such line, and each joint takes the same time on its own
-            curve. "torque_rate_limited": the same with jerk limits lowered until the torques change no faster than the
+            another start velocity or acceleration there is no such line, and the joints arrive together on different
+            curves. "torque_rate_limited": the same with jerk limits lowered until the torques change no faster than the
             manual recommends (4.4), which takes some hundredths of a second to plan; it needs a RobotModel.
-            "s_profile": exactly the motion of the vendor's joint generator (manual 3.5). That one has its own speeds
+            "s_profile": exactly the motion of the vendor's joint generator (manual 3.5), which has its own speeds
             and ignores the robot's limits: use `rcilab.check`. A joint with less than 1e-6 rad to move stays, so the
             motion may end that far from `goal`.
         start_velocity: Joint velocities at the start, shape (n,), [rad/s]; None is zero. Derivatives of the running
@@ -110,16 +110,16 @@ def plan_joint(
 def _plan_jerk_limited(
     limits: JointLimits, start: JointVector, goal: JointVector, speed: float, dq: JointVector, ddq: JointVector
 ) -> Motion:
-    at_rest = not dq.any() and not ddq.any()
-    if at_rest and np.array_equal(start, goal):
-        return standing(goal, speed=speed)
-    if not at_rest:
+    is_stationary = not dq.any() and not ddq.any()
+    if is_stationary and np.array_equal(start, goal):
+        return stationary_motion(goal, speed=speed)
+    if not is_stationary:
         _require_possible(limits, dq, ddq)
-    part = LIMIT_MARGIN * speed
+    scale = LIMIT_MARGIN * speed
     curve = _ruckig.plan_profile(
-        start, goal, part * limits.velocity, part * limits.acceleration, LIMIT_MARGIN * limits.jerk, dq, ddq
+        start, goal, scale * limits.velocity, scale * limits.acceleration, LIMIT_MARGIN * limits.jerk, dq, ddq
     )
-    if not at_rest:  # From rest every joint runs straight from start to goal, and both are inside.
+    if not is_stationary:  # From standstill every joint moves straight from start to goal, and both are inside.
         _require_room(curve, limits)
     return Motion(polynomial=curve, goal=goal, law="jerk_limited", speed=speed)
 
@@ -129,9 +129,9 @@ def _plan_s_profile(
 ) -> Motion:
     n = len(start)
     if dq.any() or ddq.any():
-        raise PlanningError("the S profile starts at rest; use law='jerk_limited' to plan from a moving start").coded(
-            "s_profile_moving"
-        )
+        raise PlanningError(
+            "the S profile starts at standstill; use law='jerk_limited' to plan from a moving start"
+        ).coded("s_profile_moving")
     if n not in S_PROFILE_VELOCITY:
         raise PlanningError(
             f"the S profile is defined for arms of 6 or 7 joints, not {n}; use law='jerk_limited'"
@@ -146,7 +146,7 @@ def _plan_s_profile(
     end = np.where(np.abs(goal - start) > STANDSTILL_DISTANCE, goal, start)
     duration = max(curve.duration for curve in curves)
     if duration == 0.0:
-        return standing(end, law="s_profile", speed=speed)
+        return stationary_motion(end, law="s_profile", speed=speed)
     pieces = [curve.pieces() for curve in curves]
     coefficients = np.array([table for _, table in pieces])
     coefficients[:, :, 0] += start[:, np.newaxis]
@@ -155,11 +155,11 @@ def _plan_s_profile(
 
 
 def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) -> None:
-    """Refuses a start state that is outside the limits, or that no jerk inside the limits keeps inside."""
+    """Requires a start state inside the limits that some jerk inside the limits keeps inside."""
     for name, value, bound, unit in (
         ("start velocity", dq, limits.velocity, "rad/s"),
         ("start acceleration", ddq, limits.acceleration, "rad/s^2"),
-        # Until the acceleration is gone, at full jerk, the velocity still changes by ddq^2 / (2 jerk).
+        # While full jerk removes the acceleration, the velocity still changes by ddq^2 / (2 jerk).
         ("velocity shortly after the start", dq + ddq * np.abs(ddq) / (2.0 * limits.jerk), limits.velocity, "rad/s"),
     ):
         beyond = np.flatnonzero(np.abs(value) > bound)
@@ -172,7 +172,7 @@ def _require_possible(limits: JointLimits, dq: JointVector, ddq: JointVector) ->
 
 
 def _require_room(curve: PiecewisePolynomial, limits: JointLimits) -> None:
-    """Refuses a curve that turns outside the position limits."""
+    """Requires a curve that stays inside the position limits."""
     (lowest, lowest_times), (highest, highest_times) = curve.extremes()
     for angles, times, bounds, outside in (
         (lowest, lowest_times, limits.lower, lowest <= limits.lower),
@@ -183,5 +183,5 @@ def _require_room(curve: PiecewisePolynomial, limits: JointLimits) -> None:
             raise PlanningError(
                 f"joint {i + 1}: would reach {angle_text(float(angles[i]))} at t = {times[i]:.3f} s, past its limit "
                 f"{angle_text(float(bounds[i]))}, because it starts too fast towards it; "
-                f"plan with a higher speed (it brakes harder), or stop first and plan from rest"
+                f"plan with a higher speed (it brakes harder), or stop first and plan from standstill"
             )

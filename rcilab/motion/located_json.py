@@ -1,6 +1,6 @@
-"""JSON with the line of every value, for files that people write by hand and that others may have spoiled.
+"""JSON with the line of every value, for files that are written by hand or come from unknown sources.
 
-Stricter than `json`: no NaN or infinity, no number beyond a double, no key twice, and only so much size and depth.
+Stricter than `json`: no NaN or infinity, no number beyond a double, no duplicate key, and bounded size and depth.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from typing import TypeAlias
 from rcilab.core.arrays import Unquoted
 from rcilab.core.errors import InvalidValueError
 
-LONGEST = 8_000_000
+MAX_BYTES = 8_000_000
 """Largest text, [bytes]; tuning value: a program of 10 000 waypoints has 4 million."""
-DEEPEST = 8
-"""How deep lists and objects may be in each other; tuning value: a program needs 4."""
+MAX_DEPTH = 8
+"""Largest nesting depth of lists and objects; tuning value: a program needs 4."""
 
-_BLANK = re.compile(r"[ \t\r\n]*")
+_WHITESPACE = re.compile(r"[ \t\r\n]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)
 _WORD = re.compile(r"[^\s,:\[\]{}\"]+")
-_DECODER = JSONDecoder()  # For text, with its escapes, and for what is only counted.
+_DECODER = JSONDecoder()  # For strings with escapes, and to count items.
 _CONSTANTS = {"true": True, "false": False, "null": None}
 
 Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
@@ -32,7 +32,7 @@ Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """A value and where it stands."""
+    """A value and its line."""
 
     value: Content
     """Every number is a float."""
@@ -47,115 +47,118 @@ class Node:
 
 
 class LongListError(Exception):
-    """A list has more values than its reader takes; nothing behind them was looked at."""
+    """A list has more values than allowed; the rest of the text has not been checked."""
 
     def __init__(self, count: int, line: int) -> None:
         super().__init__(f"{count} values in line {line}")
         self.count, self.line = count, line
 
 
-def read_json(content: bytes, name: str, most: Mapping[str, int] = MappingProxyType({})) -> Node:
-    """Returns what a text holds, with lines.
+def read_json(content: bytes, name: str, max_items: Mapping[str, int] = MappingProxyType({})) -> Node:
+    """Returns the content of a JSON text, with lines.
 
     Args:
         content: JSON in UTF-8.
-        name: What to call it in an error.
-        most: How many values the lists under these keys may hold; other lists are bounded by the text alone.
+        name: Name of the text, for errors.
+        max_items: Largest number of values in the lists under these keys; other lists are bounded by
+            the text's size alone.
 
     Raises:
-        LongListError: One of those lists holds more.
-        InvalidValueError: It is no JSON, or not what this reader takes; the message names the line.
+        LongListError: One of those lists has more values.
+        InvalidValueError: The text is not valid JSON, or exceeds a bound; the message names the line.
     """
-    if len(content) > LONGEST:
-        raise InvalidValueError(name, Unquoted(f"{len(content) / 1e6:.1f} MB"), f"is above {LONGEST / 1e6:g} MB").coded(
-            "file_large", file=name, size=f"{len(content) / 1e6:.1f}", most=f"{LONGEST / 1e6:g}"
-        )
+    if len(content) > MAX_BYTES:
+        raise InvalidValueError(
+            name, Unquoted(f"{len(content) / 1e6:.1f} MB"), f"is above {MAX_BYTES / 1e6:g} MB"
+        ).coded("file_large", file=name, size=f"{len(content) / 1e6:.1f}", most=f"{MAX_BYTES / 1e6:g}")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        problem = "is no text in UTF-8; save it as JSON"
+        problem = "is not UTF-8 text; save the file as JSON"
         raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
             "file_no_text", file=name, line=line
         ) from error
-    return _Reader(text, name, most).read()
+    return _Reader(text, name, max_items).read()
 
 
 class _Reader:
-    """Walks through one text. Owned by the call of `read_json` that made it."""
+    """Parses one text. Owned by one call of `read_json`."""
 
-    def __init__(self, text: str, name: str, most: Mapping[str, int]) -> None:
-        self._text, self._name, self._most = text, name, most
-        self._at = 0
-        self._breaks = [match.start() for match in re.finditer("\n", text)]
+    def __init__(self, text: str, name: str, max_items: Mapping[str, int]) -> None:
+        self._text, self._name, self._max_items = text, name, max_items
+        self._position = 0
+        self._line_breaks = [match.start() for match in re.finditer("\n", text)]
 
     def read(self) -> Node:
         node = self._value(0)
-        if self._next():
-            raise self._error("follows after the end of the first value; a file holds one object")
+        if self._peek():
+            raise self._error("follows the end of the first value; a file contains one object")
         return node
 
     def _value(self, depth: int, key: str = "") -> Node:
-        mark = self._next()
+        character = self._peek()
         line = self._line()
-        if mark and mark in "{[":
-            if depth == DEEPEST:
-                raise self._error(f"opens more than {DEEPEST} levels; a program needs 4")
-            self._at += 1
-            return Node(self._object(depth) if mark == "{" else self._list(depth, self._most.get(key)), line)
-        if mark == '"':
+        if character and character in "{[":
+            if depth == MAX_DEPTH:
+                raise self._error(f"opens more than {MAX_DEPTH} levels; a program needs 4")
+            self._position += 1
+            return Node(self._object(depth) if character == "{" else self._list(depth, self._max_items.get(key)), line)
+        if character == '"':
             return Node(self._string(), line)
-        number = _NUMBER.match(self._text, self._at)
+        number = _NUMBER.match(self._text, self._position)
         if number is not None:
             value = float(number[0])
             if value in (float("inf"), -float("inf")):
                 raise self._error("is beyond the largest number, 1.8e308")
-            self._at = number.end()
+            self._position = number.end()
             return Node(value, line)
-        word = _WORD.match(self._text, self._at)
+        word = _WORD.match(self._text, self._position)
         if word is None or word[0] not in _CONSTANTS:
-            raise self._error('is no value; JSON has numbers with a point, "text", true, false, null, [...] and {...}')
-        self._at = word.end()
+            raise self._error(
+                'is not a value; JSON has numbers with a point, "text", true, false, null, [...] and {...}'
+            )
+        self._position = word.end()
         return Node(_CONSTANTS[word[0]], line)
 
     def _object(self, depth: int) -> dict[str, Node]:
         found: dict[str, Node] = {}
-        if self._takes("}"):
+        if self._accept("}"):
             return found
         while True:
-            if self._next() != '"':
-                raise self._error('is no key; a key is text in double quotes, such as "speed"')
-            start = self._at
+            if self._peek() != '"':
+                raise self._error('is not a key; a key is text in double quotes, such as "speed"')
+            start = self._position
             key = self._string()
             if key in found:
-                self._at = start
-                raise self._error(f"is there already, in line {found[key].line}; keep one").coded(
+                self._position = start
+                raise self._error(f"is a duplicate of the key in line {found[key].line}; keep one").coded(
                     "file_json_twice", file=self._name, line=self._line(), key=key, first=found[key].line
                 )
-            if not self._takes(":"):
-                raise self._error(f"is no colon; one must follow the key {key!r}")
+            if not self._accept(":"):
+                raise self._error(f"is not a colon; the key {key!r} needs one")
             found[key] = self._value(depth + 1, key)
-            if self._takes("}"):
+            if self._accept("}"):
                 return found
-            if not self._takes(","):
+            if not self._accept(","):
                 raise self._error("is neither a comma nor the end of the object }")
 
-    def _list(self, depth: int, most: int | None) -> list[Node]:
-        start, line = self._at - 1, self._line()
+    def _list(self, depth: int, max_items: int | None) -> list[Node]:
+        start, line = self._position - 1, self._line()
         found: list[Node] = []
-        if self._takes("]"):
+        if self._accept("]"):
             return found
         while True:
             found.append(self._value(depth + 1))
-            if most is not None and len(found) > most:
-                raise LongListError(self._count(start, len(found)), line)
-            if self._takes("]"):
+            if max_items is not None and len(found) > max_items:
+                raise LongListError(self._count_items(start, len(found)), line)
+            if self._accept("]"):
                 return found
-            if not self._takes(","):
+            if not self._accept(","):
                 raise self._error("is neither a comma nor the end of the list ]")
 
-    def _count(self, start: int, least: int) -> int:
-        """Returns how many values the list at a place has, without their lines; `least` where it is not sound."""
+    def _count_items(self, start: int, least: int) -> int:
+        """Returns the number of values in the list at `start`, or `least` if the list is not valid."""
         try:
             return len(_DECODER.raw_decode(self._text, start)[0])
         except (ValueError, RecursionError):
@@ -163,30 +166,30 @@ class _Reader:
 
     def _string(self) -> str:
         try:
-            value, self._at = _DECODER.raw_decode(self._text, self._at)
+            value, self._position = _DECODER.raw_decode(self._text, self._position)
         except JSONDecodeError as error:
-            raise self._error(f"is no text: {error.msg.lower()}") from error
+            raise self._error(f"is not valid text: {error.msg.lower()}") from error
         return value
 
-    def _next(self) -> str:
-        """Returns the next character that is no blank, or nothing at the end."""
-        match = _BLANK.match(self._text, self._at)
+    def _peek(self) -> str:
+        """Skips whitespace and returns the next character, or "" at the end."""
+        match = _WHITESPACE.match(self._text, self._position)
         assert match is not None
-        self._at = match.end()
-        return self._text[self._at : self._at + 1]
+        self._position = match.end()
+        return self._text[self._position : self._position + 1]
 
-    def _takes(self, mark: str) -> bool:
-        if self._next() != mark:
+    def _accept(self, character: str) -> bool:
+        if self._peek() != character:
             return False
-        self._at += 1
+        self._position += 1
         return True
 
     def _line(self) -> int:
-        return bisect_right(self._breaks, self._at - 1) + 1
+        return bisect_right(self._line_breaks, self._position - 1) + 1
 
     def _error(self, problem: str) -> InvalidValueError:
-        word = _WORD.match(self._text, self._at)
-        shown = word[0] if word else self._text[self._at : self._at + 20].split("\n")[0]
+        word = _WORD.match(self._text, self._position)
+        shown = word[0] if word else self._text[self._position : self._position + 20].split("\n")[0]
         found = Unquoted(shown[:60]) if shown else Unquoted("the end of the text")
         error = InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
         if not shown:

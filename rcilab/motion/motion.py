@@ -30,14 +30,14 @@ profile (3.5), the fastest stop, or given samples."""
 
 LAWS: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
 
-_CARD: dict[Language, tuple[str, str, str]] = {
+_HTML_TEXTS: dict[Language, tuple[str, str, str]] = {
     "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
     "zh": ("运动，{law}：{duration:.3f} s，速度 {speed:g}（角度以 ° 计）", "起点", "目标"),
 }
 """Caption and row names of a motion in a notebook."""
 
 _ROUNDING = 1e-9
-"""A duration that exceeds a cycle by less than this part of a cycle is rounded down to it."""
+"""A duration that exceeds whole cycles by less than this part of a cycle is rounded down to them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,8 +62,8 @@ class MotionSample:
 class Motion:
     """Joint angles as a function of time, exact at every instant, with rows on the controller's 1 ms grid.
 
-    Rows: `.times`, `.q`, `.dq`, `.ddq`, `.jerk`, computed on first access and cached. Row 0 is the start; the last row
-    is the standstill at the goal, at the first cycle not before the exact `.duration`. Derivatives are those of the
+    The rows `.times`, `.q`, `.dq`, `.ddq`, `.jerk` are computed on first access. Row 0 is the start; the last row is
+    the standstill at the goal, at the first cycle not before the exact `.duration`. Derivatives are those of the
     curve; the controller checks backward differences of `.q`, and `rcilab.check` computes those.
     """
 
@@ -75,7 +75,7 @@ class Motion:
     speed: float = 1.0
     """The speed it was planned with, as a part of the limits, in (0, 1]."""
     segment_starts: Array = field(default_factory=lambda: np.zeros(1))
-    """Start time of each segment of a program, shape (S,), first 0, [s]; any other motion has one."""
+    """Start time of each segment of a program, shape (S,), first 0, [s]; any other motion has one segment."""
     notes: tuple[str, ...] = ()
     """Notes of the planner, one sentence each, such as a blend that had to be shortened."""
     _cache: dict[str, Array] = field(init=False, repr=False, default_factory=dict[str, Array])
@@ -105,28 +105,28 @@ class Motion:
             times: Time of each sample, shape (N,), increasing, [s]; instead of `dt`.
 
         Raises:
-            InvalidValueError: Not finite, no times or too many, or the times do not increase.
+            InvalidValueError: Not finite, neither or both of `dt` and `times`, or the times do not increase.
         """
         if dt is None and times is None:
             problem = (
-                "is missing: pass the seconds between two samples, or times=; rows of 1 ms go into Motion.from_cycles"
+                "is missing: pass the seconds between two samples, or times=; for rows of 1 ms use Motion.from_cycles"
             )
             raise InvalidValueError("dt", None, problem)
         if dt is not None and times is not None:
-            raise InvalidValueError("dt", dt, "is not needed: the samples have times; leave one of the two out")
+            raise InvalidValueError("dt", dt, "is not needed if the samples have times; pass one of the two")
         rows = as_path(q, None, "q", "rad")
         if dt is not None:
             if not 0.0 < (dt := as_number(dt, "dt", "s")) < math.inf:
-                raise InvalidValueError("dt", dt, "must be above 0: seconds between two samples")
+                raise InvalidValueError("dt", dt, "must be above 0: the seconds between two samples")
             times = np.arange(len(rows)) * dt
         assert times is not None
         return motion_through(times, rows)
 
     @classmethod
     def from_cycles(cls, q: ArrayLike) -> Motion:
-        """Returns the motion through given rows, one per controller cycle of 1 ms: those of a recording or a motion.
+        """Returns the motion through rows at the controller's cycle of 1 ms, such as those of a recording.
 
-        Between the rows it is cubic, with slopes from central differences, one-sided at the ends.
+        Between the rows it is cubic, with slopes from central differences, one-sided at both ends.
 
         Args:
             q: Joint angles, shape (N, n), N >= 1, [rad].
@@ -136,7 +136,7 @@ class Motion:
         """
         rows = as_path(q, None, "q", "rad")
         if len(rows) == 1:
-            return standing(rows[0], law="samples")
+            return stationary_motion(rows[0], law="samples")
         h = CYCLE_TIME
         slopes = np.gradient(rows, h, axis=0)
         rise = np.diff(rows, axis=0) / h
@@ -165,40 +165,39 @@ class Motion:
     @property
     def times(self) -> Array:
         """Times of the rows, whole cycles, shape (N,), [s]."""
-        return self._kept("times")
+        return self._cached("times")
 
     @property
     def q(self) -> JointPath:
         """Joint angles, shape (N, n), [rad]."""
-        return self._kept("q")
+        return self._cached("q")
 
     @property
     def dq(self) -> JointPath:
         """Joint velocities, shape (N, n), [rad/s]."""
-        return self._kept("dq")
+        return self._cached("dq")
 
     @property
     def ddq(self) -> JointPath:
         """Joint accelerations, shape (N, n), [rad/s^2]."""
-        return self._kept("ddq")
+        return self._cached("ddq")
 
     @property
     def jerk(self) -> JointPath:
-        """Joint jerks, shape (N, n), [rad/s^3]; where it jumps, the later value counts."""
-        return self._kept("jerk")
+        """Joint jerks, shape (N, n), [rad/s^3]; at a jump the later value."""
+        return self._cached("jerk")
 
     @property
     def segment(self) -> NDArray[np.intp]:
-        """Index of the segment that each row belongs to, counted from 0, shape (N,): that of the waypoint of a program.
+        """Index of the segment of each row, from 0, shape (N,); in a program the index of its waypoint.
 
-        A segment without length has no row, but where it is the last.
+        A segment of zero length has no row, unless it is the last.
         """
-        late = self.times + _ROUNDING * CYCLE_TIME
-        return np.searchsorted(self.segment_starts, late, side="right") - 1
+        return np.searchsorted(self.segment_starts, self.times + _ROUNDING * CYCLE_TIME, side="right") - 1
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 over everything that defines how this motion runs, hexadecimal; its segments and notes do not."""
+        """SHA-256, hexadecimal, over everything that defines how the motion runs; segments and notes do not."""
         digest = hashlib.sha256(f"rcilab motion {self.law} {self.speed!r}".encode())
         for array in (self.polynomial.breaks, self.polynomial.coefficients, self.goal):
             digest.update(repr(array.shape).encode())
@@ -206,11 +205,11 @@ class Motion:
         return digest.hexdigest()
 
     def __len__(self) -> int:
-        """Number of rows: one a cycle, start and goal included."""
+        """Number of rows: one per cycle, with start and goal."""
         return math.ceil(self.duration / CYCLE_TIME - _ROUNDING) + 1
 
     def at(self, t: float) -> MotionSample:
-        """Returns the motion at any time: the start before it begins, standstill at the goal from the end on.
+        """Returns the motion at any time; before it begins the start, after its end standstill at the goal.
 
         Args:
             t: Time since the start, [s].
@@ -222,40 +221,40 @@ class Motion:
         if math.isnan(t):
             raise InvalidValueError("t", t, "is not a time [s]")
         if t >= self.duration:
-            rest = readonly_copy(np.zeros(self.n))
-            return MotionSample(self.goal, rest, rest, rest)
+            zero = readonly_copy(np.zeros(self.n))
+            return MotionSample(self.goal, zero, zero, zero)
         return _sample(self.polynomial.at(t))
 
     def end(self) -> MotionSample:
-        """Returns the limits from the left at the end of the curve; a valid motion ends at standstill."""
+        """Returns the left-hand limits at the end of the curve; a valid motion ends at standstill."""
         return _sample(self.polynomial.at_end())
 
     def slowed(self, factor: float) -> Motion:
         """Returns the motion on the same path `factor` times slower: q(t / factor), on its own 1 ms grid.
 
-        Velocities are divided by the factor, accelerations by its square, jerks by its cube. Law and speed stay those
-        it was planned with.
+        Velocities are divided by the factor, accelerations by its square, jerks by its cube; `law` and
+        `speed` do not change.
 
         Args:
-            factor: Times slower, 1 or more; the duration grows by it.
+            factor: Factor on the duration, 1 or more.
 
         Raises:
             InvalidValueError: The factor is not a finite number of at least 1.
         """
         factor = as_number(factor, "factor")
         if not 1.0 <= factor < math.inf:
-            raise InvalidValueError("factor", factor, "must be 1 or more, and finite: how many times slower")
+            raise InvalidValueError("factor", factor, "must be 1 or more, and finite: the factor on the duration")
         starts = factor * self.segment_starts
         return replace(self, polynomial=self.polynomial.slowed(factor), segment_starts=starts)
 
     def save(self, file: str | PathLike[str] | BinaryIO) -> None:
-        """Writes the motion to a file that `Motion.load` reads; the file's ending selects the format.
+        """Writes the motion to a file that `Motion.load` reads; the suffix selects the format.
 
         .npz stores everything exactly. .csv stores the rows of the 1 ms grid, `t [s]`, `q1 [rad]`, ...: the motion that
         is loaded again has exactly the same `.times` and `.q`, and the law "samples".
 
         Raises:
-            InvalidValueError: The ending is unknown, or the file cannot be written.
+            InvalidValueError: The suffix is unknown, or the file cannot be written.
         """
         storage.save(file, self._write_npz, lambda stream: storage.write_rows(stream, self.times, self.q))
 
@@ -266,19 +265,19 @@ class Motion:
         A CSV whose times are not the 1 ms grid is read as `load_samples` reads it.
 
         Args:
-            file: Its name, or an open binary file.
-            max_rows: Largest number of 1 ms cycles, 17 minutes by default, of 1 KiB each when unpacked.
+            file: File name, or an open binary file.
+            max_rows: Largest number of 1 ms cycles, by default 17 minutes; each takes up to 1 KiB unpacked.
 
         Raises:
-            InvalidValueError: There is no such file, it does not contain a valid motion, or it is too large.
+            InvalidValueError: The file does not exist, does not contain a valid motion, or is too large.
             VersionMismatchError: It was written by another version of this format.
         """
         if not storage.is_csv(file):
             return storage.read_content(file, max_rows, cls)
-        times, q = read_samples(file, None, "rad", max_rows)  # type: ignore[arg-type]  # A name: streams are .npz.
+        times, q = read_samples(file, None, "rad", max_rows)  # type: ignore[arg-type]  # Streams are .npz.
         if is_on_grid(times):
             return cls.from_cycles(q)
-        return _short_enough(motion_through(times, q), max_rows, file)  # type: ignore[arg-type]
+        return _require_length(motion_through(times, q), max_rows, file)  # type: ignore[arg-type]
 
     @classmethod
     def load_samples(
@@ -291,8 +290,7 @@ class Motion:
     ) -> Motion:
         """Returns the motion through joint samples of another program, at any rate, even or not.
 
-        A cubic spline through every sample, which starts and ends at standstill, on the 1 ms grid like every motion.
-        Nothing is slowed down or smoothed: use `check`.
+        It is the cubic spline of `from_samples`. Nothing is slowed down or smoothed; use `check` for the limits.
 
         A CSV file has one row per sample. With a header line, columns are found by name and others ignored: `t`, with
         a unit other than seconds as `t [ms]`, and `q1`, `q2`, ... (also `q[1]`, `joint_1`), in degrees as `q1 [deg]`.
@@ -302,14 +300,14 @@ class Motion:
         Args:
             file: Name of the file, ending in .csv or .npz.
             rate_hz: Samples per second, for a file without times, [Hz].
-            unit: Unit of angles without one.
+            unit: Unit of angles whose column does not name one.
             max_rows: As for `load`.
 
         Raises:
-            InvalidValueError: There is no such file, or its samples are not valid, or too many; the message names the
+            InvalidValueError: The file does not exist, or its samples are not valid or too many; the message names the
                 line.
         """
-        return _short_enough(motion_through(*read_samples(file, rate_hz, unit, max_rows)), max_rows, file)
+        return _require_length(motion_through(*read_samples(file, rate_hz, unit, max_rows)), max_rows, file)
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)
@@ -318,7 +316,7 @@ class Motion:
         return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
 
     def _repr_html_(self) -> str:
-        caption, start, goal = _CARD[language()]
+        caption, start, goal = _HTML_TEXTS[language()]
         degrees = (
             f"<tr><th>{name}</th>" + "".join(f"<td>{angle:.1f}</td>" for angle in np.degrees(q)) + "</tr>"
             for name, q in ((start, self.start), (goal, self.goal))
@@ -338,8 +336,8 @@ class Motion:
         }
         storage.write_arrays(stream, content)
 
-    def _kept(self, name: str) -> Array:
-        # Two threads may both compute it; they get equal arrays and one of them stays.
+    def _cached(self, name: str) -> Array:
+        # Two threads may both compute it; the arrays are equal and one of them is kept.
         if name not in self._cache:
             self._cache[name] = self._compute(name)
         return self._cache[name]
@@ -351,47 +349,51 @@ class Motion:
             derivative = ("q", "dq", "ddq", "jerk").index(name)
             array = self.polynomial.sample(self.times, derivative)
             array[-1] = 0.0 if derivative else self.goal
-        # Backed by bytes: a motion that was checked cannot be made writable again, as an array with own data could.
+        # Backed by bytes, so that the rows of a checked motion cannot be made writable again.
         return np.frombuffer(array.tobytes()).reshape(array.shape)
 
 
 def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
     """Returns the motion through joint angles at given times: a cubic spline that starts and ends at standstill.
 
-    Limits are not checked: `check` does that.
+    Limits are not checked; use `check`.
 
     Args:
-        times: Time of each sample, shape (N,), increasing, [s]; the motion starts with the first.
+        times: Time of each sample, shape (N,), increasing, [s]; the motion starts at the first.
         q: Joint angles, shape (N, n), N >= 1, [rad].
 
     Raises:
-        InvalidValueError: Not finite, not N times and N rows, the times do not increase, or last too long.
+        InvalidValueError: Not finite, numbers of times and rows differ, the times do not increase, or span too long.
     """
     curve, rows = spline_through(times, q)
-    return standing(rows[0], law="samples") if curve is None else Motion(polynomial=curve, goal=rows[-1], law="samples")
+    return (
+        stationary_motion(rows[0], law="samples")
+        if curve is None
+        else Motion(polynomial=curve, goal=rows[-1], law="samples")
+    )
 
 
-def _short_enough(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
+def _require_length(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
     require_rows(len(motion), max_rows, "samples", Path(file).name)
     return motion
 
 
 def require_motion(motion: object) -> Motion:
-    """Returns `motion` if it is a `Motion`, where model and motion are easily swapped.
+    """Returns `motion` if it is a `Motion`; catches swapped model and motion arguments.
 
     Raises:
-        InvalidValueError: It is something else; the message says how to make one.
+        InvalidValueError: It is not; the message says how to make one.
     """
     if isinstance(motion, Motion):
         return motion
     raise InvalidValueError("motion", described(motion), "must be a motion; use plan_joint or Motion.from_samples")
 
 
-def standing(q: ArrayLike, *, law: TimeLaw = "jerk_limited", speed: float = 1.0) -> Motion:
-    """Returns the motion of zero length that stands at `q`, shape (n,), [rad]."""
+def stationary_motion(q: ArrayLike, *, law: TimeLaw = "jerk_limited", speed: float = 1.0) -> Motion:
+    """Returns the motion of zero length at `q`, shape (n,), [rad]."""
     angles = np.asarray(q, dtype=np.float64)
-    still = PiecewisePolynomial(np.zeros(2), angles.reshape(1, -1, 1))
-    return Motion(polynomial=still, goal=angles, law=law, speed=speed)
+    curve = PiecewisePolynomial(np.zeros(2), angles.reshape(1, -1, 1))
+    return Motion(polynomial=curve, goal=angles, law=law, speed=speed)
 
 
 def _grid(count: int) -> Array:

@@ -1,4 +1,4 @@
-"""Named poses: joint angles stored under a name in a JSON file of the user."""
+"""Named poses: joint angles stored under names in a JSON file of the user."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from rcilab.model.robot_model import RobotModel, require_model
 
 FORMAT = "rcilab poses"
 VERSION = 1
-LONGEST_NAME = 40  # Characters that fit into a list.
+LONGEST_NAME = 40  # [characters] Fits into a list of the UI.
 
 
 def default_file() -> Path:
-    """Returns where the poses of this user are: in $XDG_CONFIG_HOME/rcilab, or ~/.config/rcilab."""
-    home = os.environ.get("XDG_CONFIG_HOME", "")
-    return (Path(home) if os.path.isabs(home) else Path.home() / ".config") / "rcilab" / "poses.json"
+    """Returns the path of the user's file, in $XDG_CONFIG_HOME/rcilab or ~/.config/rcilab."""
+    config_home = os.environ.get("XDG_CONFIG_HOME", "")
+    return (Path(config_home) if os.path.isabs(config_home) else Path.home() / ".config") / "rcilab" / "poses.json"
 
 
 class NamedPoseStore:
-    """The stored poses of one arm. Every call reads the file again: other programs may have written to it.
+    """The stored poses of one arm. Every call reads the file again, because other programs may write to it.
 
     Args:
-        model: The arm; poses of other arms stay in the same file, untouched.
-        file: Where the poses are; None: see `default_file`.
+        model: The arm; poses of other arms in the same file are not changed.
+        file: The file; None is `default_file()`.
     """
 
     def __init__(self, model: RobotModel, file: Path | None = None) -> None:
@@ -43,7 +43,7 @@ class NamedPoseStore:
         """Returns the names of the stored poses, in the order in which they were stored.
 
         Raises:
-            InvalidValueError: The file cannot be read, or is not a file of poses.
+            InvalidValueError: The file cannot be read, or is not a pose file.
             VersionMismatchError: It was written by another version.
         """
         return tuple(self._own(self._read()))
@@ -52,7 +52,7 @@ class NamedPoseStore:
         """Returns the joint angles of a stored pose, shape (n,), [rad].
 
         Raises:
-            InvalidValueError: There is no such pose, or it does not fit this arm; see also `names`.
+            InvalidValueError: No pose has this name, or it does not fit this arm; see also `names`.
             VersionMismatchError: See `names`.
         """
         own = self._own(self._read())
@@ -65,21 +65,21 @@ class NamedPoseStore:
         try:
             q = as_vector(own[name], self._model.n, f"pose {name!r}", "rad")
         except InvalidValueError as error:
-            raise self._unsound(f"{error}; mend or delete it").coded("pose_damaged", name=name) from error
+            raise self._file_error(f"{error}; correct or delete it").coded("pose_damaged", name=name) from error
         for joint, (low, angle, high) in enumerate(zip(limits.lower, q, limits.upper, strict=True), start=1):
             if not low <= angle <= high:
-                raise self._unsound(
+                raise self._file_error(
                     f"pose {name!r} has joint {joint} at {math.degrees(angle):.1f} deg, outside "
-                    f"{math.degrees(low):.0f} to {math.degrees(high):.0f} deg; mend or delete it"
+                    f"{math.degrees(low):.0f} to {math.degrees(high):.0f} deg; correct or delete it"
                 ).coded("pose_damaged", name=name)
         return readonly_copy(q)
 
     def store(self, name: str, q: ArrayLike) -> str:
-        """Stores joint angles under a name that is not taken, and returns the name as it is stored.
+        """Stores joint angles under a new name, and returns the name as stored.
 
         Args:
             name: 1 to 40 characters; surrounding spaces are removed.
-            q: Shape (n,), [rad].
+            q: Joint angles, shape (n,), [rad].
 
         Raises:
             InvalidValueError: The name is not valid or already used, q is not n finite numbers, or writing failed.
@@ -103,7 +103,7 @@ class NamedPoseStore:
         """Deletes a stored pose; a missing one is not an error.
 
         Raises:
-            InvalidValueError: The file cannot be read or written, or is not a file of poses.
+            InvalidValueError: The file cannot be read or written, or is not a pose file.
             VersionMismatchError: See `names`.
         """
         content = self._read()
@@ -121,13 +121,15 @@ class NamedPoseStore:
             return {"format": FORMAT, "version": VERSION, "poses": {}}
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise self._unsound(f"cannot be read: {reason}").coded("unreadable") from error
+            raise self._file_error(f"cannot be read: {reason}").coded("unreadable") from error
         try:
             content: Any = json.loads(text)
         except ValueError as error:
-            raise self._unsound(f"is no JSON ({error}); mend it or move it away").coded("poses_no_file") from error
+            raise self._file_error(f"is not valid JSON ({error}); correct it or move it away").coded(
+                "poses_no_file"
+            ) from error
         if not isinstance(content, dict) or cast("dict[str, Any]", content).get("format") != FORMAT:
-            raise self._unsound("is no file of poses; mend it or move it away").coded("poses_no_file")
+            raise self._file_error("is not a pose file; correct it or move it away").coded("poses_no_file")
         found = cast("dict[str, Any]", content)
         if found.get("version") != VERSION:
             raise VersionMismatchError(f"{self.file}", found.get("version"), VERSION, "move the file away")
@@ -135,16 +137,15 @@ class NamedPoseStore:
         if not isinstance(poses, dict) or not all(
             isinstance(one, dict) for one in cast("dict[str, Any]", poses).values()
         ):
-            raise self._unsound("is no file of poses; mend it or move it away").coded("poses_no_file")
+            raise self._file_error("is not a pose file; correct it or move it away").coded("poses_no_file")
         return found
 
     def _write(self, content: dict[str, Any], own: dict[str, Any]) -> None:
-        """Replaces the file atomically."""
         content = {**content, "poses": {**content["poses"], self._model.name: own}}
         try:
             write_atomic(self.file, json.dumps(content, ensure_ascii=False, indent=1) + "\n")
         except OSError as error:
-            raise self._unsound(f"cannot be written: {error.strerror}").coded("unwritable") from error
+            raise self._file_error(f"cannot be written: {error.strerror}").coded("unwritable") from error
 
-    def _unsound(self, reason: str) -> InvalidValueError:
-        return InvalidValueError("file of poses", str(self.file), reason)
+    def _file_error(self, reason: str) -> InvalidValueError:
+        return InvalidValueError("pose file", str(self.file), reason)

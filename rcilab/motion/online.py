@@ -1,4 +1,4 @@
-"""On-line motion generation: joint angles that follow commands cycle by cycle and never leave the limits."""
+"""On-line motion generation: joint angles that follow changing commands, cycle by cycle, inside the limits."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rcilab.motion.jog_start import require_stoppable
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.twist import Frame, TwistController
 
-POSITION_MARGIN = 1e-4  # [rad] How far inside its position limits a joint stops: more than the rounding of the curve.
+POSITION_MARGIN = 1e-4  # [rad] A joint stops this far inside its range: more than the curve's rounding.
 
-_LONGEST = 1000.0  # [s] Ruckig counts to 7600 s; a joint that would creep longer towards its limit stops first.
-_STILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Below these a joint is at rest: rounding of the curve.
+_MAX_APPROACH_TIME = 1000.0  # [s] Ruckig represents 7600 s; a joint that would creep longer to its limit stops.
+_STANDSTILL = (1e-9, 1e-6)  # [rad/s], [rad/s^2] Rounding of the curve.
 
 
 class Jog:
@@ -28,7 +28,7 @@ class Jog:
     Owned by the thread that runs the cycle: one `step` per cycle of 1 ms returns the joint angles to command. For any
     command at any time, velocity, acceleration and jerk of every joint stay `LIMIT_MARGIN` inside the limits, and a
     joint that moves towards the end of its range stops `POSITION_MARGIN` inside it. A command that exceeds a limit is
-    not refused: it is followed as far as the limits allow; see `part` and `is_damped`.
+    not an error: it is followed as far as the limits allow; see `part` and `is_damped`.
 
         jog = Jog(model, robot.state.q_c)
         jog.set_twist([0.05, 0, 0, 0, 0, 0], frame="tool")
@@ -38,9 +38,9 @@ class Jog:
 
     Args:
         model: The arm, with its tool.
-        q: Commanded joint angles now, shape (n,), [rad].
-        dq: Their velocities, shape (n,), [rad/s]; None is rest. Derivatives, not the backward differences that a robot
-            reports: `derivatives_from_differences` converts.
+        q: Current commanded joint angles, shape (n,), [rad].
+        dq: Their velocities, shape (n,), [rad/s]; None is standstill. Derivatives, not the backward differences that
+            a robot reports: `derivatives_from_differences` converts.
         ddq: Their accelerations, shape (n,), [rad/s^2]; None is zero.
         speed: Part of the velocity limits, of the joints and of the tool, to use, from `MIN_SPEED` = 0.001 to 1.
 
@@ -77,7 +77,7 @@ class Jog:
         reversal = [3.0 * a_max / j_max for a_max, j_max in zip(a, j, strict=True)]  # [s] To build up and remove a.
         self._joints = list(zip(self._lower, self._upper, a, reversal, j, strict=True))
         self._ranges = list(zip(self._lower, self._upper, strict=True))
-        # Of all joints: the smallest acceleration, the longest time to let go, the largest change of speed by that.
+        # Over all joints: smallest acceleration limit, longest reversal, largest change of speed during one.
         self._slowest = (
             min(a),
             max(reversal),
@@ -85,38 +85,38 @@ class Jog:
         )
         self._tool = TwistController(model, self._lower, self._upper, self._speeds, a, j, speed)
         self._axes = _ruckig.Stepper(start.tolist(), velocity.tolist(), acceleration.tolist(), a, j)
-        self._rest = [0.0] * n
-        self._goal = self._rest
+        self._zero_velocity = [0.0] * n
+        self._goal = self._zero_velocity
         self._part = 1.0
         self._advance: Callable[[], None] = self._brake
 
     @property
     def q(self) -> JointVector:
-        """Joint angles now, shape (n,), [rad]."""
+        """Current joint angles, shape (n,), [rad]."""
         return readonly_copy(self._axes.q)
 
     @property
     def dq(self) -> JointVector:
-        """Joint velocities now, shape (n,), [rad/s]; derivatives of the curve."""
+        """Current joint velocities, shape (n,), [rad/s]; derivatives of the curve."""
         return readonly_copy(self._axes.dq)
 
     @property
     def ddq(self) -> JointVector:
-        """Joint accelerations now, shape (n,), [rad/s^2]."""
+        """Current joint accelerations, shape (n,), [rad/s^2]."""
         return readonly_copy(self._axes.ddq)
 
     @property
-    def is_at_rest(self) -> bool:
+    def is_stationary(self) -> bool:
         """True when no joint moves; after `stop` no further steps are needed."""
-        slow, weak = _STILL
+        slow, weak = _STANDSTILL
         return all(-slow < v < slow for v in self._axes.dq) and all(-weak < a < weak for a in self._axes.ddq)
 
     @property
     def part(self) -> float:
         """Part of the commanded velocity that the limits allowed in the last cycle, from 0 to 1; 1 for a target.
 
-        Acceleration to the speed does not count. Joint velocities are reduced by the velocity limits, a twist also near
-        the end of a joint's range, so that the tool keeps its direction until it stops there.
+        The acceleration phase does not count. Joint velocities are reduced by the velocity limits, a twist also
+        near the end of a joint's range, so that the tool keeps its direction until it stops there.
         """
         return self._part
 
@@ -126,7 +126,7 @@ class Jog:
         return self._advance == self._follow_twist and self._tool.is_damped
 
     def set_joint_velocity(self, dq: ArrayLike) -> None:
-        """Moves with these joint velocities from now on.
+        """Moves with these joint velocities until the next command.
 
         Velocities above the limits are all reduced by one factor. Every joint accelerates independently, as fast as its
         limits allow; one that reaches the end of its range stays there while the others move on.
@@ -137,31 +137,31 @@ class Jog:
         Raises:
             InvalidValueError: dq is not n finite numbers.
         """
-        wanted = as_vector(dq, self._model.n, "dq", "rad/s").tolist()
-        self._part = min([1.0, *(bound / abs(v) for v, bound in zip(wanted, self._speeds, strict=True) if v)])
-        self._goal = [self._part * v for v in wanted]
+        desired = as_vector(dq, self._model.n, "dq", "rad/s").tolist()
+        self._part = min([1.0, *(bound / abs(v) for v, bound in zip(desired, self._speeds, strict=True) if v)])
+        self._goal = [self._part * v for v in desired]
         self._advance = self._keep_velocity
 
     def set_twist(self, twist: ArrayLike, *, frame: Frame = "base") -> None:
-        """Moves the tool with this twist from now on.
+        """Moves the tool with this twist until the next command.
 
         From one twist to the next the tool's twist changes linearly, with half of the joints' acceleration limits; from
         standstill it moves in the commanded direction at once. Where joints would exceed a velocity limit or reach the
-        end of their range, all are slowed down by one factor. If that comes too late, at high speed near a singularity,
-        the tool briefly leaves its path, and the joints keep their limits. Closer still, the lost direction is damped
-        (`is_damped`), and a tool that would leave its line stops: at the edge of the reach it stops and can move back.
+        end of their range, all are slowed down by one factor. At high speed near a singularity that can be too late:
+        the joints keep their limits and the tool briefly leaves its path. Closer still, the lost direction is damped
+        (`is_damped`), and a tool that would leave its line stops: at the limit of its reach it stops and can move back.
         A 7-axis arm uses the smallest joint velocities for the twist.
 
         Args:
-            twist: Velocity of the tool tip and angular velocity, shape (6,), linear first, [m/s, rad/s]; lowered as a
-                whole where it passes the limits of the tool.
-            frame: Axes in which it is given: those of the base, or those of the tool as it turns.
+            twist: Velocity of the tool tip and angular velocity, shape (6,), linear first, [m/s, rad/s]; scaled
+                down as a whole if it exceeds the limits of the tool.
+            frame: Axes of the twist: those of the base, or the moving ones of the tool.
 
         Raises:
-            InvalidValueError: twist is not six finite numbers, or the frame is unknown.
+            InvalidValueError: `twist` is not six finite numbers, or the frame is unknown.
         """
-        wanted = as_vector(twist, 6, "twist", "m/s, rad/s")
-        self._tool.lead(wanted, frame, goes_on=self._advance == self._follow_twist)
+        desired = as_vector(twist, 6, "twist", "m/s, rad/s")
+        self._tool.set_goal(desired, frame, is_continued=self._advance == self._follow_twist)
         self._advance = self._follow_twist
 
     def set_target(self, q: ArrayLike) -> None:
@@ -176,15 +176,15 @@ class Jog:
         Raises:
             InvalidValueError: q is not n finite numbers.
         """
-        wanted = as_vector(q, self._model.n, "q", "rad").tolist()
+        desired = as_vector(q, self._model.n, "q", "rad").tolist()
         self._goal = [
-            min(max(angle, low), high) for angle, low, high in zip(wanted, self._lower, self._upper, strict=True)
+            min(max(angle, low), high) for angle, low, high in zip(desired, self._lower, self._upper, strict=True)
         ]
         self._part = 1.0
         self._advance = self._go_to_target
 
     def stop(self) -> None:
-        """Stops from now on, every joint independently as fast as its limits allow, as in `plan_stop`."""
+        """Stops every joint independently, as fast as its limits allow, as in `plan_stop`."""
         self._part = 1.0
         self._advance = self._brake
 
@@ -192,27 +192,27 @@ class Jog:
         """Advances one cycle and returns the joint angles to command, shape (n,), [rad].
 
         Raises:
-            PlanningError: The planner found no stop; never seen with a state inside the limits.
+            PlanningError: The planner found no stop; not observed with a state inside the limits.
         """
         self._advance()
         return np.array(self._axes.q)
 
     def _brake(self) -> None:
-        self._axes.towards_velocity(self._rest)
+        self._axes.step_to_velocity(self._zero_velocity)
 
     def _go_to_target(self) -> None:
-        self._axes.towards_ends(self._goal, self._speeds)
+        self._axes.step_to_positions(self._goal, self._speeds)
 
     def _keep_velocity(self) -> None:
-        self._lead(self._goal)
+        self._step_to_velocity(self._goal)
 
     def _follow_twist(self) -> None:
         axes = self._axes
-        wanted = self._tool.step(axes.q, axes.dq, axes.ddq)
+        desired = self._tool.step(axes.q, axes.dq, axes.ddq)
         self._part = self._tool.part
-        self._lead(wanted)
+        self._step_to_velocity(desired)
 
-    def _lead(self, wanted: Sequence[float]) -> None:
+    def _step_to_velocity(self, desired: Sequence[float]) -> None:
         """Advances one cycle towards joint velocities.
 
         Far from the end of its range a joint is controlled by velocity alone. Where it could not reach the commanded
@@ -221,23 +221,23 @@ class Jog:
         preserves it.
         """
         axes = self._axes
-        if self._is_far_inside(wanted):
-            axes.towards_velocity(wanted)
+        if self._is_far_inside(desired):
+            axes.step_to_velocity(desired)
             return
         ends: list[float | None] = []
         velocities: list[float] = []
         by_velocity = True
         for v_c, q, v, a, (low, high, a_max, reversal, j_max) in zip(
-            wanted, axes.q, axes.dq, axes.ddq, self._joints, strict=True
+            desired, axes.q, axes.dq, axes.ddq, self._joints, strict=True
         ):
             end, room = (high, high - q) if v_c > 0.0 else (low, q - low)
             speed = abs(v_c)
             peak = max(speed, abs(v)) + a * a / (2.0 * j_max)
-            # No longer than it takes to let go of a, to change over to v_c and to stop from there.
+            # An upper bound of the distance to remove a, to change to v_c and to stop from there.
             if v_c == 0.0 or room > peak * ((abs(v_c - v) + peak) / a_max + reversal):
                 ends.append(None)
                 velocities.append(v_c)
-            elif room <= 0.0 or speed * _LONGEST < room:
+            elif room <= 0.0 or speed * _MAX_APPROACH_TIME < room:
                 ends.append(None)
                 velocities.append(0.0)
             else:
@@ -245,19 +245,19 @@ class Jog:
                 velocities.append(speed)
                 by_velocity = False
         if by_velocity:
-            axes.towards_velocity(velocities)
+            axes.step_to_velocity(velocities)
         else:
-            axes.towards_ends(ends, velocities)
+            axes.step_to_positions(ends, velocities)
 
-    def _is_far_inside(self, wanted: Sequence[float]) -> bool:
-        """Returns whether every joint has more range left than it may need to reach its velocity and stop.
+    def _is_far_inside(self, desired: Sequence[float]) -> bool:
+        """Returns whether every joint has more range left than it can need to reach its velocity and stop.
 
-        Then each is controlled by velocity alone, as in `_lead`, at a fifth of the cost.
+        Then velocity control suffices for each joint, at a fifth of the cost of `_step_to_velocity`.
         """
         axes = self._axes
-        a_max, reversal, more = self._slowest
-        speed = max(max(wanted), -min(wanted), max(axes.dq), -min(axes.dq))
-        peak = speed + more
+        a_max, reversal, brake_margin = self._slowest
+        speed = max(max(desired), -min(desired), max(axes.dq), -min(axes.dq))
+        peak = speed + brake_margin
         room = peak * ((2.0 * speed + peak) / a_max + reversal)
         for q, (low, high) in zip(axes.q, self._ranges, strict=True):
             if not low + room < q < high - room:

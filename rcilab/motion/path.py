@@ -1,6 +1,6 @@
-"""Paths of the tool as geometry, without time: the straight line and the arc of the manual's blocking moves (3.5).
+"""Geometric paths of the tool: the straight line and the arc of the manual's blocking moves (3.5), and the circle.
 
-By default the orientation is a slerp from start to goal in the path length; the arm angle is always linear in it.
+By default the orientation is a slerp from start to goal in the path length. The arm angle is always linear in it.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from rcilab.motion.orientation_path import Slerp, Turning, turn_through, turn_to
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 
 _COLLINEAR = 1e-4
-"""Sine of the angle between two chords below which three points make no circle: its radius would be 5 000 chords."""
+"""Sine of the angle between two chords below which three points are collinear: the radius would be 5 000 chords."""
 
-_LEAST_AXIS = 1e-12
+_MIN_AXIS_LENGTH = 1e-12
 """Length of a vector below which it has no direction."""
 _OUT_OF_PLANE = 1e-6
-"""How far out of the plane of its circle a start may be, in radii; the circle then lies in the plane of the start."""
+"""Largest distance of the start from the plane of its circle, in radii; the circle is moved into the start's plane."""
 
 Point: TypeAlias = tuple[float, float, float]
 
@@ -32,55 +32,55 @@ ArcOrientation = Literal["through_via", "start_to_goal"]
 """Orientation of the tool on an arc: through that of via, or one slerp that ignores it, as in the vendor's."""
 CircleOrientation = Literal["held", "turning"]
 """Orientation of the tool on a circle: constant, or turning with the circle, about its axis."""
-Way: TypeAlias = Literal["shorter", "longer"]
-"""Direction of the arm angle on its circle; one of the two may cross +-pi."""
+ElbowDirection: TypeAlias = Literal["shorter", "longer"]
+"""Direction in which the arm angle changes; either may cross +-pi."""
 
 
 @dataclass(frozen=True, slots=True)
 class Circle:
-    """The circle through the first, a middle and the last point of an arc."""
+    """The circle through the first, a middle and the last point of an arc, in base."""
 
     center: Point
-    """[m]."""
+    """Centre, [m]."""
     first: Point
     """From the centre to the first point, [m]."""
     second: Point
-    """As long as `first`, at right angles to it, towards the middle point, [m]."""
+    """Perpendicular to `first` and of the same length, towards the middle point, [m]."""
     angle: float
-    """From the first point over the middle one to the last, in (0, 2 pi], [rad]."""
+    """Angle from the first point through the middle one to the last, in (0, 2 pi], [rad]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """Poses of the tool in base, and arm angles, as functions of the share of the way, 0 to 1."""
+    """Poses of the tool in base, and arm angles, as functions of the share of the path length, 0 to 1."""
 
     start: Pose
     goal: Pose
     psi_start: float | None
     """Arm angle at the start, [rad]; None: not part of the path."""
     psi_goal: float | None
-    """[rad]."""
+    """Arm angle at the goal, [rad]."""
     circle: Circle | None
     """None for a straight line."""
     distance: float
-    """Path length: of the tool, [m]; of a pure rotation, or of the arm angle if the tool does not move, [rad]. 0 if
+    """Path length of the tool, [m]; for a pure rotation, or a change of the arm angle alone, the angle, [rad]. 0 if
     start and goal are the same."""
     unit: str
-    """m or rad."""
+    """Unit of `distance`: m or rad."""
     turn: float
-    """Largest rate of the tool's rotation by the share; the whole angle for a uniform rotation, [rad]."""
+    """Largest rate of the tool's rotation by the share, [rad]; for a uniform rotation the whole angle."""
     turning: Turning | None = None
-    """Orientation of the tool; None is the slerp from start to goal."""
+    """Rotation of the tool; None is the slerp from start to goal."""
 
     @property
     def name(self) -> str:
-        """Name in messages."""
+        """Name for messages."""
         if self.circle is not None:
             return "circle" if self.circle.angle == math.tau else "arc"
         return "line" if self.unit == "m" or self.turn > STANDSTILL_DISTANCE else "null-space motion"
 
     def at(self, share: float) -> tuple[Pose, float | None]:
-        """Returns pose and arm angle, [rad], at a share of the way."""
+        """Returns pose and arm angle, [rad], at a share of the path."""
         if share >= 1.0:
             return self.goal, self.psi_goal
         if share <= 0.0:
@@ -100,26 +100,26 @@ class Path:
         return Pose.from_parts(_rotation(self.turning.sample(np.array([share]))[0]), position), psi
 
     def positions(self, shares: Array) -> Array:
-        """Returns where the tool is, shape (N, 3), [m], at many shares of the way, (N,); beyond its ends, too."""
+        """Returns positions of the tool, shape (N, 3), [m], at many shares, shape (N,), also below 0 and above 1."""
         if self.circle is None:
             a, b = np.array(self.start.parts[1]), np.array(self.goal.parts[1])
-            way = np.multiply.outer(b - a, shares)
-            way += a[:, np.newaxis]
-            return way.T
+            points = np.multiply.outer(b - a, shares)
+            points += a[:, np.newaxis]
+            return points.T
         c, e, f = (np.array(point) for point in (self.circle.center, self.circle.first, self.circle.second))
         angles = shares * self.circle.angle
-        way = np.multiply.outer(e, np.cos(angles))
-        way += np.multiply.outer(f, np.sin(angles))
-        way += c[:, np.newaxis]
-        return way.T
+        points = np.multiply.outer(e, np.cos(angles))
+        points += np.multiply.outer(f, np.sin(angles))
+        points += c[:, np.newaxis]
+        return points.T
 
     def sample(self, shares: Array) -> tuple[Array, Array | None]:
-        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares of the way, (N,).
+        """Returns poses, shape (N, 4, 4), and arm angles, shape (N,), [rad], at many shares, shape (N,).
 
-        The formulas go on beyond start and goal, and so does this, for those who form differences there.
+        Shares may be below 0 and above 1, for finite differences at the ends.
         """
         ra, rb = self.start.parts[0], self.goal.parts[0]
-        # One element after the other in memory: those who follow a path compute with columns of these.
+        # Each element contiguous in memory, because the inverse along a path computes with columns.
         T = np.zeros((4, 4, len(shares))).transpose(2, 0, 1)
         T[:, 3, 3] = 1.0
         T[:, :3, :3] = (self.turning or turn_to(ra, rb)).sample(shares)
@@ -132,14 +132,14 @@ class Path:
 def build_line(start: Pose, goal: Pose, psi_start: float | None = None, psi_goal: float | None = None) -> Path:
     """Returns the straight line from start to goal.
 
-    The way is the tool's. Where the tool only turns, it is the angle, whatever the axis (the vendor's helper agrees for
-    turns about base z and takes some other number for the rest); where the arm angle changes alone, it is that.
+    The path length is that of the tool. For a pure rotation it is the angle, about any axis (the vendor's helper agrees
+    for rotations about base z and uses another number for the rest); if only the arm angle changes, it is that change.
 
     Args:
         start: Pose of the tool in base at the start.
         goal: Pose of the tool in base at the end.
         psi_start: Arm angle at the start, [rad]; None leaves it open.
-        psi_goal: Arm angle at the end, [rad]; it changes in proportion to the way, never across +-pi.
+        psi_goal: Arm angle at the end, [rad]; it changes in proportion to the path length, never across +-pi.
 
     Raises:
         InvalidValueError: A pose is not valid.
@@ -158,7 +158,7 @@ def build_arc(
     *,
     orientation: ArcOrientation = "start_to_goal",
 ) -> Path:
-    """Returns the arc from start over via to goal.
+    """Returns the arc from start through via to goal.
 
     Args:
         start: Pose of the tool in base at the start.
@@ -166,24 +166,24 @@ def build_arc(
         goal: Pose of the tool in base at the end.
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
-        orientation: "start_to_goal": by slerp from start to goal; that of `via` is ignored, as the vendor's helper does
-            it. "through_via": exactly through that of `via` at its place, the shorter way to it and on from it, with
-            continuous angular velocity and acceleration (`ViaOrientation`).
+        orientation: "start_to_goal": by slerp from start to goal; that of `via` is ignored, as in the vendor's helper.
+            "through_via": exactly through that of `via` at its position, in the shorter direction before and after
+            it, with continuous angular velocity and acceleration (`ViaOrientation`).
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.
         InvalidValueError: A pose is not valid, or the orientation is unknown.
     """
     start, via, goal = as_pose(start, "start"), as_pose(via, "via"), as_pose(goal, "goal")
-    _require_word("orientation", orientation, get_args(ArcOrientation))
+    _require_choice("orientation", orientation, get_args(ArcOrientation))
     circle = _circle(start.position, via.position, goal.position)
     distance = circle.angle * math.hypot(*circle.first)
     if orientation == "start_to_goal":
         return _path(start, goal, psi_start, psi_goal, circle, distance, _angle_between(start, goal))
     to_via = via.position - circle.center
-    place = math.atan2(float(to_via @ circle.second), float(to_via @ circle.first)) % math.tau / circle.angle
-    turning = turn_through(start.parts[0], via.parts[0], goal.parts[0], place)
-    return _path(start, goal, psi_start, psi_goal, circle, distance, turning.fastest, turning)
+    via_share = math.atan2(float(to_via @ circle.second), float(to_via @ circle.first)) % math.tau / circle.angle
+    turning = turn_through(start.parts[0], via.parts[0], goal.parts[0], via_share)
+    return _path(start, goal, psi_start, psi_goal, circle, distance, turning.max_rate, turning)
 
 
 def build_circle(
@@ -201,55 +201,59 @@ def build_circle(
     Args:
         start: Pose of the tool in base at the start.
         center: Centre of the circle in base, shape (3,), [m].
-        axis: Direction of the circle's axis in base, shape (3,), of any length, at right angles to the way from the
+        axis: Direction of the circle's axis in base, shape (3,), of any length, perpendicular to the line from the
             centre to start; the tool goes around it by the right-hand rule.
         angle: How far, more than 0 and up to 2 pi, [rad].
         psi_start: Arm angle at the start, [rad]; None leaves it open.
         psi_goal: Arm angle at the end, [rad].
-        orientation: "held": that of the start all the way. "turning": the tool turns with the circle, about its axis
+        orientation: "held": that of the start, constant. "turning": the tool turns with the circle, about its axis
             and by the same angle, so that the same side of it faces the centre.
 
     Raises:
-        PlanningError: Start is the centre, or not in the plane through the centre at right angles to the axis.
+        PlanningError: Start is the centre, or not in the plane through the centre perpendicular to the axis.
         InvalidValueError: `start` is not a pose, a number is not finite or out of range, or the orientation is unknown.
     """
     start = as_pose(start, "start")
-    _require_word("orientation", orientation, get_args(CircleOrientation))
-    middle, normal = as_vector(center, 3, "center", "m"), as_vector(axis, 3, "axis")
+    _require_choice("orientation", orientation, get_args(CircleOrientation))
+    center_position, normal = as_vector(center, 3, "center", "m"), as_vector(axis, 3, "axis")
     angle = as_number(angle, "angle", "rad")
     if not 0.0 < angle <= math.tau:
-        raise InvalidValueError("angle", angle, "must be more than 0, up to 2 pi [rad]; turn the axis to go back")
+        raise InvalidValueError(
+            "angle", angle, "must be more than 0, up to 2 pi [rad]; reverse the axis for the other direction"
+        )
     length = float(np.linalg.norm(normal))
-    if length < _LEAST_AXIS:
+    if length < _MIN_AXIS_LENGTH:
         raise InvalidValueError("axis", normal.tolist(), "has no direction: its length is zero")
     normal = normal / length
-    first = start.position - middle
+    first = start.position - center_position
     radius = float(np.linalg.norm(first))
     height = float(first @ normal)
     if radius <= STANDSTILL_DISTANCE:
-        error = PlanningError(f"the centre of the circle is where the tool is, at {_shown(middle)}; move it away")
+        error = PlanningError(
+            f"the centre of the circle is the tool's position, {_text(center_position)}; move it away"
+        )
         raise error.coded("circle_centre")
     if abs(height) > _OUT_OF_PLANE * radius:
         raise PlanningError(
-            f"the tool at {_shown(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
-            f"choose the centre at its height along the axis: {_shown(middle + height * normal)}"
+            f"the tool at {_text(start.position)} is {1e3 * abs(height):.2f} mm out of the plane of the circle; "
+            f"choose the centre at its height along the axis: {_text(center_position + height * normal)}"
         ).coded("circle_plane", height=abs(float(height)))
-    first = start.position - (middle + height * normal)
-    circle = Circle(_point(middle + height * normal), _point(first), _point(np.cross(normal, first)), angle)
-    turned = middle + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)
+    first = start.position - (center_position + height * normal)
+    circle = Circle(_point(center_position + height * normal), _point(first), _point(np.cross(normal, first)), angle)
+    turned = center_position + height * normal + math.cos(angle) * first + math.sin(angle) * np.cross(normal, first)
     rotation = start.parts[0]
     turning = None
     if orientation == "turning":
-        # The axis in the axes of the tool, where its own turn does not move it.
+        # The axis in the tool's axes, in which the rotation about it does not move it.
         turning = Slerp(rotation, _point(angle * (normal @ start.rotation)))
         rotation = _rotation(turning.sample(np.ones(1))[0])
     end = start if angle == math.tau else Pose.from_parts(rotation, _point(turned))
-    turn = 0.0 if turning is None else turning.fastest
+    turn = 0.0 if turning is None else turning.max_rate
     return _path(start, end, psi_start, psi_goal, circle, angle * float(np.linalg.norm(first)), turn, turning)
 
 
 def circle_through(start: Pose, second: Pose, third: Pose) -> tuple[Array, Array]:
-    """Returns centre and axis of the circle through three positions, each of shape (3,), [m]; it turns in their order.
+    """Returns centre and axis of the circle through three positions in their order, each of shape (3,), [m].
 
     Raises:
         PlanningError: The three positions lie on a line, or two of them are the same.
@@ -266,8 +270,8 @@ def _path(
 ) -> Path:  # fmt: skip
     distance, unit = length, "m"
     if length <= STANDSTILL_DISTANCE:
-        swing = 0.0 if psi_start is None or psi_goal is None else abs(psi_goal - psi_start)
-        distance, unit = max(turn, swing), "rad"
+        elbow_turn = 0.0 if psi_start is None or psi_goal is None else abs(psi_goal - psi_start)
+        distance, unit = max(turn, elbow_turn), "rad"
         if distance <= STANDSTILL_DISTANCE:
             distance = 0.0
     return Path(
@@ -277,19 +281,18 @@ def _path(
 
 
 def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
-    """Returns the circle through three points."""
     to_b, to_c = b - a, c - a
     normal = np.cross(to_b, to_c)
     chords = sorted(float(np.linalg.norm(chord)) for chord in (to_b, to_c, c - b))
     if chords[0] <= STANDSTILL_DISTANCE:
         raise PlanningError(
-            f"two of the three points of the arc are the same (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
-            "an arc needs three different ones; plan_circle makes a full circle"
+            f"two of the three points of the arc are the same (start {_text(a)}, via {_text(b)}, goal {_text(c)}); "
+            "an arc needs three different points; plan_circle plans a full circle"
         ).coded("arc_same")
     if float(np.linalg.norm(normal)) <= _COLLINEAR * chords[1] * chords[2]:
         raise PlanningError(
-            f"the three points of the arc lie on a line (start {_shown(a)}, via {_shown(b)}, goal {_shown(c)}); "
-            "move via off the line, or go straight with plan_line or move_l"
+            f"the three points of the arc lie on a line (start {_text(a)}, via {_text(b)}, goal {_text(c)}); "
+            "move via off the line, or plan a straight line with plan_line or move_l"
         ).coded("arc_line")
     # The circumcentre seen from a: https://en.wikipedia.org/wiki/Circumcircle, "higher dimensions".
     spread = float(to_b @ to_b) * to_c - float(to_c @ to_c) * to_b
@@ -303,7 +306,7 @@ def _circle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Circle:
 
 
 def slerp(a: Rotation9, b: Rotation9, share: float) -> Rotation9:
-    """Returns the rotation a share of the shorter way from a to b (Shoemake 1985, spherical linear interpolation)."""
+    """Returns the slerp from a to b at a share, in the shorter direction (Shoemake 1985)."""
     qa, qb = wxyz_from_rotation(a), wxyz_from_rotation(b)
     dot = qa[0] * qb[0] + qa[1] * qb[1] + qa[2] * qb[2] + qa[3] * qb[3]
     if dot < 0.0:
@@ -328,7 +331,7 @@ def _angle_between(a: Pose, b: Pose) -> float:
     return 2.0 * math.atan2(math.hypot(x, y, z), w)
 
 
-def _require_word(name: str, value: object, known: tuple[str, ...]) -> None:
+def _require_choice(name: str, value: object, known: tuple[str, ...]) -> None:
     if value not in known:
         raise InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
 
@@ -338,5 +341,5 @@ def _point(values: np.ndarray) -> Point:
     return x, y, z
 
 
-def _shown(values: np.ndarray) -> str:
+def _text(values: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.4f}" for value in values.tolist()) + ") m"

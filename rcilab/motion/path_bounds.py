@@ -9,33 +9,33 @@ import numpy as np
 
 from rcilab.core.arrays import Array
 
-LEAST = 1e-12
-"""A slope by s below which a row bounds nothing, and the least square of s'."""
-_SIDES = 12
-"""Half-planes on each side in place of a round bound; they lose 0.9 %."""
-ROUNDNESS = math.cos(math.pi / (2.0 * _SIDES))
-"""By what a round bound is multiplied so that the corners between its half-planes are inside it."""
-_ANGLES = np.arange(_SIDES) * math.pi / _SIDES - math.pi / 2.0
+MIN_SLOPE = 1e-12
+"""A derivative by s below which a row imposes no bound; also the smallest square of s'."""
+_HALF_PLANES = 12
+"""Number of pairs of half-planes that approximate a bound on a norm; they lose 0.9 %."""
+POLYGON_FACTOR = math.cos(math.pi / (2.0 * _HALF_PLANES))
+"""Factor on a bound on a norm for which the corners of the polygon of half-planes are inside it."""
+_ANGLES = np.arange(_HALF_PLANES) * math.pi / _HALF_PLANES - math.pi / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PathBounds:
-    """Bounds at K + 1 knots: s'' between tilt x -+ reserve, for each of m rows, and x = s'^2 up to most."""
+    """Bounds at K + 1 knots: s'' between slope x -+ offset for each of m rows, and x = s'^2 up to `max_squares`."""
 
     knots: Array
     """Values of s, increasing, first 0, shape (K + 1,)."""
-    reserve: Array
-    """Shape (m, K + 1): all that follows is the least or the largest of the rows, [1/s^2]."""
-    tilt: Array
-    """Shape (m, K + 1)."""
-    most: Array
+    offset: Array
+    """Half the width of the range of s'', shape (m, K + 1), [1/s^2]."""
+    slope: Array
+    """Change of the range's centre with x, shape (m, K + 1)."""
+    max_squares: Array
     """Largest x, shape (K + 1,), [1/s^2]."""
 
     def slowed(self, factor: Array) -> PathBounds:
-        """Returns the bounds when each knot is passed slower by a factor of 1 or more, shape (K + 1,)."""
+        """Returns the bounds if each knot is passed slower by a factor of 1 or more, shape (K + 1,)."""
         squares = factor**2
         return PathBounds(
-            knots=self.knots, reserve=self.reserve / squares, tilt=self.tilt, most=self.most / squares
+            knots=self.knots, offset=self.offset / squares, slope=self.slope, max_squares=self.max_squares / squares
         )  # fmt: skip
 
 
@@ -49,14 +49,16 @@ def path_bounds(knots: Array, first: Array, second: Array, acceleration: Array, 
         acceleration: Bounds on the rows' acceleration, shape (m, K + 1) or (m, 1), [unit/s^2].
         fastest: Largest s' that other bounds allow, shape (K + 1,), [1/s].
     """
-    size = np.maximum(np.abs(first), LEAST)
-    reserve = acceleration / size
-    tilt = -second / np.copysign(size, first)
-    return PathBounds(knots=knots, reserve=reserve, tilt=tilt, most=np.minimum(_ceiling(reserve, tilt), fastest**2))
+    size = np.maximum(np.abs(first), MIN_SLOPE)
+    offset = acceleration / size
+    slope = -second / np.copysign(size, first)
+    return PathBounds(
+        knots=knots, offset=offset, slope=slope, max_squares=np.minimum(_max_squares(offset, slope), fastest**2)
+    )
 
 
 def half_planes(first: Array, second: Array) -> tuple[Array, Array]:
-    """Returns rows whose bounds, times `ROUNDNESS`, stand for one on the length of first s'' + second s'^2.
+    """Returns rows that bound the norm of first s'' + second s'^2 if each is bounded by it times `POLYGON_FACTOR`.
 
     Args:
         first: Vectors, shape (K + 1, d).
@@ -65,19 +67,19 @@ def half_planes(first: Array, second: Array) -> tuple[Array, Array]:
     Returns:
         Rows of first and second, each of shape (sides, K + 1).
     """
-    # In the plane of both, by the part of the second along the first and the part across.
+    # In the plane of both vectors: components of the second along and across the first.
     length = np.sqrt((first * first).sum(axis=1))
-    along = (first * second).sum(axis=1) / np.maximum(length, LEAST)
+    along = (first * second).sum(axis=1) / np.maximum(length, MIN_SLOPE)
     across = np.sqrt(np.maximum((second * second).sum(axis=1) - along * along, 0.0))
     c, s = np.cos(_ANGLES), np.sin(_ANGLES)
     return np.outer(c, length), np.outer(c, along) + np.outer(s, across)
 
 
-def _ceiling(reserve: Array, tilt: Array) -> Array:
-    """Returns the largest x at each knot at which some s'' keeps every row, shape (K + 1,)."""
-    # Where two rows leave no s'' between them: tilt_i x - reserve_i = tilt_j x + reserve_j.
-    most = np.full(tilt.shape[1], LEAST)
-    for i in range(len(tilt) - 1):
-        pairs = np.abs(tilt[i] - tilt[i + 1 :]) / (reserve[i] + reserve[i + 1 :])
-        np.maximum(most, pairs.max(axis=0), out=most)
-    return 1.0 / most
+def _max_squares(offset: Array, slope: Array) -> Array:
+    """Returns the largest x at each knot for which some s'' satisfies every row, shape (K + 1,)."""
+    # Beyond slope_i x - offset_i = slope_j x + offset_j the ranges of two rows do not overlap.
+    max_squares = np.full(slope.shape[1], MIN_SLOPE)
+    for i in range(len(slope) - 1):
+        pairs = np.abs(slope[i] - slope[i + 1 :]) / (offset[i] + offset[i + 1 :])
+        np.maximum(max_squares, pairs.max(axis=0), out=max_squares)
+    return 1.0 / max_squares

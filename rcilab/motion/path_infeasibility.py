@@ -1,4 +1,4 @@
-"""Feasibility of a tool path before planning: the first point that cannot be followed, and the reason."""
+"""Feasibility of a tool path: the first point that the arm cannot follow, and the reason."""
 
 from __future__ import annotations
 
@@ -14,73 +14,75 @@ from rcilab.motion.bounds import limit_passed
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path
 
-_STRETCHING = 5
-"""Rows before the end of reach on which a turning elbow is a sign of that end. Seen: 3."""
+_STRETCHED_ROWS = 5
+"""Number of rows before the limit of reach on which a fast elbow is caused by that limit. Observed: 3."""
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class Infeasibility:
     """The first row of a path that the arm cannot follow."""
 
     row: int
     reason: RcilabError
     is_singular: bool
-    """Rather than out of reach, or at a joint limit."""
+    """True at a singularity; False out of reach or at a joint limit."""
 
 
-def examine(
-    model: RobotModel, q: JointVector, path: Path, shares: Array, longest: Array, span: str
-) -> tuple[JointPath, Obstacle | None]:
-    """Returns the joint angles along a path, shape (N, n), [rad], and the first obstacle, or None.
+def solve_path(
+    model: RobotModel, q: JointVector, path: Path, shares: Array, max_steps: Array, span: str
+) -> tuple[JointPath, Infeasibility | None]:
+    """Returns the joint angles along a path, shape (N, n), [rad], and the first row that is infeasible, or None.
 
     Args:
         model: The arm, with its tool.
         q: Joint angles at the start, shape (n,), [rad].
         path: The path.
-        shares: Shares of the way, shape (N,), the first 0.
-        longest: Turns of the joints from row to row that are no jump yet, shape (N - 1, n) or (n,), [rad].
+        shares: Shares of the path, shape (N,), the first 0.
+        max_steps: Largest steps of the joints from row to row that are not a jump, shape (N - 1, n) or (n,), [rad].
         span: Distance between two rows, for the message.
     """
     T, psi = path.sample(shares)
-    rows, loss = inverse_path(model, T, psi, q)
+    rows, branch_end = inverse_path(model, T, psi, q)
     rows[0] = q
     limits = model.limits.joint
-    excess = np.abs(np.diff(rows, axis=0)) - longest
+    excess = np.abs(np.diff(rows, axis=0)) - max_steps
     jumps = (np.flatnonzero((excess > 0.0).any(axis=1)) + 1).tolist()
     outside = np.flatnonzero(~((limits.lower < rows) & (rows < limits.upper)).all(axis=1)).tolist()
     first = min(jumps[:1] + outside[:1], default=len(rows))
-    # The elbow turns ever faster before the arm is stretched: then reach is the reason.
-    if loss is not None and loss.row <= first + _STRETCHING * isinstance(loss.reason, UnreachableError):
-        return rows, Obstacle(loss.row, loss.reason, isinstance(loss.reason, SingularError))
+    # Close to the stretched arm the elbow turns fast; the reason is then the reach.
+    if branch_end is not None and branch_end.row <= first + _STRETCHED_ROWS * isinstance(
+        branch_end.reason, UnreachableError
+    ):
+        return rows, Infeasibility(branch_end.row, branch_end.reason, isinstance(branch_end.reason, SingularError))
     if first == len(rows):
         return rows, None
     advice = ", or give another arm angle" if model.redundancy else ""
     if outside[:1] == [first]:
         angles = rows[first]
         i = int(np.maximum(limits.lower - angles, angles - limits.upper).argmax())
-        passed = limit_passed(limits, i + 1, float(angles[i]), f"start from another branch{advice}")
-        return rows, Obstacle(first, passed, False)
+        limit_error = limit_passed(limits, i + 1, float(angles[i]), f"start from another branch{advice}")
+        return rows, Infeasibility(first, limit_error, False)
     i = int(excess[first - 1].argmax())
     turn = abs(math.degrees(rows[first, i] - rows[first - 1, i]))
-    jump = PlanningError(
-        f"joint {i + 1} would have to jump by {turn:.1f} deg {span}, because a singularity is in the way; lead the "
-        f"tool around it, go there in joint space{advice}"
+    jump_error = PlanningError(
+        f"joint {i + 1} would have to jump by {turn:.1f} deg {span}, because a singularity is in the way; move the "
+        f"tool around it, use a joint motion{advice}"
     ).coded("path_singular", joint=i + 1, turn=math.radians(turn))
-    return rows, Obstacle(first, jump, True)
+    return rows, Infeasibility(first, jump_error, True)
 
 
-def refusal(path: Path, share: float, reason: RcilabError, when: str = "") -> PlanningError:
-    """Returns the error that says where a path cannot be followed, and why.
+def path_error(path: Path, share: float, reason: RcilabError, when: str = "") -> PlanningError:
+    """Returns the error for a path that cannot be followed, with the position and the reason.
 
     Args:
         path: The path.
         share: The point, as a share of the path length.
-        reason: The cause.
-        when: Its time, for the message.
+        reason: The reason.
+        when: The time, for the message.
     """
     x, y, z = path.at(share)[0].parts[1]
     return PlanningError(
         f"the {path.name} cannot be followed at {share * path.distance:.3f} of {path.distance:.3f} {path.unit} "
-        f"({when}{100.0 * share:.1f} % of the way, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
+        f"({when}{100.0 * share:.1f} % of the path, tool at {x:.3f}, {y:.3f}, {z:.3f} m): {reason}",
         share=share,
     ).coded("path", share=f"{100.0 * share:.1f}", place=(float(x), float(y), float(z)), reason=reason)

@@ -1,7 +1,7 @@
-"""The jerk-limited motion along a path of the tool: as fast as joints, tool and arm angle allow.
+"""The jerk-limited motion along a path of the tool: as fast as the limits on joints, tool and arm angle allow.
 
-Paths are followed by the closed-form inverse at every cycle, so the tool is on the path to rounding; between the cycles
-the joints run as quintics with the path's own velocities and accelerations.
+The closed-form inverse at every cycle keeps the tool on the path within rounding. Between the cycles the joints follow
+quintics with the path's own velocities and accelerations.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from rcilab.motion.bounds import LIMIT_MARGIN, limit_touched
 from rcilab.motion.hermite import quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.motion import Motion, standing
+from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.orientation_path import ViaOrientation, turns_between
 from rcilab.motion.path import Path
-from rcilab.motion.path_bounds import LEAST, ROUNDNESS, PathBounds, half_planes, path_bounds
-from rcilab.motion.path_infeasibility import examine, refusal
+from rcilab.motion.path_bounds import MIN_SLOPE, POLYGON_FACTOR, PathBounds, half_planes, path_bounds
+from rcilab.motion.path_infeasibility import path_error, solve_path
 from rcilab.motion.piecewise import PiecewisePolynomial
 from rcilab.motion.rows import blocks, spread
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _KNOTS = 500
-"""Steps of the path between which bounds are interpolated. Tuning value: two millimetres of a line of a metre."""
+"""Number of steps between which bounds are interpolated. Tuning value: 2 mm on a line of 1 m."""
 _FINE_KNOTS = 4000
-"""The same close to a singularity, where joints turn fast on a short way. Tuning value: the law then takes 50 ms."""
-_STEP = 0.1
-"""Rotation of a joint from knot to knot that can only be caused by a singularity, [rad]: 50 rad on the whole path, more
-than any arm can turn."""
+"""The same close to a singularity, where joints turn fast over a short distance. Tuning value: planning takes 50 ms."""
+_MAX_STEP = 0.1
+"""A larger step of a joint from knot to knot is caused by a singularity, [rad]: it would be 50 rad on the whole path,
+more than any arm can turn."""
 _ROUNDS = 8
-"""How often to slow down a law locally where it exceeds a limit, and then as a whole. Measured: 1 to 5 locally."""
-_SLOWEST = 4.0
-"""A larger excess of a limit is caused by a jump, not by the interpolation between the knots. Tuning value."""
-_INSTANTS = (0.25, 0.5, 0.75)
+"""Largest number of local slowdowns of a time law that exceeds a limit, and then of global ones. Measured: 1 to 5."""
+_MAX_SLOWDOWN = 4.0
+"""A larger slowdown is required by a jump, not by the interpolation between the knots. Tuning value."""
+_CHECKED_FRACTIONS = (0.25, 0.5, 0.75)
 """Instants of a cycle at which the curve is checked besides its start, in cycles."""
-_HASTE = 1.002
-"""Factor on the square of the required slowdown, applied also closely below a limit, so that few rounds are needed: 1
+_OVERCORRECTION = 1.002
+"""Factor on the square of the required slowdown, applied also slightly below a limit, so that few rounds are needed: 1
 or 2 on nine of ten paths. Tuning value; motions become 0.06 % longer."""
-_NUDGE = 1e-4
-"""Share of the way over which derivatives by the way are formed. Tuning value: both their errors are below 1e-7."""
+_DIFFERENCE_STEP = 1e-4
+"""Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Bounds:
-    """Bounds of n joints, the arm angle if there is one, and the tool's turn: one a column, shape (m,)."""
+    """Bounds of n joints, the arm angle if there is one, and the tool's rotation, as columns, shape (m,)."""
 
     velocity: Array
     acceleration: Array
     jerk: Array
     tool: tuple[float, float, float]
-    """Of the tool's translation: velocity, acceleration, jerk."""
+    """Velocity, acceleration and jerk of the tool's translation."""
 
 
 def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
@@ -73,7 +73,7 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
             full.
 
     Raises:
-        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+        PlanningError: A pose on the path is out of reach, or a joint limit or a singularity is in the way.
         InvalidValueError: The speed is out of range.
     """
     speed = as_number(speed, "speed")
@@ -82,13 +82,13 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
             "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
         ).coded("span", low=f"{MIN_SPEED:g}", high="1")
     if path.distance == 0.0:
-        return standing(q, speed=speed)
+        return stationary_motion(q, speed=speed)
     bounds = _bounds(model, LIMIT_MARGIN * speed)
     allowed = _path_bounds(path, require_path(model, q, path), bounds)
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
     fastest, slowdown = FastestLaw(allowed), np.ones(len(allowed.knots))
     worst = 0.0
-    for round_ in range(2 * _ROUNDS):
+    for attempt in range(2 * _ROUNDS):
         law = smooth_law(allowed.knots, fastest.slowed(slowdown), cycles)
         rows = _rows_along(model, q, path, law.s)
         excess = _excess(bounds, path, rows, law.s)
@@ -102,17 +102,17 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
                 curve = _joined(coefficients)
                 return Motion(polynomial=curve, goal=rows[-1], law="jerk_limited", speed=speed)
         worst = float(law.s[excess.argmax()])
-        # Where slowing down in places only shifts what is too fast, the whole way is slowed down.
-        if round_ < _ROUNDS:
+        # If local slowdowns only move the excess, slow down the whole path.
+        if attempt < _ROUNDS:
             factor = np.ones(len(law.s))
-            factor[: len(excess)] = np.maximum(excess * excess * _HASTE, 1.0)
+            factor[: len(excess)] = np.maximum(excess * excess * _OVERCORRECTION, 1.0)
             slowdown *= spread(factor, law.s, allowed.knots, cycles + 3)
         else:
-            slowdown *= float(excess.max()) * _HASTE
-        if slowdown.max() > _SLOWEST:
+            slowdown *= float(excess.max()) * _OVERCORRECTION
+        if slowdown.max() > _MAX_SLOWDOWN:
             break
-    reason = "the joints would have to jump, because a singularity is close; lead the tool around it"
-    raise refusal(path, worst, PlanningError(reason).coded("jump"))
+    reason = "the joints would have to jump, because a singularity is close; move the tool around it"
+    raise path_error(path, worst, PlanningError(reason).coded("jump"))
 
 
 def curve_through(model: RobotModel, path: Path, rows: JointPath, law: TimeParametrization) -> PiecewisePolynomial:
@@ -134,17 +134,17 @@ def require_path(model: RobotModel, q: JointVector, path: Path) -> JointPath:
     """Returns the joint angles at evenly spaced knots of a path that can be followed, shape (M + 1, n), [rad].
 
     Raises:
-        PlanningError: A pose on the way is out of reach, or a joint limit or a singularity is in the way.
+        PlanningError: A pose on the path is out of reach, or a joint limit or a singularity is in the way.
     """
     for knots in (_KNOTS, _FINE_KNOTS):
         shares = np.linspace(0.0, 1.0, knots + 1)
-        span = f"on {100.0 / knots:g} % of the way"
-        rows, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
-        if obstacle is None:
+        span = f"on {100.0 / knots:g} % of the path"
+        rows, infeasible = solve_path(model, q, path, shares, np.full(model.n, _MAX_STEP), span)
+        if infeasible is None:
             return rows
-        if not obstacle.is_singular:
+        if not infeasible.is_singular:
             break
-    raise refusal(path, float(shares[obstacle.row]), obstacle.reason)
+    raise path_error(path, float(shares[infeasible.row]), infeasible.reason)
 
 
 def _rows_along(model: RobotModel, q: JointVector, path: Path, shares: Array) -> JointPath:
@@ -152,7 +152,7 @@ def _rows_along(model: RobotModel, q: JointVector, path: Path, shares: Array) ->
     rows = np.empty((model.n, len(shares))).T
     rows[0] = q
     for block in blocks(len(shares)):
-        # From the row before on, so that none of a path's steps is overlooked.
+        # From the previous row on, so that every step is covered.
         block = slice(max(block.start - 1, 0), block.stop)
         rows[block] = inverse_path(model, *path.sample(shares[block]), rows[block.start])[0]
     rows[0] = q
@@ -160,12 +160,12 @@ def _rows_along(model: RobotModel, q: JointVector, path: Path, shares: Array) ->
 
 
 def _require_inside(model: RobotModel, path: Path, rows: JointPath, shares: Array) -> None:
-    """Refuses rows that touch a joint limit between the knots."""
+    """Requires rows inside the joint limits between the knots, too."""
     limits = model.limits.joint
     outside = np.argwhere(~((limits.lower < rows) & (rows < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()
-        raise refusal(path, float(shares[row]), limit_touched(limits, joint + 1, float(rows[row, joint])))
+        raise path_error(path, float(shares[row]), limit_touched(limits, joint + 1, float(rows[row, joint])))
 
 
 def _bounds(model: RobotModel, part: float) -> _Bounds:
@@ -191,17 +191,17 @@ def _longest_reversal(bounds: _Bounds) -> float:
 
 
 def _columns(path: Path, rows: JointPath, shares: Array) -> Array:
-    """Returns joint angles, the arm angle if there is one, and the tool's turn along a path, shape (N, m), [rad].
+    """Returns joint angles, the arm angle if there is one, and the tool's rotation along a path, shape (N, m), [rad].
 
-    A turn that is not even has rows of its own (`_turn_rows`) and is left out here, as zeros.
+    A rotation through a via orientation has rows of its own (`_turn_rows`) and is zero here.
     """
-    turn = 0.0 if _turns_unevenly(path) else path.turn
+    turn = 0.0 if _has_via_orientation(path) else path.turn
     if path.psi_start is None or path.psi_goal is None:
         return np.vstack((rows.T, turn * shares)).T
     return np.vstack((rows.T, (path.psi_goal - path.psi_start) * shares, turn * shares)).T
 
 
-def _turns_unevenly(path: Path) -> bool:
+def _has_via_orientation(path: Path) -> bool:
     return isinstance(path.turning, ViaOrientation)
 
 
@@ -215,14 +215,14 @@ def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
     second[:, 0], second[:, -1] = second[:, 1], second[:, -2]
     velocity, acceleration, _ = bounds.tool
     along, toward = (np.tile(rows, len(knots)) for rows in _tool_rows(path))
-    round_ = 1.0 if path.circle is None else ROUNDNESS
-    parts = [(first, second, bounds.velocity, bounds.acceleration), (along, toward, velocity, round_ * acceleration)]
-    if _turns_unevenly(path):
-        parts.append((*_turn_rows(path, shares), bounds.velocity[-1], ROUNDNESS * bounds.acceleration[-1]))
+    factor = 1.0 if path.circle is None else POLYGON_FACTOR
+    parts = [(first, second, bounds.velocity, bounds.acceleration), (along, toward, velocity, factor * acceleration)]
+    if _has_via_orientation(path):
+        parts.append((*_turn_rows(path, shares), bounds.velocity[-1], POLYGON_FACTOR * bounds.acceleration[-1]))
     firsts, seconds, velocities, accelerations = zip(*parts, strict=True)
     sizes = [np.full(len(rows), limit) for rows, limit in zip(firsts, velocities, strict=True)]
     first = np.vstack(firsts)
-    fastest = (np.concatenate(sizes)[:, np.newaxis] / np.maximum(np.abs(first), LEAST)).min(axis=0)
+    fastest = (np.concatenate(sizes)[:, np.newaxis] / np.maximum(np.abs(first), MIN_SLOPE)).min(axis=0)
     limits = [np.full(len(rows), limit) for rows, limit in zip(firsts, accelerations, strict=True)]
     return path_bounds(shares, first, np.vstack(seconds), np.concatenate(limits)[:, np.newaxis], fastest)
 
@@ -231,14 +231,14 @@ def _tool_rows(path: Path) -> tuple[Array, Array]:
     """Returns the tool's path derivatives as rows that bound their norm, each of shape (1 or sides, 1), [m]."""
     if path.circle is None:
         return np.full((1, 1), math.dist(path.start.parts[1], path.goal.parts[1])), np.zeros((1, 1))
-    # Along the way, and towards the centre.
+    # Along the path, and towards the centre.
     return half_planes(np.array([[path.distance, 0.0]]), np.array([[0.0, path.distance * path.circle.angle]]))
 
 
 def _turn_rows(path: Path, shares: Array) -> tuple[Array, Array]:
-    """Returns the path derivatives of an uneven turn as rows that bound its norm, each of shape (sides, K + 1), [rad].
+    """Returns the derivatives of a non-uniform rotation as rows that bound its norm, (sides, K + 1) each, [rad].
 
-    In the plane of its rotation velocity w by the share and of dw the acceleration is w s'' + dw s'^2.
+    With the rotation velocity w by the share, the acceleration is w s'' + dw s'^2.
     """
     R = path.sample(np.concatenate((shares[:1] - shares[1], shares, shares[-1:] + shares[1])))[0][:, :3, :3]
     turns = turns_between(R) / shares[1]
@@ -246,42 +246,42 @@ def _turn_rows(path: Path, shares: Array) -> tuple[Array, Array]:
 
 
 def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Array:
-    """Returns the slowdown that each row needs to keep every bound, shape (N,); 1 or less keeps them."""
+    """Returns the slowdown that each row needs to be inside every bound, shape (N,); 1 or less is inside."""
     last = len(rows) - 1
     excess = np.zeros(len(rows) + 3)
     limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
     for block in blocks(len(excess)):
-        # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
-        held = np.clip(np.arange(block.start - 3, block.stop), 0, last)
-        u = shares[held]
-        column, position = _columns(path, rows[held], u).T, path.positions(u).T
+        # With the three previous rows; before the first and after the last row there are three cycles of standstill.
+        clamped = np.clip(np.arange(block.start - 3, block.stop), 0, last)
+        u = shares[clamped]
+        column, position = _columns(path, rows[clamped], u).T, path.positions(u).T
         for order, (limit, tool_limit) in enumerate(zip(limits, bounds.tool, strict=True), start=1):
             column, position = np.diff(column), np.diff(position)
             span = CYCLE_TIME**order
             joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
             tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
-            _raise(excess[block], np.maximum(joints, tool), order)
-        if _turns_unevenly(path):
+            _accumulate(excess[block], np.maximum(joints, tool), order)
+        if _has_via_orientation(path):
             turn = turns_between(path.sample(u)[0][:, :3, :3]).T
             for order, limit in enumerate(limits, start=1):
-                _raise(excess[block], np.sqrt((turn * turn).sum(axis=0)) / (CYCLE_TIME**order * limit[-1]), order)
+                _accumulate(excess[block], np.sqrt((turn * turn).sum(axis=0)) / (CYCLE_TIME**order * limit[-1]), order)
                 turn = np.diff(turn)
     excess[last] = excess[last:].max()
     return excess[: last + 1]
 
 
-def _raise(excess: Array, ratio: Array, order: int) -> None:
-    """Includes the excess of backward differences; one of order n grows with the speed to the power n."""
+def _accumulate(excess: Array, ratio: Array, order: int) -> None:
+    """Includes the excess of backward differences; those of order n grow with the speed to the power n."""
     np.maximum(excess, ratio[3 - order :] ** (1.0 / order), out=excess)
 
 
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
-    """Returns the slowdown that each cycle needs to keep the joints' bounds, shape (N - 1,)."""
+    """Returns the slowdown that each cycle needs to be inside the joints' bounds, shape (N - 1,)."""
     excess = np.zeros(len(powers[0]))
     for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
         powers = [float(p) * powers[p] for p in range(1, len(powers))]
         largest = np.abs(powers[0])
-        for part in _INSTANTS:
+        for part in _CHECKED_FRACTIONS:
             value = powers[-1].copy("K")
             for coefficient in reversed(powers[:-1]):
                 value *= part * CYCLE_TIME
@@ -294,18 +294,20 @@ def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
 def _quintics(
     model: RobotModel, path: Path, rows: JointPath, law: TimeParametrization
 ) -> Iterator[tuple[slice, list[Array]]]:
-    """Yields the curve through the rows with the path's velocities and accelerations: continuous in both.
+    """Yields the curve through the rows with the path's velocities and accelerations, block by block.
 
     Yields:
-        Some of its N - 1 cycles, and their coefficients by ascending power, each of shape (cycles, n).
+        A block of its N - 1 cycles, and their coefficients by ascending power, each of shape (cycles, n).
     """
     last = len(rows) - 1
     h = CYCLE_TIME
     for block in blocks(last):
         ends = slice(block.start, block.stop + 1)
         here, u = rows[ends], law.s[ends]
-        before, after = (inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_NUDGE, _NUDGE))
-        first, second = (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+        before, after = (
+            inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_DIFFERENCE_STEP, _DIFFERENCE_STEP)
+        )
+        first, second = (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
         du, ddu = law.ds[ends, np.newaxis], law.dds[ends, np.newaxis]
         v = first * du
         a = second * du**2 + first * ddu

@@ -1,4 +1,4 @@
-"""A piecewise polynomial of time for all joints: the curve of every motion."""
+"""Piecewise polynomials of time for all joints: the curve of every motion."""
 
 from __future__ import annotations
 
@@ -12,42 +12,44 @@ from rcilab.core.arrays import Array, JointPath, JointVector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
 DERIVATIVES = 4
-"""Position, velocity, acceleration and jerk."""
+"""Number of derivatives with the position: position, velocity, acceleration and jerk."""
 
-_SAME_BREAK = 1e-11  # [s] Breaks of two joints closer than this are one; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
+_SAME_BREAK = 1e-11  # [s] Closer breaks of two joints are merged; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
 
 
 def require_piece_shapes(breaks: tuple[int, ...], coefficients: tuple[int, ...]) -> None:
-    """Refuses shapes of breaks and coefficients that do not fit together.
+    """Requires shapes of breaks and coefficients that fit together.
 
     Raises:
-        InvalidValueError: They do not.
+        InvalidValueError: They do not fit.
     """
     if len(breaks) != 1 or breaks[0] < 2 or len(coefficients) != 3 or coefficients[0] != breaks[0] - 1:
         shapes = f"breaks of shape {breaks}, coefficients of shape {coefficients}"
         raise InvalidValueError("polynomial pieces", shapes, "must have shapes (S + 1,) and (S, n, k)")
     if coefficients[1] < 1 or coefficients[2] < 1:
-        raise InvalidValueError("coefficients", f"array of shape {coefficients}", "need a joint and a power")
+        raise InvalidValueError(
+            "coefficients", f"array of shape {coefficients}", "must have at least one joint and one power"
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewisePolynomial:
     """Joint angles over time: S polynomial pieces for n joints, powers of the time since each piece began.
 
-    Piece s holds on [breaks[s], breaks[s + 1]); joint i is there at the sum over p of
+    On piece s, [breaks[s], breaks[s + 1]), the angle of joint i is the sum over p of
     `coefficients[s, i, p] * (t - breaks[s])**p`.
     """
 
     breaks: Array
-    """Where the pieces begin, and where the last one ends, shape (S + 1,), not decreasing, first 0, [s]."""
+    """Start of each piece and end of the last one, shape (S + 1,), not decreasing, first 0, [s]."""
     coefficients: Array
     """Shape (S, n, k), ascending powers, [rad, rad/s, ...]."""
     _factors: tuple[Array, ...] = field(init=False, repr=False)
-    """For each derivative what each coefficient is multiplied by, those of lower powers left out; one at least."""
+    """For each derivative the factors on the coefficients that remain, from the lowest power; at least one."""
     _table_powers: NDArray[np.intp] = field(init=False, repr=False)
-    """The same side by side, for one piece: which coefficient, shape (k, DERIVATIVES)."""
+    """Index of the coefficient for each power and derivative, shape (k, DERIVATIVES)."""
     _table_factors: Array = field(init=False, repr=False)
-    """Likewise: times what, shape (k, DERIVATIVES, 1)."""
+    """Factor on that coefficient, shape (k, DERIVATIVES, 1)."""
     _starts: list[float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,7 +80,7 @@ class PiecewisePolynomial:
 
     @property
     def duration(self) -> float:
-        """Where the last piece ends, [s]."""
+        """End of the last piece, [s]."""
         return float(self.breaks[-1])
 
     @property
@@ -94,7 +96,7 @@ class PiecewisePolynomial:
             derivative: 0 for angles [rad], 1 velocities, 2 accelerations, 3 jerks.
 
         Returns:
-            Shape (N, n), writable. At a break the later piece counts.
+            Shape (N, n), writable. At a break the later piece applies.
         """
         t = np.clip(np.asarray(times, dtype=np.float64), 0.0, self.breaks[-1])
         piece = np.searchsorted(self.breaks[:-1], t, side="right") - 1
@@ -120,9 +122,9 @@ class PiecewisePolynomial:
         return self._at_piece(piece, t - self._starts[piece])
 
     def extremes(self) -> tuple[tuple[JointVector, JointVector], tuple[JointVector, JointVector]]:
-        """Returns how far each joint goes: the smallest angles with their times, and the largest with theirs.
+        """Returns the smallest and the largest angle of each joint, with their times.
 
-        Exact for pieces up to cubics: a joint turns at a break or where its velocity, a parabola, is zero.
+        For pieces up to cubics. An extremum is at a break or at a zero of the velocity, a parabola.
 
         Returns:
             ((lowest, times), (highest, times)), each of shape (n,), [rad] and [s].
@@ -137,9 +139,9 @@ class PiecewisePolynomial:
         root = np.sqrt(np.maximum(b * b - 4.0 * a * c, 0.0))
         sum_ = -0.5 * (b + np.copysign(root, b))  # Numerical Recipes 5.6.4: no difference of close numbers.
         with np.errstate(divide="ignore", invalid="ignore"):
-            turns = [np.nan_to_num(sum_ / a), np.nan_to_num(c / sum_)]
-        # What is no turn, or lies outside the piece, is replaced by an end of the piece: a point of the curve too.
-        tau = np.stack([np.zeros_like(c), length, *(np.clip(turn, 0.0, length) for turn in turns)])
+            extrema = [np.nan_to_num(sum_ / a), np.nan_to_num(c / sum_)]
+        # A zero that does not exist or is outside the piece becomes an end of the piece, which is on the curve too.
+        tau = np.stack([np.zeros_like(c), length, *(np.clip(extremum, 0.0, length) for extremum in extrema)])
         angles = q[-1]
         for coefficient in reversed(q[:-1]):
             angles = angles * tau + coefficient
@@ -150,20 +152,20 @@ class PiecewisePolynomial:
         return (angles[low, joint], times[low, joint]), (angles[high, joint], times[high, joint])
 
     def at_end(self) -> tuple[JointVector, JointVector, JointVector, JointVector]:
-        """Returns the limits from the left at the end of the last piece."""
+        """Returns the left-hand limits at the end of the last piece."""
         return self._at_piece(-1, float(self.breaks[-1]) - self._starts[-1])
 
     def slowed(self, factor: float) -> PiecewisePolynomial:
-        """Returns the same curve run through `factor` times slower: q(t / factor), exact but for rounding.
+        """Returns the same curve `factor` times slower: q(t / factor), exact within rounding.
 
         Args:
-            factor: Times slower, above 0; below 1 it is faster.
+            factor: Factor on the duration, above 0; below 1 the curve is faster.
         """
         powers = np.arange(self.coefficients.shape[2])
         return PiecewisePolynomial(self.breaks * factor, self.coefficients / factor**powers)
 
     def _at_piece(self, piece: int, tau: float) -> tuple[JointVector, JointVector, JointVector, JointVector]:
-        # All derivatives together: where a derivative has fewer powers than the others its highest ones are zeros.
+        # All derivatives together; the highest powers of the higher derivatives are zero.
         table = self._table_factors * self.coefficients[piece].T[self._table_powers]
         value = table[-1]
         for coefficient in table[-2::-1]:
@@ -173,13 +175,13 @@ class PiecewisePolynomial:
 
 
 def join_pieces(starts: Array, coefficients: Array, duration: float) -> PiecewisePolynomial:
-    """Returns the curve of joints with pieces of their own, on the union of all breaks.
+    """Returns the curve of joints that have different pieces, on the union of all breaks.
 
     Args:
-        starts: When each piece of each joint begins, shape (n, m), not decreasing along a joint, first 0, [s]. The last
-            piece of a joint goes on to the end; a piece of no length is skipped.
+        starts: Start of each piece of each joint, shape (n, m), not decreasing along a joint, first 0, [s]. The last
+            piece of a joint extends to the end; a piece of zero length is skipped.
         coefficients: Shape (n, m, k), ascending powers of the time since the piece began, [rad, rad/s, ...].
-        duration: Where the curve ends, [s].
+        duration: End of the curve, [s].
     """
     breaks = _union(starts, duration)
     middle = (breaks[:-1] + breaks[1:]) / 2.0

@@ -20,19 +20,20 @@ class Program:
     """A sequence of waypoints for one model, from one start. `plan_program` plans its motion.
 
     Raises:
-        InvalidValueError: A number is out of range, or the angles are not as many as the arm has axes.
-        ModelError: No robot has this name.
+        InvalidValueError: A number is out of range, or the number of angles is not the arm's number of axes.
+        ModelError: No model has this name.
     """
 
     model: str
-    """Name of the arm, as the manual spells it."""
+    """Name of the arm's model, spelled as in the manual."""
     start: Floats
     """Joint angles at the start, n of them, [rad]."""
     waypoints: tuple[Waypoint, ...]
     name: str = ""
     """Name for display."""
     tool: Floats | None = None
-    """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of the planner."""
+    """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of the model passed
+    to `plan_program`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -73,11 +74,11 @@ class Program:
 
         Args:
             text: JSON, bytes in UTF-8.
-            name: What to call it in an error.
+            name: Name of the text, for errors.
 
         Raises:
-            InvalidValueError: The program is not valid; the message names the line, the key and what to do.
-            VersionMismatchError: It was written for another version of this format.
+            InvalidValueError: The program is not valid; the message names the line, the key and the remedy.
+            VersionMismatchError: It has another version of this format.
         """
         content = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
         return read_program(content, name, cls)
@@ -95,13 +96,13 @@ class Program:
         """Returns the program in a file.
 
         Raises:
-            InvalidValueError: There is no such file, or its program is not valid; the message names the line.
-            VersionMismatchError: It was written for another version of this format.
+            InvalidValueError: The file does not exist, or its program is not valid; the message names the line.
+            VersionMismatchError: It has another version of this format.
         """
         return load_program(file, cls)
 
     def to_python(self) -> str:
-        """Returns a script that plans the same motion; run as `python SCRIPT [OUT.npz]` it prints the report."""
+        """Returns a script that plans the same motion; `python SCRIPT [OUT.npz]` prints its report."""
         return program_script(self)
 
     def __repr__(self) -> str:

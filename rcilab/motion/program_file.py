@@ -1,4 +1,4 @@
-"""Programs as JSON: an exact round trip, and errors that name the line."""
+"""Programs as JSON, with an exact round trip and errors that name the line."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rcilab.core.arrays import Unquoted, described
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
-from rcilab.motion.located_json import LONGEST, LongListError, Node, read_json
-from rcilab.motion.waypoint import ALLOWED, ALWAYS, MOST_WAYPOINTS, WORDS, Waypoint, require_count, require_fit
+from rcilab.motion.located_json import MAX_BYTES, LongListError, Node, read_json
+from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ VERSION = 1
 SCHEMA = Path(__file__).with_name("program.schema.json")
 """The JSON schema (draft 2020-12) of a program."""
 
-_SHOWN = 40  # Characters of a value that a UI repeats.
+_EXCERPT_LENGTH = 40  # [characters] Of a value in an error message.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")
 
@@ -39,7 +39,7 @@ def program_text(program: Program) -> str:
     if program.tool is not None:
         lines.append(f'  "tool": {json.dumps(program.tool)}')
     lines.append(f'  "start": {json.dumps(program.start)}')
-    waypoints = ",\n".join(f"    {json.dumps(_as_written(waypoint))}" for waypoint in program.waypoints)
+    waypoints = ",\n".join(f"    {json.dumps(_as_json_object(waypoint))}" for waypoint in program.waypoints)
     lines.append(f'  "waypoints": [\n{waypoints}\n  ]')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
@@ -67,50 +67,50 @@ def load_program(file: str | PathLike[str], build: Callable[..., P]) -> P:
     """Returns the program in a file; arguments as of `read_program`.
 
     Raises:
-        InvalidValueError: There is no such file, or its program is not valid.
-        VersionMismatchError: It was written for another version of this format.
+        InvalidValueError: The file does not exist, or its program is not valid.
+        VersionMismatchError: It has another version of this format.
     """
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("program file", described(file), "must be a file name")
     path = Path(fspath(file))
-    content = read_limited(path, "program file", LONGEST + 1)
+    content = read_limited(path, "program file", MAX_BYTES + 1)
     return read_program(content, path.name, build)
 
 
 def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
-    """Returns what `build` makes of the program in a JSON text; its keyword arguments are those of `Program`.
+    """Returns the program in a JSON text, built by `build` with the keyword arguments of `Program`.
 
     Args:
         content: JSON in UTF-8.
-        name: What to call it in an error.
+        name: Name of the text, for errors.
         build: Builds the program; raises InvalidValueError for an invalid value.
 
     Raises:
-        InvalidValueError: The program is not valid; the message has line, key, value, bound and what to do.
-        VersionMismatchError: It was written for another version of this format.
+        InvalidValueError: The program is not valid; the message names line, key, value, bound and remedy.
+        VersionMismatchError: It has another version of this format.
     """
     try:
         root = read_json(content, name, {"waypoints": MOST_WAYPOINTS})
-    except LongListError as long:  # Said at once, before each of them is read.
+    except LongListError as too_long:  # Reported before the rest is read.
         try:
-            require_count(long.count)
+            require_count(too_long.count)
         except InvalidValueError as error:
-            raise _placed(error, name, Node([], long.line)) from error
+            raise _with_line(error, name, Node([], too_long.line)) from error
         raise
     found = _object(root, name, "a program", _PROGRAM_KEYS)
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
             raise InvalidValueError(
-                f"{name}, {key}", None, f"is missing; a program has {json.dumps(_written(expected))}"
+                f"{name}, {key}", None, f"is missing; a program has {json.dumps(_as_json_number(expected))}"
             ).coded("file_missing", file=name, key=key)
         value = found[key].value
         if key == "version" and value != expected:
             what = f"{name}, line {found[key].line}, version"
             raise VersionMismatchError(what, value, VERSION, "write it again with the rcilab that reads it")
         if value != expected:
-            raise InvalidValueError(_at(name, found[key], key), found[key].plain(), f"must be {expected!r}").coded(
-                "file_no_program", file=name, line=found[key].line
-            )
+            raise InvalidValueError(
+                _location(name, found[key], key), found[key].plain(), f"must be {expected!r}"
+            ).coded("file_no_program", file=name, line=found[key].line)
     for key in ("model", "start", "waypoints"):
         if key not in found:
             raise InvalidValueError(
@@ -118,26 +118,26 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
             ).coded("file_missing", file=name, key=key)
     texts = {key: _text(name, found[key], key) for key in ("name", "model") if key in found}
     vectors = {key: _vector(name, found[key], key) for key in ("start", "tool") if key in found}
-    listed = found["waypoints"]
-    if not isinstance(listed.value, list):
-        raise InvalidValueError(_at(name, listed, "waypoints"), listed.plain(), "must be a list [{...}, {...}]").coded(
-            "file_kind", file=name, line=listed.line, key="waypoints"
-        )
+    waypoint_list = found["waypoints"]
+    if not isinstance(waypoint_list.value, list):
+        raise InvalidValueError(
+            _location(name, waypoint_list, "waypoints"), waypoint_list.plain(), "must be a list [{...}, {...}]"
+        ).coded("file_kind", file=name, line=waypoint_list.line, key="waypoints")
     try:
         robot = describe_robot(str(texts["model"]))
     except ModelError as error:
-        raise InvalidValueError(_at(name, found["model"], "model"), texts["model"], f"is no robot: {error}").coded(
-            "file_model", file=name, line=found["model"].line, model=_shown(texts["model"])
-        ) from error
+        raise InvalidValueError(
+            _location(name, found["model"], "model"), texts["model"], f"is not a known model: {error}"
+        ).coded("file_model", file=name, line=found["model"].line, model=_excerpt(texts["model"])) from error
     try:
-        require_count(len(listed.value))
+        require_count(len(waypoint_list.value))
     except InvalidValueError as error:
-        raise _placed(error, name, listed) from error
-    waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(listed.value, 1))
+        raise _with_line(error, name, waypoint_list) from error
+    waypoints = tuple(_waypoint(node, number, name, robot) for number, node in enumerate(waypoint_list.value, 1))
     try:
         return build(waypoints=waypoints, **texts, **vectors)
     except InvalidValueError as error:
-        raise _placed(error, name, found.get("tool" if error.name == "wxyz" else error.name, root)) from error
+        raise _with_line(error, name, found.get("tool" if error.name == "wxyz" else error.name, root)) from error
 
 
 def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Waypoint:
@@ -150,33 +150,33 @@ def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Wa
         ).coded("file_missing_of", file=name, line=node.line, number=number, key="type")
     values: dict[str, Any] = {"type": _text(name, found["type"], f"{kind}, type")}
     for key, value in found.items():
-        if key == "type" or (value.value is None and key not in ALWAYS):
+        if key == "type" or (value.value is None and key not in COMMON_FIELDS):
             continue
         what = f"{kind}, {key}"
-        read = _number if key in _SCALARS else _text if key in WORDS else _vector
+        read = _number if key in _SCALARS else _text if key in CHOICES else _vector
         values[key] = read(name, value, what)
     try:
         waypoint = Waypoint(**values)
         require_fit(waypoint, robot)
         return waypoint
     except InvalidValueError as error:
-        raise _placed(
+        raise _with_line(
             error, name, found.get(error.name, node), f"waypoint {number} ({values['type']}), ", number
         ) from error
 
 
-def _placed(error: InvalidValueError, name: str, node: Node, prefix: str = "", number: int = 0) -> InvalidValueError:
+def _with_line(error: InvalidValueError, name: str, node: Node, prefix: str = "", number: int = 0) -> InvalidValueError:
     value = Unquoted("nothing") if error.value is None else error.value
     placed = InvalidValueError(f"{name}, line {node.line}, {prefix}{error.name}", value, error.requirement)
     reason = error if error.code else error.requirement
-    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _shown(error.value)}
+    facts: dict[str, object] = {"file": name, "line": node.line, "key": error.name, "value": _excerpt(error.value)}
     if number:
         return placed.coded("file_waypoint", number=number, reason=reason, **facts)
     return placed.coded("file_value", reason=reason, **facts)
 
 
-def _shown(value: object) -> str:
-    return plain_text("" if value is None else str(value), _SHOWN)
+def _excerpt(value: object) -> str:
+    return plain_text("" if value is None else str(value), _EXCERPT_LENGTH)
 
 
 def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str, Node]:
@@ -188,13 +188,13 @@ def _object(node: Node, name: str, kind: str, keys: tuple[str, ...]) -> dict[str
         if key not in keys:
             raise InvalidValueError(
                 f"{name}, line {value.line}, {kind}, {key}", value.plain(), f"is unknown; known: {', '.join(keys)}"
-            ).coded("file_unknown", file=name, line=value.line, key=_shown(key))
+            ).coded("file_unknown", file=name, line=value.line, key=_excerpt(key))
     return node.value
 
 
 def _text(name: str, node: Node, key: str) -> str:
     if not isinstance(node.value, str):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be text in double quotes").coded(
+        raise InvalidValueError(_location(name, node, key), node.plain(), "must be text in double quotes").coded(
             "file_kind", file=name, line=node.line, key=key
         )
     return node.value
@@ -202,7 +202,7 @@ def _text(name: str, node: Node, key: str) -> str:
 
 def _number(name: str, node: Node, key: str) -> float:
     if not isinstance(node.value, float):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a number").coded(
+        raise InvalidValueError(_location(name, node, key), node.plain(), "must be a number").coded(
             "file_kind", file=name, line=node.line, key=key
         )
     return node.value
@@ -210,20 +210,20 @@ def _number(name: str, node: Node, key: str) -> float:
 
 def _vector(name: str, node: Node, key: str) -> tuple[float, ...]:
     if not isinstance(node.value, list):
-        raise InvalidValueError(_at(name, node, key), node.plain(), "must be a list of numbers [...]").coded(
+        raise InvalidValueError(_location(name, node, key), node.plain(), "must be a list of numbers [...]").coded(
             "file_kind", file=name, line=node.line, key=key
         )
     return tuple(_number(name, item, f"{key}, number {i}") for i, item in enumerate(node.value, 1))
 
 
-def _at(name: str, node: Node, key: str) -> str:
+def _location(name: str, node: Node, key: str) -> str:
     return f"{name}, line {node.line}, {key}"
 
 
-def _written(value: object) -> object:
+def _as_json_number(value: object) -> object:
     return int(value) if isinstance(value, float) else value
 
 
-def _as_written(waypoint: Waypoint) -> dict[str, object]:
+def _as_json_object(waypoint: Waypoint) -> dict[str, object]:
     values = {field.name: getattr(waypoint, field.name) for field in fields(Waypoint)}
     return {key: value for key, value in values.items() if value is not None}

@@ -33,7 +33,7 @@ if __name__ == "__main__":
 
 
 def program_script(program: Program) -> str:
-    """Returns the script; its numbers are exact, and text is only in literals."""
+    """Returns the script; numbers are exact, and text of the program appears only in string literals."""
     head = [("name", program.name), ("model", program.model), ("tool", program.tool), ("start", program.start)]
     lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)

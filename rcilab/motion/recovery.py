@@ -1,4 +1,4 @@
-"""The motion back inside joint ranges and safety box, for an arm that was stopped outside them."""
+"""Motion back inside the joint ranges and the safety box, for an arm that stopped outside them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rcilab.motion.joint import plan_joint
 from rcilab.motion.motion import Motion
 
 RECOVERY_MARGIN = radians(1.0)
-"""How far inside its range a joint is moved, [rad]: enough that the next motion starts inside although a compliant arm
-deflects a little."""
+"""Distance inside its range to which a joint is moved, [rad]: the next motion then starts inside even if a compliant
+arm deflects slightly."""
 RECOVERY_DEPTH = 0.01
-"""How far inside its safety box the tool is moved, [m], for the same reason."""
+"""Distance inside the safety box to which the tool is moved, [m], for the same reason."""
 RECOVERY_SPEED = 0.05
-"""Part of the velocity and acceleration limits: low, for an arm that has just been stopped."""
+"""Part of the velocity and acceleration limits; low, because the arm has just been stopped."""
 
 
 def plan_recovery(
@@ -39,9 +39,9 @@ def plan_recovery(
     is more than 1 degree outside.
 
     Args:
-        model: The arm; with soft limits, their range counts.
-        q: Where the arm is, shape (n,), [rad]: `state.q_c`. A joint may be outside by at most `RECOVERY_RANGE`, 20
-            degrees.
+        model: The arm; soft limits, if set, define the range.
+        q: Current commanded joint angles, `state.q_c`, shape (n,), [rad]. A joint may be outside by at most
+            `RECOVERY_RANGE`, 20 degrees.
         box: The controller's safety box, such as `robot.safety_box`; None: no box.
         speed: Part of the velocity and acceleration limits to use, 0.001 to 1.
 
@@ -61,8 +61,8 @@ def plan_recovery(
             return plan_line(model, start, Pose(_nearest_inside(box, T.position), T.wxyz), speed=speed)
     margin = np.minimum(RECOVERY_MARGIN, (limits.upper - limits.lower) / 2.0)
     goal = np.where(beyond >= 0.0, np.clip(start, limits.lower + margin, limits.upper - margin), start)
-    opened = range_from(limits, start)
-    arm = model.with_joint_limits(opened.lower, opened.upper)
+    widened = range_from(limits, start)
+    arm = model.with_joint_limits(widened.lower, widened.upper)
     return plan_joint(arm, start, goal, speed=speed, law="torque_rate_limited")
 
 
@@ -70,19 +70,19 @@ def _too_far(limits: JointLimits, joint: int, angle: float, beyond: float) -> Pl
     soft, most = limits.exceeded_soft_limit(joint, angle), f"{degrees(RECOVERY_RANGE):g}"
     facts = {"joint": joint, "angle": angle, "beyond": beyond, "most": RECOVERY_RANGE}
     where = "its range" if soft is None else f"the soft limit of {degrees(soft):.2f}° that was set"
-    said = (
-        f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery leads back "
-        f"from {most}° at most; guide the arm back by hand"
+    message = (
+        f"joint {joint}: {angle_text(angle)} is {degrees(beyond):.2f}° outside {where}, and plan_recovery works "
+        f"up to {most}°; guide the arm back by hand"
     )
     if soft is None:
-        return PlanningError(said).coded("recovery_range", **facts)
-    said += ", or widen the soft limit"
-    return PlanningError(said).coded("recovery_range_soft", **facts, limit=soft)
+        return PlanningError(message).coded("recovery_range", **facts)
+    message += ", or widen the soft limit"
+    return PlanningError(message).coded("recovery_range_soft", **facts, limit=soft)
 
 
 def _nearest_inside(box: SafetyBox, position: Vector3) -> Vector3:
-    """Returns the nearest point `RECOVERY_DEPTH` inside the box, or at its middle where it is thin, shape (3,), [m]."""
-    room = np.array(box.size) / 2.0
-    room -= np.minimum(RECOVERY_DEPTH, room)
-    into = box.T_base_box.inverse()
-    return box.T_base_box @ np.clip(into @ position, -room, room)
+    """Returns the nearest point `RECOVERY_DEPTH` inside the box, or its middle if it is thinner, shape (3,), [m]."""
+    half_size = np.array(box.size) / 2.0
+    half_size -= np.minimum(RECOVERY_DEPTH, half_size)
+    T_box_base = box.T_base_box.inverse()
+    return box.T_base_box @ np.clip(T_box_base @ position, -half_size, half_size)

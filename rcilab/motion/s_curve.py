@@ -17,7 +17,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 
 STANDSTILL_DISTANCE = 1e-6
-"""A coordinate that is to move no farther than this does not move at all, [rad or m]."""
+"""A coordinate with at most this distance to move does not move, [rad or m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +25,7 @@ class SCurve:
     """The S profile of one coordinate, starting at zero."""
 
     distance: float
-    """How far it goes, with its sign, [rad]; 0 where it does not move."""
+    """Signed distance, [rad]; 0 if it does not move."""
     peak: float
     """Speed of the middle part, V, [rad/s]."""
     duration: float
@@ -48,11 +48,10 @@ class SCurve:
     def stretched(self, duration: float) -> SCurve:
         """Returns the curve over the same distance in a longer time: same accelerations, lower peak speed.
 
-        The peak is the smaller root of 0.75 (a0 + a1) V^2 - T a0 a1 V + |D| a0 a1 = 0, written so that neither the
-        difference of close numbers nor a small quotient spoils it.
+        The peak is the smaller root of 0.75 (a0 + a1) V^2 - T a0 a1 V + |D| a0 a1 = 0, in a form without cancellation.
 
         Args:
-            duration: The time it shall take, [s]; not below its own.
+            duration: The longer time, [s]; a shorter one has no effect.
         """
         if self.distance == 0.0 or duration <= self.duration:
             return self
@@ -62,7 +61,7 @@ class SCurve:
         return replace(self, peak=peak, duration=duration)
 
     def pieces(self) -> tuple[Array, Array]:
-        """Returns the curve as four polynomial pieces: rise, constant speed, fall, standing at the end.
+        """Returns the curve as four polynomial pieces: rise, constant speed, fall, standstill at the end.
 
         Returns:
             Starts, shape (4,), [s], and coefficients, shape (4, 5), ascending powers of the time since each start.
@@ -83,7 +82,7 @@ class SCurve:
         return np.array([0.0, t1, falling, self.duration]), coefficients
 
     def at(self, t: float) -> tuple[float, float, float, float]:
-        """Returns coordinate, speed, acceleration and jerk at a time; it stands before the start and after the end.
+        """Returns coordinate, speed, acceleration and jerk at a time; standstill before the start and after the end.
 
         Args:
             t: Time, [s].
@@ -108,10 +107,10 @@ def plan_s_curve(
     """Returns the fastest S profile over a distance.
 
     Args:
-        distance: How far to go, with its sign, [rad]. Up to `STANDSTILL_DISTANCE` it does not move.
+        distance: Signed distance, [rad]. Up to `STANDSTILL_DISTANCE` the coordinate does not move.
         velocity: Largest speed, > 0, [rad/s].
         start_acceleration: Largest acceleration a0, > 0, [rad/s^2].
-        end_acceleration: Largest deceleration a1, > 0, [rad/s^2]; None is the same as at the start.
+        end_acceleration: Largest deceleration a1, > 0, [rad/s^2]; None is that of the start.
 
     Raises:
         InvalidValueError: A bound is not positive, or a number is not finite.
@@ -136,11 +135,11 @@ def plan_s_curve(
 
 
 def synchronize(curves: list[SCurve]) -> list[SCurve]:
-    """Returns the curves all stretched to the time of the slowest."""
+    """Returns the curves, all stretched to the duration of the slowest."""
     duration = max(curve.duration for curve in curves)
     return [curve.stretched(duration) for curve in curves]
 
 
 def _shortest_time(length: float, a0: float, a1: float) -> float:
-    """Returns the time over a length without a speed bound, when rise and fall meet, [s]."""
+    """Returns the duration over a length without a speed bound, [s]: fall follows rise directly."""
     return sqrt(3.0 * length * (a0 + a1) / (a0 * a1))

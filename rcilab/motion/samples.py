@@ -22,11 +22,11 @@ from rcilab.motion.table import Table, read_table
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 
-MOST = 4.0 * math.pi
-"""Angle that no joint of an arm reaches, [rad]: more is in degrees."""
+MAX_ANGLE = 4.0 * math.pi
+"""Larger angles are not those of a joint, [rad]; they are probably in degrees."""
 
 _ON_GRID = 1e-6
-"""How far times may be off whole cycles and still be them, [s]: what six decimals leave."""
+"""Tolerance of times at whole cycles, [s]: the rounding to six decimals."""
 
 _TIME_KEYS = ("t", "time", "times")
 _MOST_JOINTS = 7
@@ -36,7 +36,7 @@ _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def is_on_grid(times: Array) -> bool:
-    """Returns whether times, shape (N,), [s], are one a controller cycle."""
+    """Returns whether times, shape (N,), [s], are one controller cycle apart."""
     grid = times[0] + CYCLE_TIME * np.arange(len(times))
     return bool(np.abs(times - grid).max() < _ON_GRID)
 
@@ -49,13 +49,13 @@ def read_samples(
     Arguments are those of `Motion.load_samples`.
 
     Raises:
-        InvalidValueError: There is no such file, or its samples are not valid; the message names the line.
+        InvalidValueError: The file does not exist, or its samples are not valid; the message names the line.
     """
     require_max_rows(max_rows)
     if unit not in get_args(AngleUnit):
         raise InvalidValueError("unit", unit, f"is unknown; known: {', '.join(get_args(AngleUnit))}")
     if rate_hz is not None and not 0.0 < (rate_hz := as_number(rate_hz, "rate_hz", "Hz")) < math.inf:
-        raise InvalidValueError("rate_hz", rate_hz, "must be above 0: samples a second [Hz]")
+        raise InvalidValueError("rate_hz", rate_hz, "must be above 0: samples per second [Hz]")
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("samples", file, "must be a file name")
     path = Path(fspath(file))
@@ -63,17 +63,17 @@ def read_samples(
         raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}")
     content = read_limited(path, "samples", max_rows * ROW_BYTES + 1)
     require_bytes(len(content), max_rows, "samples", path.name)
-    times, q, place = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
+    times, q, locations = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
     if times is None:
         if rate_hz is None:
             raise InvalidValueError(
-                "samples", path.name, "has no times; pass rate_hz, the samples a second, or add a column t [s]"
+                "samples", path.name, "has no times; pass rate_hz, the samples per second, or add a column t [s]"
             ).coded("table_no_times", file=path.name)
         times = np.arange(len(q)) / rate_hz
     elif rate_hz is not None:
-        raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times of its own; leave it out")
-    _require_later(times, place)
-    _require_angles(q, place)
+        raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times; omit it")
+    _require_increasing(times, locations)
+    _require_angles(q, locations)
     return times, q
 
 
@@ -81,15 +81,17 @@ def _from_csv(
     content: bytes, name: str, has_rate: bool, unit: AngleUnit, max_rows: int
 ) -> tuple[Array | None, Array, list[str]]:
     table = read_table(content, name, max_rows)
-    place = [f"{name}, line {line}" for line in table.lines]
+    locations = [f"{name}, line {line}" for line in table.lines]
     if table.header is not None:
         times, q = _by_header(table, table.header, name, unit)
-        return times, q, place
+        return times, q, locations
     first = 0 if has_rate else 1
     if table.columns == first:
-        raise InvalidValueError(place[0], "a single column", "needs a time and the joints, or rate_hz and the joints")
+        raise InvalidValueError(
+            locations[0], "a single column", "needs a time and the joints, or rate_hz and the joints"
+        )
     q = np.stack([table.column(i) for i in range(first, table.columns)], axis=1)
-    return None if has_rate else table.column(0), np.radians(q) if unit == "deg" else q, place
+    return None if has_rate else table.column(0), np.radians(q) if unit == "deg" else q, locations
 
 
 def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> tuple[Array | None, Array]:
@@ -101,68 +103,70 @@ def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> t
         text = title.lower()
         if time := _TIME.fullmatch(text):
             if times is not None:
-                raise InvalidValueError(where, title, "is a second column of times; keep one").coded("table_twice")
+                raise InvalidValueError(where, title, "is a second column of times; keep one of them").coded(
+                    "table_twice"
+                )
             times = table.column(i) * _SECONDS[time[1]]
         elif joint := _JOINT.fullmatch(text):
             number = int(joint[1] or joint[2])
             if number in joints:
-                raise InvalidValueError(where, title, f"is a second column for joint {number}; keep one").coded(
+                raise InvalidValueError(where, title, f"is a second column for joint {number}; keep one of them").coded(
                     "table_twice"
                 )
             angles = table.column(i)
             joints[number] = np.radians(angles) if (joint[3] or unit) != "rad" else angles
     if sorted(joints) != list(range(1, len(joints) + 1)) or not joints:
         found = ", ".join(str(number) for number in sorted(joints)) or "none"
-        needs = f"names the joints {found}; needs q1, q2, ... without a gap (t [s] for the times, q1 [deg] for degrees)"
-        raise InvalidValueError(where, ",".join(header), needs).coded("table_titles")
+        problem = f"names the joints {found}; needs q1, q2, ... without a gap (t [s] for times, q1 [deg] for degrees)"
+        raise InvalidValueError(where, ",".join(header), problem).coded("table_titles")
     return times, np.stack([joints[number] for number in sorted(joints)], axis=1)
 
 
 def _from_npz(
     content: bytes, name: str, has_rate: bool, unit: AngleUnit, max_rows: int
 ) -> tuple[Array | None, Array, list[str]]:
-    problem = "cannot be read: it is damaged, or no archive of numpy's; numpy.savez(file, t=..., q=...) writes one"
+    problem = "cannot be read: it is damaged, or not a NumPy archive; numpy.savez(file, t=..., q=...) writes one"
     arrays = read_arrays(
         content, "samples", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name, max_rows)
     )
     if str(arrays.get("kind", "")) == KIND:
-        raise InvalidValueError("samples", name, "is a saved motion; Motion.load reads it, to the last bit")
+        raise InvalidValueError("samples", name, "is a saved motion; load it with Motion.load")
     if "q" not in arrays:
         found = ", ".join(arrays) or "nothing"
-        raise InvalidValueError("samples", name, f"holds no array q of joint angles (found: {found})")
+        raise InvalidValueError("samples", name, f"has no array q of joint angles (found: {found})")
     q = as_path(arrays["q"], None, f"{name}, q", unit)
     key = next((key for key in _TIME_KEYS if key in arrays), None)
     times = None if key is None else as_vector(arrays[key], len(q), f"{name}, {key}", "s")
-    place = [f"{name}, row {row} (from 0)" for row in range(len(q))]
-    return times, np.radians(q) if unit == "deg" else q, place
+    locations = [f"{name}, row {row} (from 0)" for row in range(len(q))]
+    return times, np.radians(q) if unit == "deg" else q, locations
 
 
 def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
-    """Refuses arrays that are too long or too wide; what else may be wrong is found once they are read."""
+    """Requires arrays that are not too long or too wide, before they are read."""
     for key in ("q", *_TIME_KEYS):
         require_rows(next(iter(shapes.get(key, ())), 0), max_rows, "samples", name)
     q = shapes.get("q", ())
     if prod(q[1:]) > _MOST_JOINTS:
-        raise InvalidValueError(f"{name}, q", f"array of shape {q}", f"needs at most {_MOST_JOINTS} joints")
+        raise InvalidValueError(f"{name}, q", f"array of shape {q}", f"must have at most {_MOST_JOINTS} joints")
 
 
 _READERS = {".csv": _from_csv, ".npz": _from_npz}
 
 
-def _require_later(times: Array, place: list[str]) -> None:
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if late.size:
-        i = int(late[0]) + 1
+def _require_increasing(times: Array, locations: list[str]) -> None:
+    not_later = np.flatnonzero(np.diff(times) <= 0.0)
+    if not_later.size:
+        i = int(not_later[0]) + 1
         problem = f"s is not later than the sample before, {times[i - 1]:g} s"
-        raise InvalidValueError(place[i], float(times[i]), problem).coded("table_order", before=f"{times[i - 1]:g}")
+        raise InvalidValueError(locations[i], float(times[i]), problem).coded("table_order", before=f"{times[i - 1]:g}")
 
 
-def _require_angles(q: Array, place: list[str]) -> None:
-    beyond = np.argwhere(np.abs(q) > MOST)
+def _require_angles(q: Array, locations: list[str]) -> None:
+    beyond = np.argwhere(np.abs(q) > MAX_ANGLE)
     if beyond.size:
         row, joint = (int(i) for i in beyond[0])
-        turns = (
-            f"rad of joint {joint + 1} is more than two turns; if these are degrees, say so in a header, "
+        problem = (
+            f"rad of joint {joint + 1} is more than two turns; if the angles are in degrees, write so in a header, "
             f"q{joint + 1} [deg], or, in Python, pass unit='deg'"
         )
-        raise InvalidValueError(place[row], float(q[row, joint]), turns).coded("turns", joint=joint + 1)
+        raise InvalidValueError(locations[row], float(q[row, joint]), problem).coded("turns", joint=joint + 1)

@@ -1,4 +1,4 @@
-"""The segments of a program: the geometry of the path to each waypoint."""
+"""Segments of a program: the geometry of the path to each waypoint."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from rcilab.motion.bounds import require_inside
 from rcilab.motion.cartesian import arm_angles
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
-from rcilab.motion.path_infeasibility import examine
+from rcilab.motion.path_infeasibility import solve_path
 from rcilab.motion.path_timing import require_path
 from rcilab.motion.program import Program
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE
 from rcilab.motion.waypoint import Waypoint, label, named_value
 
 _KNOTS = 100
-"""Steps in which a path is first looked at. Tuning value."""
+"""Number of steps of the first check of a path. Tuning value."""
 _STEP = 0.1
-"""Turn of a joint from knot to knot beyond which it is looked at more closely, [rad]. Tuning value."""
-_OTHER_BRANCH = 1e-6
-"""How far a line may end from the q it was to go to, [rad]; beyond it is another branch."""
-_NUDGE = 3e-4
-"""Share of the way over which derivatives by the way are formed. Tuning value: both their errors are below 1e-7."""
+"""A larger step of a joint from knot to knot is checked with finer knots, [rad]. Tuning value."""
+_BRANCH_TOLERANCE = 1e-6
+"""Largest difference between the end of a line and its target q, [rad]; beyond it q is on another branch."""
+_DIFFERENCE_STEP = 3e-4
+"""Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -38,34 +38,35 @@ class Segment:
     """The path to one waypoint, as a function of its share u, 0 to 1."""
 
     number: int
-    """Of the waypoint, from 1."""
+    """Number of the waypoint, from 1."""
     waypoint: Waypoint
     start: JointVector
-    """Shape (n,), [rad]."""
+    """Joint angles at the start, shape (n,), [rad]."""
     goal: JointVector
+    """Joint angles at the end, shape (n,), [rad]."""
     path: Path | None
-    """Of the tool; None is a straight line in joint space."""
+    """Path of the tool; None is a straight line in joint space."""
     knots: JointPath
     """Joint angles at evenly spaced shares, shape (M + 1, n), [rad]; two rows for a straight line in joint space."""
 
     @property
     def label(self) -> str:
-        """Name in errors."""
+        """Name for errors."""
         return label(self.number, self.waypoint)
 
     @property
-    def stands(self) -> bool:
-        """Whether nothing moves on it."""
+    def is_stationary(self) -> bool:
+        """Whether nothing moves on the segment."""
         if self.path is not None:
             return self.path.distance == 0.0
         return float(np.abs(self.goal - self.start).max()) <= STANDSTILL_DISTANCE
 
-    def near(self, share: float) -> JointVector:
-        """Returns joint angles close to those at a share, to choose the branch."""
+    def joints_near(self, share: float) -> JointVector:
+        """Returns joint angles close to those at a share, to select the branch."""
         return self.knots[round(min(max(share, 0.0), 1.0) * (len(self.knots) - 1))]
 
     def positions(self, model: RobotModel, shares: Array) -> Array:
-        """Returns where the tool is, shape (N, 3), [m]."""
+        """Returns positions of the tool, shape (N, 3), [m], at many shares, shape (N,)."""
         if self.path is not None:
             return _positions(self.path, shares)
         return model.position_path(self.start + shares[:, np.newaxis] * (self.goal - self.start))
@@ -73,21 +74,21 @@ class Segment:
     def state(self, model: RobotModel, share: float) -> tuple[JointVector, JointVector, JointVector]:
         """Returns joint angles and their first two derivatives by the share, each of shape (n,)."""
         if self.path is None:
-            way = self.goal - self.start
-            return self.start + share * way, way, np.zeros_like(way)
-        T, psi = self.path.sample(share + _NUDGE * np.array([-1.0, 0.0, 1.0]))
-        before, here, after = inverse_path(model, T, psi, self.near(share))[0]
-        return here, (after - before) / (2.0 * _NUDGE), (after - 2.0 * here + before) / _NUDGE**2
+            distance = self.goal - self.start
+            return self.start + share * distance, distance, np.zeros_like(distance)
+        T, psi = self.path.sample(share + _DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
+        before, here, after = inverse_path(model, T, psi, self.joints_near(share))[0]
+        return here, (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
 
 
 def build_segments(
     model: RobotModel, program: Program, progress: Callable[[float], None] = lambda part: None
 ) -> list[Segment]:
-    """Returns the segments of a program, each from the end of the one before.
+    """Returns the segments of a program; each starts at the end of the previous one.
 
     Raises:
         PlanningError: A target is out of reach, or a joint limit or a singularity is in the way; the message names the
-            waypoint, the place and the reason.
+            waypoint, the position and the reason.
         InvalidValueError: A waypoint does not fit this arm.
     """
     q = np.array(program.start)
@@ -128,7 +129,7 @@ def _named(error: PlanningError, number: int | None, kind: str, reason: RcilabEr
 
 
 def _positions(path: Path, shares: Array) -> Array:
-    """Returns where the tool is on a path, shape (N, 3), [m], without its orientation."""
+    """Returns positions of the tool on a path, shape (N, 3), [m]."""
     u = shares[:, np.newaxis]
     if path.circle is None:
         start = path.start.position
@@ -145,23 +146,23 @@ def _segment(model: RobotModel, q: JointVector, number: int, waypoint: Waypoint)
             number=number, waypoint=waypoint, start=q, goal=goal, path=None, knots=np.stack((q, goal))
         )  # fmt: skip
     path = _path(model, q, waypoint)
-    knots = np.stack((q, q)) if path.distance == 0.0 else _followed(model, q, path)
+    knots = np.stack((q, q)) if path.distance == 0.0 else _follow(model, q, path)
     goal = knots[-1]
-    if waypoint.q is not None and (excess := np.abs(goal - waypoint.q)).max() > _OTHER_BRANCH:
+    if waypoint.q is not None and (excess := np.abs(goal - waypoint.q)).max() > _BRANCH_TOLERANCE:
         joint = int(excess.argmax())
         raise PlanningError(
             f"the {waypoint.type} ends with joint {joint + 1} at {math.degrees(goal[joint]):.2f} deg and not at "
-            f"{math.degrees(waypoint.q[joint]):.2f} deg: q is on another branch; go there with a joint move",
+            f"{math.degrees(waypoint.q[joint]):.2f} deg: q is on another branch; use a joint move",
             share=1.0,
         ).coded("other_branch", joint=joint + 1)
     return Segment(number=number, waypoint=waypoint, start=q, goal=goal, path=path, knots=knots)
 
 
-def _followed(model: RobotModel, q: JointVector, path: Path) -> JointPath:
+def _follow(model: RobotModel, q: JointVector, path: Path) -> JointPath:
     """Returns the joint angles at evenly spaced shares of a path that can be followed, shape (M + 1, n), [rad]."""
-    shares, span = np.linspace(0.0, 1.0, _KNOTS + 1), f"on {100.0 / _KNOTS:g} % of the way"
-    knots, obstacle = examine(model, q, path, shares, np.full(model.n, _STEP), span)
-    return knots if obstacle is None else require_path(model, q, path)
+    shares, span = np.linspace(0.0, 1.0, _KNOTS + 1), f"on {100.0 / _KNOTS:g} % of the path"
+    knots, infeasible = solve_path(model, q, path, shares, np.full(model.n, _STEP), span)
+    return knots if infeasible is None else require_path(model, q, path)
 
 
 def _joint_goal(model: RobotModel, q: JointVector, waypoint: Waypoint) -> JointVector:
@@ -177,18 +178,18 @@ def _path(model: RobotModel, q: JointVector, waypoint: Waypoint) -> Path:
     if waypoint.q is not None:
         goal = model.forward(waypoint.q)
         psi = model.arm_angle(waypoint.q) if model.redundancy else None
-    psis = arm_angles(model, q, psi, waypoint.way or "shorter")
+    psi_range = arm_angles(model, q, psi, waypoint.way or "shorter")
     if waypoint.type == "circle":
         assert waypoint.center is not None
         assert waypoint.axis is not None
         angle = math.tau if waypoint.angle is None else waypoint.angle
         orientation = waypoint.orientation or "held"
-        return build_circle(T, waypoint.center, waypoint.axis, angle, *psis, orientation=orientation)
+        return build_circle(T, waypoint.center, waypoint.axis, angle, *psi_range, orientation=orientation)
     if waypoint.type == "nullspace":
-        return build_line(T, T, *psis)
+        return build_line(T, T, *psi_range)
     assert goal is not None
     if waypoint.via is not None:
         if waypoint.via_wxyz is None:
-            return build_arc(T, Pose(waypoint.via), goal, *psis, orientation="start_to_goal")
-        return build_arc(T, Pose(waypoint.via, waypoint.via_wxyz), goal, *psis, orientation="through_via")
-    return build_line(T, goal, *psis)
+            return build_arc(T, Pose(waypoint.via), goal, *psi_range, orientation="start_to_goal")
+        return build_arc(T, Pose(waypoint.via, waypoint.via_wxyz), goal, *psi_range, orientation="through_via")
+    return build_line(T, goal, *psi_range)

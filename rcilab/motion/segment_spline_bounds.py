@@ -1,4 +1,4 @@
-"""The bounds at the knots of a segment spline."""
+"""Bounds at the knots of a segment spline."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 from rcilab.core.arrays import Array
 from rcilab.core.limits import Limits
 from rcilab.motion.bounds import LIMIT_MARGIN
-from rcilab.motion.path_bounds import ROUNDNESS, PathBounds, half_planes, path_bounds
-from rcilab.motion.segment_spline import SegmentSpline, derivatives_at_knots
+from rcilab.motion.path_bounds import POLYGON_FACTOR, PathBounds, half_planes, path_bounds
+from rcilab.motion.segment_spline import SegmentSpline, knot_derivatives
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ColumnLimits:
-    """Bounds at speed 1, with the margin, of each joint, the arm angle, and the tool's translation and rotation."""
+    """Bounds at speed 1, with `LIMIT_MARGIN`, of each joint, the arm angle, and the tool's translation and rotation."""
 
     velocity: Array
-    """Shape (n + 3,), [rad/s], the translation's [m/s]."""
+    """Shape (n + 3,), [rad/s]; of the translation [m/s]. The others likewise."""
     acceleration: Array
     jerk: Array
 
 
 def column_limits(limits: Limits) -> ColumnLimits:
-    """Returns the bounds of an arm."""
+    """Returns the bounds of an arm, by column."""
     joint, tool, elbow = limits.joint, limits.cartesian, limits.arm_angle
     extra = [
         (math.inf,) * 3 if elbow is None else (elbow.velocity, elbow.acceleration, elbow.jerk),
@@ -40,27 +40,29 @@ def column_limits(limits: Limits) -> ColumnLimits:
     )
 
 
-def chain_bounds(chain: SegmentSpline, limits: ColumnLimits) -> PathBounds:
+def spline_bounds(spline: SegmentSpline, limits: ColumnLimits) -> PathBounds:
     """Returns the bounds of a segment spline."""
-    first, second, third = derivatives_at_knots(chain)
-    n = chain.n
-    speed = np.minimum(_at_knots(chain.speed, 1.0, np.minimum), 1.0)
-    leads = _at_knots(chain.leads_tool, 0.0, np.maximum)
-    lengths = _norms(first, n)
-    thirds = _norms(third, n)
+    first, second, third = knot_derivatives(spline)
+    n = spline.n
+    speed = np.minimum(_at_knots(spline.speed, 1.0, np.minimum), 1.0)
+    moves_tool = _at_knots(spline.moves_tool, 0.0, np.maximum)
+    first_norms = _norms(first, n)
+    third_norms = _norms(third, n)
     velocity = np.outer(speed, limits.velocity)
-    for table in (lengths, thirds):
-        table[:, n:] *= leads[:, np.newaxis]
+    for table in (first_norms, third_norms):
+        table[:, n:] *= moves_tool[:, np.newaxis]
     with np.errstate(divide="ignore"):
-        fastest = np.minimum((velocity / lengths).min(axis=1), (limits.jerk / thirds).min(axis=1) ** (1.0 / 3.0))
-    first[:, n:] *= leads[:, np.newaxis]
-    second[:, n:] *= leads[:, np.newaxis]
+        fastest = np.minimum(
+            (velocity / first_norms).min(axis=1), (limits.jerk / third_norms).min(axis=1) ** (1.0 / 3.0)
+        )
+    first[:, n:] *= moves_tool[:, np.newaxis]
+    second[:, n:] *= moves_tool[:, np.newaxis]
     translation = half_planes(first[:, n + 1 : n + 4], second[:, n + 1 : n + 4])
     rotation = half_planes(first[:, n + 4 :], second[:, n + 4 :])
-    sides = np.repeat(ROUNDNESS * limits.acceleration[n + 1 :], len(translation[0]))
+    sides = np.repeat(POLYGON_FACTOR * limits.acceleration[n + 1 :], len(translation[0]))
     acceleration = np.concatenate((limits.acceleration[: n + 1], sides))
     return path_bounds(
-        chain.knots,
+        spline.knots,
         np.vstack((first[:, : n + 1].T, translation[0], rotation[0])),
         np.vstack((second[:, : n + 1].T, translation[1], rotation[1])),
         np.outer(acceleration, speed),
@@ -69,11 +71,11 @@ def chain_bounds(chain: SegmentSpline, limits: ColumnLimits) -> PathBounds:
 
 
 def _norms(table: Array, n: int) -> Array:
-    """Returns the sizes of joint, arm angle, translation and rotation, shape (K + 1, n + 3)."""
+    """Returns the norms of joint, arm angle, translation and rotation columns, shape (K + 1, n + 3)."""
     tool = [np.sqrt((table[:, i : i + 3] ** 2).sum(axis=1)) for i in (n + 1, n + 4)]
     return np.column_stack((np.abs(table[:, : n + 1]), *tool))
 
 
-def _at_knots(intervals: Array, outside: float, join: np.ufunc) -> Array:
-    """Returns what both intervals beside each knot say, joined, shape (K + 1,)."""
-    return join(np.concatenate(([outside], intervals)), np.concatenate((intervals, [outside])))
+def _at_knots(intervals: Array, outside: float, combine: np.ufunc) -> Array:
+    """Returns the combined values of both intervals next to each knot, shape (K + 1,)."""
+    return combine(np.concatenate(([outside], intervals)), np.concatenate((intervals, [outside])))

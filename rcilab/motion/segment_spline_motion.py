@@ -1,4 +1,4 @@
-"""The fastest motion along a segment spline: the time law is slowed down where its motion exceeds a limit."""
+"""The fastest motion along a segment spline: the time law is slowed down wherever a limit is exceeded."""
 
 from __future__ import annotations
 
@@ -15,119 +15,123 @@ from rcilab.motion.bounds import limit_touched
 from rcilab.motion.hermite import quintic
 from rcilab.motion.rows import blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
-from rcilab.motion.segment_spline_bounds import ColumnLimits, chain_bounds, column_limits
+from rcilab.motion.segment_spline_bounds import ColumnLimits, column_limits, spline_bounds
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _ROUNDS = 12
-"""How often to slow down in places, and then as often as a whole. Seen: 1 to 4 in places."""
+"""Largest number of local slowdowns, and then of global ones. Observed: 1 to 4 local."""
 _USUAL_ROUNDS = 4.0
-"""Number of rounds that counts as half of the progress. Tuning value."""
-_SLOWEST = 50.0
-"""Beyond this a limit is passed by a jump. Tuning value."""
-_INSTANTS = (0.25, 0.5, 0.75)
-"""Where in a cycle the curve is looked at, besides its start, in cycles."""
-_CHANGE = 1e-9
-"""By what part of itself a square of s' has changed that is not rounding."""
-_HASTE = 1.002
-"""To slow down by the square of what was found, and this much more, also where it was closely under a limit, so that
-few rounds do, and places that were good stay so when the cycles fall elsewhere. Tuning value."""
+"""Number of rounds that is reported as half of the progress. Tuning value."""
+_MAX_SLOWDOWN = 50.0
+"""A larger slowdown is required by a jump. Tuning value."""
+_CHECKED_FRACTIONS = (0.25, 0.5, 0.75)
+"""Instants of a cycle at which the curve is checked besides its start, in cycles."""
+_MIN_CHANGE = 1e-9
+"""A larger relative change of a square of s' is not rounding."""
+_OVERCORRECTION = 1.002
+"""Factor on the square of the required slowdown, applied also slightly below a limit, so that few rounds are needed and
+rows inside the limits stay inside when the cycles shift. Tuning value."""
 
 
-def plan_chain(chain: SegmentSpline, limits: Limits, report: Callable[[float], None]) -> tuple[Array, list[float]]:
-    """Returns the fastest curve along a spline between standstills, and when it passes each corner, [s].
+def plan_segment_spline(
+    spline: SegmentSpline, limits: Limits, report: Callable[[float], None]
+) -> tuple[Array, list[float]]:
+    """Returns the fastest curve along a spline, from standstill to standstill, and the times of the corners, [s].
 
-    A quintic a cycle, through the chain at every cycle with its velocity and acceleration there: its coefficients,
-    shape (N - 1, n, 6), ascending powers of the time since the cycle began.
+    The curve has one quintic per cycle, with the position, velocity and acceleration of the spline at both ends: its
+    coefficients, shape (N - 1, n, 6), in ascending powers of the time since the cycle began.
 
     Args:
-        chain: The chain.
-        limits: Of the arm.
-        report: Called before every round with the approximate progress; an exception that it raises ends the planning.
+        spline: The spline.
+        limits: Limits of the arm.
+        report: Called before every round with the approximate progress; an exception raised by it cancels planning.
 
     Raises:
         PlanningError: A joint limit or a singularity is in the way.
     """
     bounds = column_limits(limits)
-    allowed = chain_bounds(chain, bounds)
+    allowed = spline_bounds(spline, bounds)
     finite = np.isfinite(bounds.acceleration)
     # From full deceleration to full acceleration.
-    reversal = 2.0 * float(chain.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
+    reversal = 2.0 * float(spline.speed.max()) * float((bounds.acceleration[finite] / bounds.jerk[finite]).max())
     cycles = max(2, math.ceil(reversal / CYCLE_TIME))
-    fastest, slowdown = FastestLaw(allowed), np.ones(len(chain.knots))
-    squares = np.zeros(len(chain.knots))
+    fastest, slowdown = FastestLaw(allowed), np.ones(len(spline.knots))
+    squares = np.zeros(len(spline.knots))
     worst = 0.0
-    for round_ in range(2 * _ROUNDS):
-        report(round_ / (round_ + _USUAL_ROUNDS))
+    for attempt in range(2 * _ROUNDS):
+        report(attempt / (attempt + _USUAL_ROUNDS))
         before, squares = squares, fastest.slowed(slowdown)
-        law = smooth_law(chain.knots, squares, cycles)
-        interval = chain.interval(law.s)
-        changed = np.abs(squares - before) > _CHANGE * squares
-        # Few places make the later rounds; where the law is as it was, it is looked at again only in the end.
-        looked_at = changed[interval] | changed[interval + 1]
-        excess = _excess(chain, bounds, law, interval, looked_at)
-        if excess.max() <= 1.0 and not looked_at.all():
-            excess = _excess(chain, bounds, law, interval, np.ones_like(looked_at))
+        law = smooth_law(spline.knots, squares, cycles)
+        interval = spline.interval(law.s)
+        changed = np.abs(squares - before) > _MIN_CHANGE * squares
+        # Later rounds change the law in few places; the rest is checked again only at the end.
+        is_checked = changed[interval] | changed[interval + 1]
+        excess = _excess(spline, bounds, law, interval, is_checked)
+        if excess.max() <= 1.0 and not is_checked.all():
+            excess = _excess(spline, bounds, law, interval, np.ones_like(is_checked))
         if excess.max() <= 1.0:
-            q, coefficients = _curve(chain, law)
-            _require_inside(chain, q, law, limits.joint)
-            corners = [int(np.searchsorted(law.s, middle)) * CYCLE_TIME for middle in chain.middles]
+            q, coefficients = _curve(spline, law)
+            _require_inside(spline, q, law, limits.joint)
+            corners = [int(np.searchsorted(law.s, corner)) * CYCLE_TIME for corner in spline.corners]
             return coefficients, corners
         worst = float(law.s[excess.argmax()])
-        if round_ < _ROUNDS:
-            factor = np.maximum(excess * excess * _HASTE, 1.0)
-            slowdown *= spread(factor, law.s, chain.knots, cycles + 3)
+        if attempt < _ROUNDS:
+            factor = np.maximum(excess * excess * _OVERCORRECTION, 1.0)
+            slowdown *= spread(factor, law.s, spline.knots, cycles + 3)
         else:
-            slowdown *= float(excess.max()) * _HASTE
-        if slowdown.max() > _SLOWEST:
+            slowdown *= float(excess.max()) * _OVERCORRECTION
+        if slowdown.max() > _MAX_SLOWDOWN:
             break
+    segment = spline.segment_at(worst)
     raise PlanningError(
-        f"{chain.place(worst)}: the joints would have to jump, because a singularity is close; lead the tool around it",
-        waypoint=chain.segment_at(worst).number,
+        f"{spline.describe_position(worst)}: the joints would have to jump, because a singularity is close; "
+        "move the tool around it",
+        waypoint=segment.number,
     ).coded(
         "waypoint",
-        number=chain.segment_at(worst).number,
-        kind=chain.segment_at(worst).waypoint.type,
+        number=segment.number,
+        kind=segment.waypoint.type,
         reason=PlanningError("").coded("jump"),
     )
 
 
-def _curve(chain: SegmentSpline, law: TimeParametrization) -> tuple[Array, Array]:
+def _curve(spline: SegmentSpline, law: TimeParametrization) -> tuple[Array, Array]:
     """Returns the joint angles at N cycles, shape (N, n), and the coefficients between, shape (N - 1, n, 6)."""
-    q, coefficients = np.empty((len(law.s), chain.n)), np.empty((len(law.s) - 1, chain.n, 6))
+    q, coefficients = np.empty((len(law.s), spline.n)), np.empty((len(law.s) - 1, spline.n, 6))
     for block in blocks(len(coefficients)):
         ends = slice(block.start, block.stop + 1)
-        q[ends], powers = _quintics(chain, law, ends)
+        q[ends], powers = _quintics(spline, law, ends)
         coefficients[block] = np.stack(powers, axis=2)
     return q, coefficients
 
 
 def _excess(
-    chain: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, looked_at: Array
+    spline: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, is_checked: Array
 ) -> Array:
-    """Returns how much slower each row must be passed to keep every bound, shape (N,), in blocks that are looked at.
+    """Returns the slowdown that each row needs to be inside every bound, shape (N,); 0 in blocks that are not checked.
 
     Args:
-        chain: The chain.
-        limits: What to keep.
-        law: How fast it is run through.
-        interval: In which interval each row is, shape (N,).
-        looked_at: Which rows to look at, shape (N,); the others of their blocks are looked at as well.
+        spline: The spline.
+        limits: The bounds.
+        law: The time law.
+        interval: Interval of each row, shape (N,).
+        is_checked: Rows to check, shape (N,); whole blocks are checked.
     """
     last = len(law.s) - 1
     excess = np.zeros(last + 1)
     for block in blocks(last):
         ends = slice(block.start, block.stop + 1)
-        if looked_at[ends].any():
-            powers = _quintics(chain, law, ends)[1]
-            excess[block] = _joint_excess(chain, limits, powers, interval[ends])
-            np.maximum(excess[ends], _tool_excess(chain, limits, law, interval, ends), out=excess[ends])
+        if is_checked[ends].any():
+            powers = _quintics(spline, law, ends)[1]
+            excess[block] = _joint_excess(spline, limits, powers, interval[ends])
+            np.maximum(excess[ends], _tool_excess(spline, limits, law, interval, ends), out=excess[ends])
     return excess
 
 
-def _quintics(chain: SegmentSpline, law: TimeParametrization, rows: slice) -> tuple[Array, list[Array]]:
-    """Returns the joint angles at N cycles, shape (N, n), and the curve's coefficients by power, each (N - 1, n)."""
+def _quintics(spline: SegmentSpline, law: TimeParametrization, rows: slice) -> tuple[Array, list[Array]]:
+    """Returns the joint angles at N cycles, shape (N, n), and the coefficients by power, shape (N - 1, n) each."""
     h = CYCLE_TIME
-    q, first, second = chain.sample(law.s[rows], slice(chain.n))
+    q, first, second = spline.sample(law.s[rows], slice(spline.n))
     ds, dds = law.ds[rows, np.newaxis], law.dds[rows, np.newaxis]
     v = first * ds
     a = second * ds**2 + first * dds
@@ -139,16 +143,16 @@ def _quintics(chain: SegmentSpline, law: TimeParametrization, rows: slice) -> tu
     return q, [part / h**power for power, part in enumerate(parts)]
 
 
-def _joint_excess(chain: SegmentSpline, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
-    """Returns how much slower each cycle must be to keep the joints' bounds in it, shape (N - 1,)."""
-    n = chain.n
-    speed = np.maximum(chain.speed[interval[:-1]], chain.speed[interval[1:]])
+def _joint_excess(spline: SegmentSpline, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
+    """Returns the slowdown that each cycle needs to be inside the joints' bounds, shape (N - 1,)."""
+    n = spline.n
+    speed = np.maximum(spline.speed[interval[:-1]], spline.speed[interval[1:]])
     scales = speed, speed, np.ones_like(speed)
     excess = np.zeros(len(powers[0]))
     for order, (limit, scale) in enumerate(zip(_tables(limits, slice(n)), scales, strict=True), start=1):
         powers = [float(p) * powers[p] for p in range(1, len(powers))]
         largest = np.abs(powers[0])
-        for part in _INSTANTS:
+        for part in _CHECKED_FRACTIONS:
             value = powers[-1]
             for coefficient in reversed(powers[:-1]):
                 value = value * (part * CYCLE_TIME) + coefficient
@@ -159,31 +163,31 @@ def _joint_excess(chain: SegmentSpline, limits: ColumnLimits, powers: list[Array
 
 
 def _tool_excess(
-    chain: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, rows: slice
+    spline: SegmentSpline, limits: ColumnLimits, law: TimeParametrization, interval: Rows, rows: slice
 ) -> Array:
-    """Returns how much slower each of some rows must be to keep the bounds on tool and arm angle.
+    """Returns the slowdown that each of some rows needs to be inside the bounds on tool and arm angle.
 
-    By backward differences at 1 ms, as the controller checks them, with standstill before and after: the last row
+    Checked by backward differences at 1 ms, as by the controller, with standstill before and after; the last row
     includes the three that follow it.
     """
-    n, last = chain.n, len(law.s) - 1
+    n, last = spline.n, len(law.s) - 1
     end = rows.stop + 3 if rows.stop > last else rows.stop
-    # With the three rows before; the first one has stood, and the last one stands, for three more cycles.
-    held = np.clip(np.arange(rows.start - 3, end), 0, last)
-    leads = _looking_back(chain.leads_tool[interval[held]], np.minimum) > 0.0
+    # With the three previous rows; before the first and after the last row there are three cycles of standstill.
+    clamped = np.clip(np.arange(rows.start - 3, end), 0, last)
+    moves_tool = _with_previous(spline.moves_tool[interval[clamped]], np.minimum) > 0.0
     excess = np.zeros(end - rows.start)
-    if leads.any():
-        speed = _looking_back(chain.speed[interval[held]], np.maximum)
-        table = chain.values(law.s[held], slice(n, None)).T.copy()
+    if moves_tool.any():
+        speed = _with_previous(spline.speed[interval[clamped]], np.maximum)
+        table = spline.values(law.s[clamped], slice(n, None)).T.copy()
         for order, limit in enumerate(_tables(limits, slice(n, None)), start=1):
             table = np.diff(table) / CYCLE_TIME
             squares = table * table
             ratio = np.abs(table[0]) / limit[0]
             np.maximum(ratio, np.sqrt(squares[1:4].sum(axis=0)) / limit[1], out=ratio)
             np.maximum(ratio, np.sqrt(squares[4:7].sum(axis=0)) / limit[2], out=ratio)
-            seen = ratio[3 - order :]
-            seen = np.where(leads, seen if order == 3 else seen / speed, 0.0)
-            np.maximum(excess, seen ** (1.0 / order), out=excess)
+            excess_ratio = ratio[3 - order :]
+            excess_ratio = np.where(moves_tool, excess_ratio if order == 3 else excess_ratio / speed, 0.0)
+            np.maximum(excess, excess_ratio ** (1.0 / order), out=excess)
     count = rows.stop - rows.start
     excess[count - 1] = excess[count - 1 :].max()
     return excess[:count]
@@ -193,21 +197,23 @@ def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:
     return limits.velocity[columns], limits.acceleration[columns], limits.jerk[columns]
 
 
-def _looking_back(values: Array, join: np.ufunc) -> Array:
-    """Returns what each row from the fourth on and the three before it say, joined, shape (N - 3,)."""
-    return join(join(values[3:], values[2:-1]), join(values[1:-2], values[:-3]))
+def _with_previous(values: Array, combine: np.ufunc) -> Array:
+    """Returns the combined values of each row from the fourth on and the three before it, shape (N - 3,)."""
+    return combine(combine(values[3:], values[2:-1]), combine(values[1:-2], values[:-3]))
 
 
-def _require_inside(chain: SegmentSpline, q: Array, law: TimeParametrization, limits: JointLimits) -> None:
+def _require_inside(spline: SegmentSpline, q: Array, law: TimeParametrization, limits: JointLimits) -> None:
     outside = np.argwhere(~((limits.lower < q) & (q < limits.upper)))
     if outside.size:
         row, joint = outside[0].tolist()
-        segment = chain.segment_at(float(law.s[row]))
+        segment = spline.segment_at(float(law.s[row]))
         advice = "a smaller blend radius stays closer to the waypoints"
-        touched = limit_touched(limits, joint + 1, float(q[row, joint]), advice)
-        raise PlanningError(f"{chain.place(float(law.s[row]))}: {touched}", waypoint=segment.number).coded(
+        limit_error = limit_touched(limits, joint + 1, float(q[row, joint]), advice)
+        raise PlanningError(
+            f"{spline.describe_position(float(law.s[row]))}: {limit_error}", waypoint=segment.number
+        ).coded(
             "waypoint",
             number=segment.number,
             kind=segment.waypoint.type,
-            reason=touched,
+            reason=limit_error,
         )

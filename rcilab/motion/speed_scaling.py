@@ -1,13 +1,13 @@
-"""Speed override of a running motion: the same path, slower, faster again, or held and resumed.
+"""Speed override of a running motion: the same path at another speed, or held and resumed.
 
-The rows of a motion q(s) are played at s(t), where s' = rate is 1 as planned and 0 while the arm is held. Then
+The motion q(s) is sampled at s(t), where the rate s' is 1 as planned and 0 while the arm is held. Then
 
     dq = q_s rate,   ddq = q_ss rate^2 + q_s rate',   jerk = q_sss rate^3 + 3 q_ss rate rate' + q_s rate''
 
-so a constant rate up to 1 keeps every limit that the motion keeps; only a change of the rate can exceed one. The rate
-changes along a quintic from its present value and derivatives. Duration and start of the change are found by trial: the
-backward differences of the rows to be commanded must keep the joints' limits, so that a change may have to wait while
-the plan uses a limit in full. The path, and with it every distance and the safety box, is unchanged.
+so at a constant rate up to 1 the motion is inside every limit that holds for the plan; only a change of the rate can
+exceed one. The rate changes along a quintic from its current value and derivatives. Duration and start of the change
+are found by trial: the backward differences of the commanded rows must be inside the joints' limits, so that a change
+may be delayed while the plan uses a limit in full. The path does not change, nor do clearances and the safety box.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
 from rcilab.motion.hermite import quintic
-from rcilab.motion.motion import Motion, standing
+from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.piecewise import PiecewisePolynomial
 
 MIN_SPEED_OVERRIDE = 0.1
-"""Smallest override: for a lower speed, plan the motion again."""
+"""Smallest override; for a lower speed, plan the motion again."""
 
 _RAMPS = (0.08, 0.12, 0.18, 0.26, 0.38, 0.55, 0.8, 1.2, 1.8, 2.7, 4.0)  # [s]
 _DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.5, 4.0)  # [s]
-_PAST = 3  # Rows before a change that the differences of the first new rows use.
+_PREVIOUS_ROWS = 3  # Rows before a change that enter the differences of the first new rows.
 _ROUNDING = 1e-9
 
 
@@ -39,52 +39,52 @@ class SpeedScaledMotion:
     """A motion with a speed override, row by row, one per controller cycle since its first command."""
 
     motion: Motion
-    """As planned."""
+    """The planned motion."""
     q: JointPath
-    """Commanded joint angles, shape (N, n), [rad]; the last row is the goal, or where the arm is held."""
-    place: Array
-    """Time in the plan of each row, shape (N,), [s]."""
+    """Commanded joint angles, shape (N, n), [rad]; the last row is the goal, or the held position."""
+    plan_time: Array
+    """Time of each row in the plan, shape (N,), [s]."""
     rate: Array
-    """s', shape (N,)."""
+    """Rate s', shape (N,)."""
     drate: Array
-    """[1/s], shape (N,)."""
+    """First derivative of the rate, shape (N,), [1/s]."""
     ddrate: Array
-    """[1/s^2], shape (N,)."""
+    """Second derivative of the rate, shape (N,), [1/s^2]."""
     override: float = 1.0
-    """The rate after the last change; 0: held."""
+    """Rate after the last change; 0 is held."""
     changed: int = 0
-    """First row of the last change."""
+    """Index of the first row of the last change."""
 
     @property
-    def holds(self) -> bool:
-        """Whether the arm is held in the last row, before the goal."""
-        return self.override == 0.0 and float(self.place[-1]) < self.motion.duration
+    def is_held(self) -> bool:
+        """Whether the arm is held in the last row, short of the goal."""
+        return self.override == 0.0 and float(self.plan_time[-1]) < self.motion.duration
 
     @property
     def duration(self) -> float:
         """Time until the last row, [s]."""
         return (len(self.q) - 1) * CYCLE_TIME
 
-    def place_at(self, cycle: int) -> float:
-        """Returns the time in the plan of a cycle, [s]."""
-        return float(self.place[min(max(cycle, 0), len(self.place) - 1)])
+    def plan_time_at(self, cycle: int) -> float:
+        """Returns the time in the plan at a cycle, [s]."""
+        return float(self.plan_time[min(max(cycle, 0), len(self.plan_time) - 1)])
 
-    def time_at(self, place: float) -> float:
-        """Returns when it first reaches a time in the plan, [s]; the time of the last row if it never does."""
-        return min(int(np.searchsorted(self.place, place - _ROUNDING)), len(self.place) - 1) * CYCLE_TIME
+    def time_at(self, plan_time: float) -> float:
+        """Returns the time at which a time in the plan is first reached, [s]; that of the last row if it never is."""
+        return min(int(np.searchsorted(self.plan_time, plan_time - _ROUNDING)), len(self.plan_time) - 1) * CYCLE_TIME
 
     def as_motion(self) -> Motion:
         """Returns the commanded rows as a motion; the planned motion if nothing has changed.
 
-        At its rows velocity and acceleration are those of the plan with this override, within rounding; between them
-        it is quintic.
+        At the rows velocity and acceleration are those of the plan with this override, within rounding; between the
+        rows it is quintic.
         """
         if not self.changed:
             return self.motion
         if len(self.q) == 1:
-            return standing(self.q[0], law="samples")
+            return stationary_motion(self.q[0], law="samples")
         rate, drate = self.rate[:, np.newaxis], self.drate[:, np.newaxis]
-        slope, bend = (self.motion.polynomial.sample(self.place, order) for order in (1, 2))
+        slope, bend = (self.motion.polynomial.sample(self.plan_time, order) for order in (1, 2))
         v, a = slope * rate, bend * rate**2 + slope * drate
         v[-1] = a[-1] = 0.0
         h = CYCLE_TIME
@@ -97,10 +97,10 @@ class SpeedScaledMotion:
 def as_planned(motion: Motion) -> SpeedScaledMotion:
     """Returns a motion without an override."""
     count = len(motion)
-    still = make_readonly(np.zeros(count))
-    place = make_readonly(np.minimum(motion.times, motion.duration))
+    zeros = make_readonly(np.zeros(count))
+    plan_time = make_readonly(np.minimum(motion.times, motion.duration))
     return SpeedScaledMotion(
-        motion=motion, q=motion.q, place=place, rate=make_readonly(np.ones(count)), drate=still, ddrate=still
+        motion=motion, q=motion.q, plan_time=plan_time, rate=make_readonly(np.ones(count)), drate=zeros, ddrate=zeros
     )
 
 
@@ -114,16 +114,16 @@ def start_with_override(motion: Motion, override: float) -> SpeedScaledMotion:
     if override == 1.0:
         return as_planned(motion)
     count = int(np.ceil(motion.duration / (override * CYCLE_TIME) - _ROUNDING)) + 1
-    place = np.minimum(override * CYCLE_TIME * np.arange(count), motion.duration)
-    place[-1] = motion.duration
-    still = make_readonly(np.zeros(count))
+    plan_time = np.minimum(override * CYCLE_TIME * np.arange(count), motion.duration)
+    plan_time[-1] = motion.duration
+    zeros = make_readonly(np.zeros(count))
     return SpeedScaledMotion(
         motion=motion,
-        q=make_readonly(np.concatenate((motion.q[:1], _rows(motion, place[1:])))),
-        place=make_readonly(place),
+        q=make_readonly(np.concatenate((motion.q[:1], _rows(motion, plan_time[1:])))),
+        plan_time=make_readonly(plan_time),
         rate=make_readonly(np.full(count, override)),
-        drate=still,
-        ddrate=still,
+        drate=zeros,
+        ddrate=zeros,
         override=override,
         changed=1,
     )
@@ -146,22 +146,22 @@ def require_speed_override(override: object) -> float:
 def change_speed_override(
     scaled: SpeedScaledMotion, cycle: int, override: float, limits: JointLimits
 ) -> Iterator[SpeedScaledMotion]:
-    """Yields motions with another override from a cycle on, those that reach it soonest first.
+    """Yields motions with another override from a cycle on, in the order in which they reach it.
 
-    Each keeps the joints' limits; the caller checks everything else and takes the first valid one.
+    Each is inside the joints' limits; the caller checks everything else and uses the first valid one.
 
     Args:
-        scaled: The motion so far.
-        cycle: The first row that may differ.
+        scaled: The current motion.
+        cycle: Index of the first row that may change.
         override: From 0 (held) to 1.
         limits: Bounds of the joints.
     """
     scaled = _continued(scaled, cycle + round(max(_DELAYS) / CYCLE_TIME) + 1)
-    ways = sorted((delay + ramp, delay, ramp) for delay in _DELAYS for ramp in _RAMPS)
-    for _, delay, ramp in ways:
+    candidates = sorted((delay + ramp, delay, ramp) for delay in _DELAYS for ramp in _RAMPS)
+    for _, delay, ramp in candidates:
         first = cycle + round(delay / CYCLE_TIME)
         if first >= len(scaled.q) - 1:
-            continue  # It reaches the goal before.
+            continue  # The goal is reached before the change.
         law = _ramp(scaled, first, override, ramp)
         if law is not None and _keeps_limits(scaled, first, law, limits):
             yield _joined(scaled, first, law, override)
@@ -169,16 +169,16 @@ def change_speed_override(
 
 def _continued(scaled: SpeedScaledMotion, count: int) -> SpeedScaledMotion:
     """Returns a held motion extended to `count` rows by repeating the last one."""
-    more = count - len(scaled.q)
-    if not scaled.holds or more <= 0:
+    added = count - len(scaled.q)
+    if not scaled.is_held or added <= 0:
         return scaled
     return SpeedScaledMotion(
         motion=scaled.motion,
-        q=np.concatenate((scaled.q, np.repeat(scaled.q[-1:], more, axis=0))),
-        place=np.concatenate((scaled.place, np.repeat(scaled.place[-1:], more))),
-        rate=np.concatenate((scaled.rate, np.zeros(more))),
-        drate=np.concatenate((scaled.drate, np.zeros(more))),
-        ddrate=np.concatenate((scaled.ddrate, np.zeros(more))),
+        q=np.concatenate((scaled.q, np.repeat(scaled.q[-1:], added, axis=0))),
+        plan_time=np.concatenate((scaled.plan_time, np.repeat(scaled.plan_time[-1:], added))),
+        rate=np.concatenate((scaled.rate, np.zeros(added))),
+        drate=np.concatenate((scaled.drate, np.zeros(added))),
+        ddrate=np.concatenate((scaled.ddrate, np.zeros(added))),
         override=scaled.override,
         changed=scaled.changed,
     )
@@ -194,7 +194,7 @@ def _ramp(scaled: SpeedScaledMotion, first: int, override: float, ramp: float) -
     u = np.arange(1, count + 1) / count
     rates = np.polynomial.polynomial.Polynomial(c)
     law = np.stack(
-        (scaled.place[first] + T * rates.integ()(u), rates(u), rates.deriv()(u) / T, rates.deriv(2)(u) / T**2)
+        (scaled.plan_time[first] + T * rates.integ()(u), rates(u), rates.deriv()(u) / T, rates.deriv(2)(u) / T**2)
     )
     if law[1].min() < -_ROUNDING or law[1].max() > 1.0 + _ROUNDING:
         return None
@@ -203,11 +203,11 @@ def _ramp(scaled: SpeedScaledMotion, first: int, override: float, ramp: float) -
 
 
 def _keeps_limits(scaled: SpeedScaledMotion, first: int, law: Array, limits: JointLimits) -> bool:
-    q = np.concatenate((scaled.q[max(first + 1 - _PAST, 0) : first + 1], _rows(scaled.motion, law[0])))
-    if first + 1 < _PAST:  # The arm was at standstill before.
-        q = np.concatenate((np.repeat(q[:1], _PAST, axis=0), q))
+    q = np.concatenate((scaled.q[max(first + 1 - _PREVIOUS_ROWS, 0) : first + 1], _rows(scaled.motion, law[0])))
+    if first + 1 < _PREVIOUS_ROWS:  # The arm was at standstill before.
+        q = np.concatenate((np.repeat(q[:1], _PREVIOUS_ROWS, axis=0), q))
     if law[1, -1] == 0.0:
-        q = np.concatenate((q, np.repeat(q[-1:], _PAST, axis=0)))
+        q = np.concatenate((q, np.repeat(q[-1:], _PREVIOUS_ROWS, axis=0)))
     for bound in (limits.velocity, limits.acceleration, limits.jerk):
         q = np.diff(q, axis=0) / CYCLE_TIME
         if not (np.abs(q).max(axis=0) < bound).all():
@@ -220,24 +220,33 @@ def _joined(scaled: SpeedScaledMotion, first: int, law: Array, override: float) 
     end = scaled.motion.duration
     if override > 0.0 and law[0, -1] < end:
         rest = int(np.ceil((end - law[0, -1]) / (override * CYCLE_TIME) - _ROUNDING))
-        place = law[0, -1] + override * CYCLE_TIME * np.arange(1, rest + 1)
-        law = np.concatenate((law, np.stack((place, np.full(rest, override), np.zeros(rest), np.zeros(rest)))), axis=1)
+        plan_time = law[0, -1] + override * CYCLE_TIME * np.arange(1, rest + 1)
+        law = np.concatenate(
+            (law, np.stack((plan_time, np.full(rest, override), np.zeros(rest), np.zeros(rest)))), axis=1
+        )
     arrived = np.flatnonzero(law[0] >= end - _ROUNDING * CYCLE_TIME)
     if arrived.size:
         law = law[:, : int(arrived[0]) + 1]
         law[0, -1] = end
-    keep = first + 1
-    place, rate, drate, ddrate = (
-        make_readonly(np.concatenate((before[:keep], after)))
-        for before, after in zip((scaled.place, scaled.rate, scaled.drate, scaled.ddrate), law, strict=True)
+    kept_count = first + 1
+    plan_time, rate, drate, ddrate = (
+        make_readonly(np.concatenate((before[:kept_count], after)))
+        for before, after in zip((scaled.plan_time, scaled.rate, scaled.drate, scaled.ddrate), law, strict=True)
     )
-    q = make_readonly(np.concatenate((scaled.q[:keep], _rows(scaled.motion, law[0]))))
+    q = make_readonly(np.concatenate((scaled.q[:kept_count], _rows(scaled.motion, law[0]))))
     return SpeedScaledMotion(
-        motion=scaled.motion, q=q, place=place, rate=rate, drate=drate, ddrate=ddrate, override=override, changed=keep
+        motion=scaled.motion,
+        q=q,
+        plan_time=plan_time,
+        rate=rate,
+        drate=drate,
+        ddrate=ddrate,
+        override=override,
+        changed=kept_count,
     )
 
 
-def _rows(motion: Motion, place: Array) -> JointPath:
-    rows = motion.polynomial.sample(place)
-    rows[place >= motion.duration] = motion.goal
+def _rows(motion: Motion, plan_time: Array) -> JointPath:
+    rows = motion.polynomial.sample(plan_time)
+    rows[plan_time >= motion.duration] = motion.goal
     return rows

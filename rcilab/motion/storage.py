@@ -1,4 +1,4 @@
-"""Files of motions: a versioned .npz with an exact round trip, and rows as CSV."""
+"""Motion files: a versioned .npz with an exact round trip, and rows as CSV."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ KIND = "rcilab motion"
 VERSION = 1
 
 _SIGNATURES = (b"PK", b"\x93NUMPY")
-"""How an archive and a single array of numpy's begin."""
+"""First bytes of a NumPy archive and of a single array."""
 
 
 def write_arrays(stream: IO[bytes], content: Mapping[str, ArrayLike]) -> None:
@@ -37,8 +37,8 @@ def write_rows(stream: IO[bytes], times: Array, q: JointPath) -> None:
     """Writes the rows of a motion as CSV.
 
     Args:
-        stream: Where to.
-        times: Shape (N,), [s].
+        stream: Binary stream to write to.
+        times: Times of the rows, shape (N,), [s].
         q: Joint angles, shape (N, n), [rad].
     """
     lines = TextIOWrapper(stream, encoding="utf-8", newline="")
@@ -50,15 +50,15 @@ def write_rows(stream: IO[bytes], times: Array, q: JointPath) -> None:
 def save(
     file: str | PathLike[str] | BinaryIO, npz: Callable[[IO[bytes]], None], csv: Callable[[IO[bytes]], None]
 ) -> None:
-    """Writes a motion: by the ending of a name .npz or .csv, to a stream .npz.
+    """Writes a motion: to a file as .npz or .csv by its suffix, to a stream as .npz.
 
     Args:
-        file: Name or stream.
-        npz: Writes the one form to a stream.
-        csv: Writes the other.
+        file: File name or binary stream.
+        npz: Writes .npz to a stream.
+        csv: Writes CSV to a stream.
 
     Raises:
-        InvalidValueError: The ending is unknown, or the file cannot be written.
+        InvalidValueError: The suffix is unknown, or the file cannot be written.
     """
     if not isinstance(file, str | PathLike):
         _require_stream(file, "write")
@@ -75,16 +75,16 @@ def save(
 
 
 def is_csv(file: object) -> bool:
-    """Returns whether a file is a CSV, by the ending of its name."""
+    """Returns whether a file name ends in .csv."""
     return isinstance(file, str | PathLike) and Path(fspath(file)).suffix.lower() == ".csv"
 
 
 def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Callable[..., M]) -> M:
-    """Returns what `build` makes of the content of an .npz; its keyword arguments are those of `Motion`.
+    """Returns the motion in an .npz, built by `build` with the keyword arguments of `Motion`.
 
     Raises:
-        InvalidValueError: There is no such file, or its motion is not valid or too long.
-        VersionMismatchError: It was written by another version of this format.
+        InvalidValueError: The file does not exist, or its motion is not valid or too long.
+        VersionMismatchError: It has another version of this format.
     """
     require_max_rows(max_rows)
     if not isinstance(file, str | PathLike):
@@ -93,11 +93,13 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
     content = _read(file, name, max_rows)
     if str(content.get("kind", "")) != KIND:
         found = ", ".join(content) or "nothing"
-        raise InvalidValueError("motion file", name, f"holds no motion (found: {found}); save one with Motion.save")
+        raise InvalidValueError(
+            "motion file", name, f"does not contain a motion (found: {found}); save one with Motion.save"
+        )
     version = content.get("version")
     if version is None or version.shape != () or version != VERSION:
         found = None if version is None else version.tolist()
-        advice = "plan the motion again and save it, or read it with the rcilab that wrote it"
+        advice = "plan and save the motion again, or read it with the version of rcilab that wrote it"
         raise VersionMismatchError(f"motion file {name!r}", found, VERSION, advice)
     try:
         curve = PiecewisePolynomial(content["breaks"], content["coefficients"])
@@ -106,44 +108,46 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
             goal=content["goal"],
             law=str(content["law"]),
             speed=as_number(content["speed"], "speed"),
-            # Files of versions without programs have neither.
+            # Files of older versions have neither.
             segment_starts=content.get("segment_starts", np.zeros(1)),
             notes=tuple(content["notes"].tolist()) if "notes" in content else (),
         )
     except KeyError as error:
-        raise InvalidValueError("motion file", name, f"is incomplete: no {error}") from error
+        raise InvalidValueError("motion file", name, f"is incomplete: {error} is missing") from error
     except InvalidValueError as error:
-        raise InvalidValueError("motion file", name, f"holds a damaged motion: {error}") from error
+        raise InvalidValueError("motion file", name, f"contains a damaged motion: {error}") from error
     except (TypeError, ValueError, OverflowError) as error:
-        problem = "holds a damaged motion: breaks and coefficients are not all numbers"
+        problem = "contains a damaged motion: breaks and coefficients are not all numbers"
         raise InvalidValueError("motion file", name, problem) from error
     require_rows(len(motion), max_rows, "motion file", name)
     return motion
 
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dict[str, np.ndarray]:
-    most = max_rows * ROW_BYTES + 1
-    content = read_limited(Path(file), "motion file", most) if isinstance(file, str | PathLike) else file.read(most)
+    max_bytes = max_rows * ROW_BYTES + 1
+    content = (
+        read_limited(Path(file), "motion file", max_bytes) if isinstance(file, str | PathLike) else file.read(max_bytes)
+    )
     if not content:
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):
-        raise InvalidValueError("motion file", name, "cannot be read as a motion: Motion.save did not write it")
-    problem = "cannot be read as a motion: it is damaged, or holds something else; save the motion again"
+        raise InvalidValueError("motion file", name, "cannot be read as a motion: it was not written by Motion.save")
+    problem = "cannot be read as a motion: it is damaged, or has another content; save the motion again"
     require_bytes(len(content), max_rows, "motion file", name)
     return read_arrays(content, "motion file", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name))
 
 
 def _require_shapes(shapes: Shapes, name: str) -> None:
-    """Refuses arrays that do not fit together; one that is missing is reported once the others are read."""
+    """Requires arrays that fit together; a missing one is reported when the file is read."""
     breaks, coefficients, goal = (shapes.get(key) for key in ("breaks", "coefficients", "goal"))
     if breaks is None or coefficients is None:
         return
     try:
         require_piece_shapes(breaks, coefficients)
         if goal is not None and goal != coefficients[1:2]:
-            raise InvalidValueError("goal", f"array of shape {goal}", f"needs {coefficients[1]} joints")
+            raise InvalidValueError("goal", f"array of shape {goal}", f"must have {coefficients[1]} joints")
     except InvalidValueError as error:
-        raise InvalidValueError("motion file", name, f"holds a damaged motion: {error}") from error
+        raise InvalidValueError("motion file", name, f"contains a damaged motion: {error}") from error
 
 
 def _require_stream(file: object, method: str) -> None:

@@ -1,4 +1,4 @@
-"""Tables in text files, with errors that name the line; only the numbers are kept in memory."""
+"""Tables of numbers in text files, with errors that name the line."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import require_rows
 
-_LONGEST_LINE = 65_536  # Characters. Tuning value: a line of ours has some hundreds.
+_LONGEST_LINE = 65_536  # [characters] Tuning value: a line written by rcilab has some hundreds.
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Cells in rows and columns, and their lines."""
+    """The numbers of a table, and the line of each row."""
 
     name: str
-    """What to call it in an error."""
+    """Name of the file, for errors."""
     header: list[str] | None
-    """Names of the columns, when the first line names them."""
+    """Names of the columns; None without a header line."""
     header_line: int
-    """Its line, from 1; 0 without one."""
+    """Line of the header, from 1; 0 without one."""
     values: Array
-    """Shape (N, columns), at least one row; NaN where a cell holds no number."""
+    """Shape (N, columns), at least one row; NaN for a cell that is not a number."""
     lines: list[int]
     """Line of each row, from 1."""
     text: str
-    """Where all of it was read from."""
+    """The whole text."""
 
     @property
     def columns(self) -> int:
@@ -44,57 +44,57 @@ class Table:
         """Returns the numbers in a column, counted from 0, shape (N,).
 
         Raises:
-            InvalidValueError: A cell holds no finite number; the message names its line.
+            InvalidValueError: A cell is not a finite number; the message names its line.
         """
         numbers = self.values[:, index]
-        wrong = np.flatnonzero(~np.isfinite(numbers))
-        if wrong.size:
-            line = self.lines[int(wrong[0])]
-            cell = next(_cells(text, _mark_of(self.text)) for number, text in _lines(self.text) if number == line)[
-                index
-            ]
-            problem = f"in column {index + 1} is no finite number; decimals need a point"
+        invalid = np.flatnonzero(~np.isfinite(numbers))
+        if invalid.size:
+            line = self.lines[int(invalid[0])]
+            cell = next(
+                _cells(text, _separator_of(self.text)) for number, text in _data_lines(self.text) if number == line
+            )[index]
+            problem = f"in column {index + 1} is not a finite number; use a point for decimals"
             raise InvalidValueError(f"{self.name}, line {line}", cell, problem).coded("table_cell", column=index + 1)
         return numbers
 
 
 def read_table(content: bytes, name: str, max_rows: int) -> Table:
-    """Returns the table in a text: columns parted by semicolons, commas, tabs or blanks, whichever the first line has.
+    """Returns the table in a text; columns are separated by semicolons, commas, tabs or spaces, as in the first line.
 
-    Empty lines and lines that begin with # are passed over. The first line is a header if no cell of it is a number.
+    Empty lines and lines that begin with # are skipped. The first line is a header if none of its cells is a number.
 
     Args:
         content: The text, UTF-8.
-        name: What to call it in an error.
-        max_rows: How many rows it may have.
+        name: Name of the file, for errors.
+        max_rows: Largest number of rows.
 
     Raises:
-        InvalidValueError: It is no text, has no rows or too many, or a line has not as many columns as the first.
+        InvalidValueError: The content is not text, has no rows or too many, or lines differ in their number of columns.
     """
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        problem = "is no text in UTF-8; save it as CSV"
+        problem = "is not UTF-8 text; save the file as CSV"
         raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
             "table_no_text", file=name, line=line
         ) from error
     rows = text.count("\n") + 1
-    if rows > max_rows + 1000:  # Comments and a header; what counts is counted below.
+    if rows > max_rows + 1000:  # With room for comments and a header; the rows are counted below.
         require_rows(rows, max_rows, "samples", name)
-    mark = _mark_of(text)
+    separator = _separator_of(text)
     header, header_line, columns = None, 0, 0
     values, lines = array("d"), array("q")
-    for number, line in _lines(text):
+    for number, line in _data_lines(text):
         if len(line) > _LONGEST_LINE:
             raise InvalidValueError(
-                f"{name}, line {number}", len(line), f"characters are more than a line has, {_LONGEST_LINE}"
+                f"{name}, line {number}", len(line), f"characters are more than the {_LONGEST_LINE} allowed in a line"
             ).coded("table_line", count=len(line), most=_LONGEST_LINE)
-        cells = _cells(line, mark)
+        cells = _cells(line, separator)
         numbers = [_number(cell) for cell in cells]
         if columns == 0:
             columns = len(cells)
-            if all(math.isnan(value) and not _says_nan(cell) for cell, value in zip(cells, numbers, strict=True)):
+            if all(math.isnan(value) and not _is_nan_text(cell) for cell, value in zip(cells, numbers, strict=True)):
                 header, header_line = cells, number
                 continue
         if len(cells) != columns:
@@ -106,27 +106,27 @@ def read_table(content: bytes, name: str, max_rows: int) -> Table:
         values.extend(numbers)
         lines.append(number)
     if not lines:
-        below = " below its header" if header is not None else ""
-        raise InvalidValueError("samples", name, f"holds no rows{below}").coded("table_empty", file=name)
+        detail = " below the header" if header is not None else ""
+        raise InvalidValueError("samples", name, f"has no rows{detail}").coded("table_empty", file=name)
     require_rows(len(lines), max_rows, "samples", name)
     return Table(name, header, header_line, np.array(values).reshape(-1, columns), lines.tolist(), text)
 
 
-def _lines(text: str) -> Iterator[tuple[int, str]]:
-    """Yields the lines that count and their numbers, from 1."""
+def _data_lines(text: str) -> Iterator[tuple[int, str]]:
+    """Yields the number, from 1, and the text of each line that is neither empty nor a comment."""
     for number, line in enumerate(StringIO(text, newline=None), 1):
         if (line := line.strip("\r\n")).strip() and not line.lstrip().startswith("#"):
             yield number, line
 
 
-def _mark_of(text: str) -> str | None:
-    """Returns what parts the columns; None: blanks."""
-    first = next(_lines(text), (0, ""))[1]
-    return next((mark for mark in ";,\t" if mark in first), None)
+def _separator_of(text: str) -> str | None:
+    """Returns the column separator; None is white space."""
+    first = next(_data_lines(text), (0, ""))[1]
+    return next((separator for separator in ";,\t" if separator in first), None)
 
 
-def _cells(line: str, mark: str | None) -> list[str]:
-    cells = line.split() if mark is None else next(csv.reader([line], delimiter=mark, skipinitialspace=True))
+def _cells(line: str, separator: str | None) -> list[str]:
+    cells = line.split() if separator is None else next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
@@ -137,5 +137,5 @@ def _number(cell: str) -> float:
         return math.nan
 
 
-def _says_nan(cell: str) -> bool:
+def _is_nan_text(cell: str) -> bool:
     return cell.lower().lstrip("+-") == "nan"

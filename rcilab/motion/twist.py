@@ -1,4 +1,4 @@
-"""From a wanted twist of the tool to joint velocities, cycle by cycle."""
+"""Joint velocities for a desired twist of the tool, cycle by cycle."""
 
 from __future__ import annotations
 
@@ -20,41 +20,41 @@ if TYPE_CHECKING:
     from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 
 Frame: TypeAlias = Literal["base", "tool"]
-"""Axes in which a twist is given; its point is the tool tip in both."""
+"""Axes of a twist; its reference point is the tool tip in both."""
 
 DAMPED_BELOW = 0.02
-"""Singular value of the Jacobian under which a direction is damped, metres and radians taken as they are. Reason: a
-tenth of all configurations of the xMates is that close to a singularity, their homes are at 0.15 and above."""
+"""Singular value of the Jacobian, in m and rad, below which a direction is damped. Reason: a tenth of all
+configurations of the xMates are that close to a singularity; their home positions are at 0.15 and above."""
 
 RAMP_PART = 0.5
-"""Part of the joints' acceleration and jerk that changes of the twist use. Reason: the rest is for the bending of the
-joints' curves, so that the tool keeps its direction."""
+"""Part of the joints' acceleration and jerk that changes of the twist use. Reason: the rest is for the curvature of the
+joints' paths, so that the tool keeps its direction."""
 
 TOOL_MARGIN = 0.99
-"""Part of the tool's velocity limits that a twist uses. Reason: joints follow each cycle's velocity with a lag of up
-to acceleration^2 / (2 jerk), some mm/s at the tool, and not all of them with the same."""
+"""Part of the tool's velocity limits that a twist uses. Reason: the joints lag each cycle's velocity by up to
+acceleration^2 / (2 jerk), some mm/s at the tool, and by different amounts."""
 
 MISSED_PART = 0.1
-"""Part of a twist that the tool misses where it stops on the way into a singularity: it is 6 degrees off its line."""
+"""Part of a twist that the tool misses when it stops on the way into a singularity: it is 6 degrees off its line."""
 
-_LOOK = 1e-3  # [rad] How far the fastest joint is moved to see whether a singularity comes nearer.
-_CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: how much a velocity may change in a cycle.
+_LOOKAHEAD = 1e-3  # [rad] Step of the fastest joint to test whether a singularity comes closer.
+_CHANGE = RAMP_PART * CYCLE_TIME  # [s] Times an acceleration: the change of a velocity allowed in a cycle.
 _IDENTITY = np.eye(6)
-_SAME = 1e-9  # [m/s, rad/s] Twists closer than this are the same; as a number, a weight closer to 1 is 1.
-_SLOWEST = 1e-12  # [rad/s] Below this a joint stands.
+_TWIST_TOLERANCE = 1e-9  # [m/s, rad/s] Twists closer than this are equal; also the tolerance of a weight of 1.
+_MIN_SPEED = 1e-12  # [rad/s] Below this a joint is stationary.
 
 
 class TwistController:
-    """Turns one twist after another into joint velocities. Owned by the thread that runs the cycle.
+    """Computes joint velocities for changing twists. Owned by the thread that runs the cycle.
 
     Attributes:
         is_damped: Whether the last step was so close to a singularity that the tool leaves the twist.
-        part: Part of the wanted twist that the last step gave, from 0 to 1.
+        part: Part of the desired twist in the last step, from 0 to 1.
 
     Args:
         model: The arm, with its tool.
-        lower: Joint angles to stop at, [rad].
-        upper: Likewise, [rad].
+        lower: Lower ends of the joints' ranges, at which they stop, [rad].
+        upper: Upper ends, [rad].
         velocity: Bounds of the joints, [rad/s].
         acceleration: Bounds, [rad/s^2].
         jerk: Bounds, [rad/s^3].
@@ -71,7 +71,7 @@ class TwistController:
         jerk: Sequence[float],
         speed: float,
     ) -> None:
-        from rcilab.model.dynamics.symmetric_solver import SymmetricSolver  # Loads for 0.1 s.
+        from rcilab.model.dynamics.symmetric_solver import SymmetricSolver  # The import takes 0.1 s.
 
         tool = model.limits.cartesian
         self._chain, self._T_flange_tool = build_chain(model.description.dh), model.T_flange_tool
@@ -87,25 +87,25 @@ class TwistController:
         ]
         self._in_tool = False
         self._goal = np.zeros(6)
-        self._line = np.zeros((6, 2))  # The twist at the first step, and from there to the goal.
+        self._line = np.zeros((6, 2))  # The twist at the first step, and its difference to the goal.
         self._norms = (0.0, 0.0)
         self._weight = 1.0
         self._solver = SymmetricSolver(6)
         self._blend = _ruckig.Stepper([0.0], [0.0], [0.0], [1.0], [1.0])
-        self._begins = False
-        self._cut = 1.0
-        self._allowed = 1.0
-        self._last: list[float] | None = None
+        self._is_first_step = False
+        self._goal_scale = 1.0
+        self._last_part = 1.0
+        self._last_desired: list[float] | None = None
         self.is_damped = False
         self.part = 1.0
 
-    def lead(self, twist: Array, frame: Frame, *, goes_on: bool) -> None:
-        """Takes another wanted twist: the next step starts towards it, from the twist that the tool has then.
+    def set_goal(self, twist: Array, frame: Frame, *, is_continued: bool) -> None:
+        """Sets the desired twist; the next step starts a transition to it from the twist of the tool at that time.
 
         Args:
             twist: Shape (6,), linear first, [m/s, rad/s].
-            frame: Its axes.
-            goes_on: Whether the tool followed this object in the last cycle: the same twist again changes nothing then.
+            frame: Axes of the twist.
+            is_continued: Whether this controller moved the tool in the last cycle; the same twist then has no effect.
 
         Raises:
             InvalidValueError: The frame is unknown.
@@ -113,18 +113,18 @@ class TwistController:
         if frame not in get_args(Frame):
             raise InvalidValueError("frame", frame, f"is unknown; known: {', '.join(get_args(Frame))}")
         norms = zip(self._speeds, _norms(twist), strict=True)
-        self._cut = min([1.0, *(bound / norm for bound, norm in norms if norm > bound)])
-        goal, in_tool = self._cut * twist, frame == "tool"
-        if goes_on and in_tool == self._in_tool and np.array_equal(goal, self._goal):
+        self._goal_scale = min([1.0, *(bound / norm for bound, norm in norms if norm > bound)])
+        goal, in_tool = self._goal_scale * twist, frame == "tool"
+        if is_continued and in_tool == self._in_tool and np.array_equal(goal, self._goal):
             return
         self._goal, self._in_tool = goal, in_tool
         self._weight = 0.0
-        self._begins = True
-        self._allowed = 1.0
-        self._last = None
+        self._is_first_step = True
+        self._last_part = 1.0
+        self._last_desired = None
 
     def step(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> list[float]:
-        """Returns joint velocities to go on with, plain floats, [rad/s].
+        """Returns the joint velocities of the next cycle, plain floats, [rad/s].
 
         Args:
             q: Joint angles, [rad].
@@ -133,53 +133,53 @@ class TwistController:
         """
         J, rotation = tool_jacobian(self._chain, q, self._T_flange_tool)
         if self._in_tool:
-            # Rows are the same vectors in other axes, so that everything below holds in those, too.
+            # The rows are the same vectors in other axes, so everything below applies in those, too.
             R = np.array(rotation).reshape(3, 3)
             J = J.T.reshape(-1, 3).dot(R).reshape(-1, 6).T
         inverse, self.is_damped = damped_inverse(J, self._solver)
-        wanted = None if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
-        if wanted is None:
-            wanted = inverse.dot(self._goal).tolist()
+        desired = None if self._weight == 1.0 else self._blended(J, inverse, dq, ddq)
+        if desired is None:
+            desired = inverse.dot(self._goal).tolist()
         fidelity = 1.0
         if self.is_damped:
-            fidelity = self._fidelity(J, inverse, q, wanted)
-            wanted = [fidelity * v for v in wanted]
-        # While the twist changes, so do the joint velocities, on purpose.
-        last = wanted if self._weight != 1.0 or self._last is None else self._last
-        part = self._allowed = self._part_inside(q, wanted, last)
-        self._last = wanted
-        self.part = part * self._cut * fidelity
-        return [part * v for v in wanted]
+            fidelity = self._fidelity(J, inverse, q, desired)
+            desired = [fidelity * v for v in desired]
+        # While the twist changes, the joint velocities change intentionally.
+        previous = desired if self._weight != 1.0 or self._last_desired is None else self._last_desired
+        part = self._last_part = self._part_inside(q, desired, previous)
+        self._last_desired = desired
+        self.part = part * self._goal_scale * fidelity
+        return [part * v for v in desired]
 
-    def _fidelity(self, J: Matrix, inverse: Matrix, q: Sequence[float], wanted: Sequence[float]) -> float:
-        """Returns the part of the velocities that is kept on the way into a singularity, 1 to 0; 1 on the way out.
+    def _fidelity(self, J: Matrix, inverse: Matrix, q: Sequence[float], desired: Sequence[float]) -> float:
+        """Returns the factor on the velocities on the way into a singularity, 1 to 0; 1 on the way out.
 
-        There the tool would leave the asked direction and slide along the edge of the reach, and come back by another
-        way. It slows down instead as it misses the twist, and stands where it misses `MISSED_PART` of it.
+        At full velocity the tool would leave the commanded direction, slide along the limit of its reach and return on
+        another path. Instead it slows down as it misses the twist, and stops when it misses `MISSED_PART` of it.
         """
         length = float(np.linalg.norm(self._goal))
-        fastest = max(map(abs, wanted))
-        if length < _SAME or fastest < _SLOWEST:
+        fastest = max(map(abs, desired))
+        if length < _TWIST_TOLERANCE or fastest < _MIN_SPEED:
             return 1.0
         missed = float(np.linalg.norm(self._goal - J.dot(inverse.dot(self._goal)))) / length
-        ahead = [angle + _LOOK / fastest * v for angle, v in zip(q, wanted, strict=True)]
+        ahead = [angle + _LOOKAHEAD / fastest * v for angle, v in zip(q, desired, strict=True)]
         J_ahead, _ = tool_jacobian(self._chain, ahead, self._T_flange_tool)
         if np.linalg.eigvalsh(J_ahead.dot(J_ahead.T))[0] >= np.linalg.eigvalsh(J.dot(J.T))[0]:
             return 1.0
         return max(0.0, 1.0 - missed / MISSED_PART)
 
     def _blended(self, J: Matrix, inverse: Matrix, dq: Sequence[float], ddq: Sequence[float]) -> list[float] | None:
-        """Returns joint velocities for the twist of this cycle; None when it is the goal.
+        """Returns joint velocities for the twist of this cycle, or None if it is the goal.
 
-        It is on the straight line from the twist at the first step to the goal.
+        The twist is on the straight line from that of the first step to the goal.
         """
         line = self._line
-        if self._begins:
+        if self._is_first_step:
             line[:, 0] = J.dot(dq)
             line[:, 1] = self._goal - line[:, 0]
             self._norms = _norms(line[:, 1])
         norms = self._norms
-        if max(norms) < _SAME:
+        if max(norms) < _TWIST_TOLERANCE:
             self._weight = 1.0
             return None
         starts, strides = inverse.dot(line).T.tolist()
@@ -189,38 +189,40 @@ class TwistController:
                 rate = a_max / stride if rate * stride > a_max else rate
                 rate_change = j_max / stride if rate_change * stride > j_max else rate_change
         blend = self._blend
-        if self._begins:
-            # What the tool accelerates along the line already goes on; the rest is for the joints to lose.
+        if self._is_first_step:
+            # The acceleration along the line continues; the joints remove the rest.
             change = line[:, 1]
-            running = float(change.dot(J.dot(ddq)) / change.dot(change))
-            blend.place([0.0], [0.0], [min(max(running, -rate), rate)])
-            self._begins = False
-        blend.limit([rate], [rate_change])
-        blend.towards_velocity([1.0])
+            current_rate = float(change.dot(J.dot(ddq)) / change.dot(change))
+            blend.set_state([0.0], [0.0], [min(max(current_rate, -rate), rate)])
+            self._is_first_step = False
+        blend.set_limits([rate], [rate_change])
+        blend.step_to_velocity([1.0])
         (weight,), (slope,) = blend.dq, blend.ddq
-        self._weight = 1.0 if abs(weight - 1.0) < _SAME and abs(slope) < _SAME * rate_change else weight
+        self._weight = (
+            1.0 if abs(weight - 1.0) < _TWIST_TOLERANCE and abs(slope) < _TWIST_TOLERANCE * rate_change else weight
+        )
         return [start + weight * stride for start, stride in zip(starts, strides, strict=True)]
 
-    def _part_inside(self, q: Sequence[float], wanted: Sequence[float], last: Sequence[float]) -> float:
-        """Returns the part of joint velocities that keeps their bounds and can be taken back before a range ends.
+    def _part_inside(self, q: Sequence[float], desired: Sequence[float], previous: Sequence[float]) -> float:
+        """Returns the factor on joint velocities that keeps their bounds and allows a stop before the end of a range.
 
-        Where the joint velocities of the twist change along the way, near singularities above all, it is also so slow
-        that the joints can follow: at the part p of the twist they accelerate by p^2 times the bend of their curve.
+        Where the joint velocities of the twist change along the path, mainly near singularities, the factor is also so
+        small that the joints can follow: at a factor p they accelerate by p^2 times the curvature of their path.
         """
-        part, before = 1.0, self._allowed
-        time = rate = rate_change = math.inf  # [s], [1/s], [1/s^2] All joints as one: velocities as parts of `wanted`.
-        bend = 1.0  # How much faster than they may the joints accelerated in the last cycle, when above 1.
-        for v, v_last, angle, (low, high, v_max, a_max, j_max) in zip(wanted, last, q, self._joints, strict=True):
+        part, before = 1.0, self._last_part
+        time = rate = rate_change = math.inf  # [s], [1/s], [1/s^2] Over all joints, relative to `desired`.
+        excess = 1.0  # Ratio of the joints' acceleration in the last cycle to the allowed one, if above 1.
+        for v, v_last, angle, (low, high, v_max, a_max, j_max) in zip(desired, previous, q, self._joints, strict=True):
             speed = abs(v)
-            if speed > _SLOWEST:
+            if speed > _MIN_SPEED:
                 room = high - angle if v > 0.0 else angle - low
-                # Comparisons cost a quarter of calls of min.
+                # Comparisons take a quarter of the time of calls of min.
                 part = v_max / speed if part * speed > v_max else part
                 time = room / speed if time * speed > room else time
                 rate = a_max / speed if rate * speed > a_max else rate
                 rate_change = j_max / speed if rate_change * speed > j_max else rate_change
-            if (growth := abs(v - v_last) * before) > (allowed := _CHANGE * a_max):
-                bend = max(bend, growth / allowed)
+            if (change := abs(v - v_last) * before) > (max_change := _CHANGE * a_max):
+                excess = max(excess, change / max_change)
         if time == math.inf:
             return 1.0
         time -= part * CYCLE_TIME
@@ -228,28 +230,28 @@ class TwistController:
             return 0.0
         rate *= RAMP_PART
         part = min(part, before + rate * CYCLE_TIME, _fastest_before(time, rate, RAMP_PART * rate_change))
-        return min(part, before / math.sqrt(bend)) if bend > 1.0 else part
+        return min(part, before / math.sqrt(excess)) if excess > 1.0 else part
 
 
 def damped_inverse(J: Matrix, solver: SymmetricSolver) -> tuple[Matrix, bool]:
-    """Returns the matrix that turns a twist into the smallest joint velocities, and whether it is damped.
+    """Returns the inverse that gives the smallest joint velocities for a twist, and whether it is damped.
 
     Damped least squares with numerical filtering (Maciejewski and Klein 1988; Siciliano et al., Robotics, 2009, 3.5):
-    a direction whose singular value s is below s0 = `DAMPED_BELOW` is driven by s / s0^2 instead of 1 / s, which fades
-    to nothing at the singularity itself; every other direction is exact.
+    a direction whose singular value s is below s0 = `DAMPED_BELOW` is multiplied by s / s0^2 instead of 1 / s, which
+    is zero at the singularity itself; every other direction is exact.
 
     Args:
         J: Jacobian, shape (6, n).
-        solver: Of six equations.
+        solver: Solver for six equations.
 
     Returns:
-        Shape (n, 6), and True when a direction was damped.
+        Shape (n, 6), and True if a direction is damped.
     """
-    A = J.dot(J.T)  # For so small matrices half the cost of the operator.
+    A = J.dot(J.T)  # For matrices this small, half the time of the operator.
     B = solver.solve(A, _IDENTITY)
     elements = B.ravel()
-    # The Frobenius norm is no smaller than the largest eigenvalue of the inverse, 1 / s^2 of the smallest s. It has to
-    # be that of B: in the product with J a direction that is lost altogether would cancel.
+    # The Frobenius norm is at least the largest eigenvalue of the inverse, 1 / s^2 of the smallest s. It must be that
+    # of B: in the product with J a completely lost direction would cancel.
     if elements.dot(elements) < DAMPED_BELOW**-4 and solver.has_solved:
         return J.T.dot(B), False
     squares, U = np.linalg.eigh(A)
@@ -264,8 +266,8 @@ def _fastest_before(distance: float, a: float, j: float) -> float:
     """
     if distance < a**3 / j**2:
         return (distance * distance * j) ** (1.0 / 3.0)
-    lost = a / j
-    return 0.5 * a * (math.sqrt(lost * lost + 8.0 * distance / a) - lost)
+    time = a / j
+    return 0.5 * a * (math.sqrt(time * time + 8.0 * distance / a) - time)
 
 
 def _norms(twist: Array) -> tuple[float, float]:

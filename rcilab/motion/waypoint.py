@@ -1,4 +1,4 @@
-"""Waypoints: the steps of a program as values of plain numbers."""
+"""Waypoints: the steps of a program, as plain numbers."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.motion.joint import MIN_SPEED
-from rcilab.motion.path import CircleOrientation, Way
-from rcilab.motion.samples import MOST
+from rcilab.motion.path import CircleOrientation, ElbowDirection
+from rcilab.motion.samples import MAX_ANGLE
 from rcilab.robots.description import RobotDescription
 
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]
 
-FARTHEST = 10.0
-"""Largest coordinate, [m]: far beyond the reach of an arm, so that a larger one must be in millimetres."""
+MAX_COORDINATE = 10.0
+"""Largest coordinate, [m]: far beyond the reach of an arm; a larger one is probably in millimetres."""
 LARGEST_BLEND = 1.0
 """Largest blend radius, [m]: about the reach of an arm."""
 LONGEST_DWELL = 3600.0
 """Longest dwell at a waypoint, [s]."""
-_UNIT = 1e-3
-"""How far the length of a quaternion may be from 1; it is normalised."""
+_UNIT_TOLERANCE = 1e-3
+"""Largest difference of a quaternion's length from 1; it is normalised."""
 
-ALWAYS = ("speed", "blend", "dwell")
+COMMON_FIELDS = ("speed", "blend", "dwell")
 """Fields of every waypoint."""
 ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "joint": ("q", "position", "wxyz", "psi"),
@@ -39,27 +39,27 @@ ALLOWED: dict[WaypointType, tuple[str, ...]] = {
     "nullspace": ("psi", "way"),
 }
 """Further fields of a waypoint by type."""
-NEEDED: dict[WaypointType, tuple[str, ...]] = {
+REQUIRED: dict[WaypointType, tuple[str, ...]] = {
     "joint": (),
     "line": (),
     "arc": ("via",),
     "circle": ("center", "axis"),
     "nullspace": ("psi",),
 }
-"""Required fields besides a target: a joint move, a line and an arc need q, or position and wxyz."""
+"""Required fields in addition to a target; the target of a joint move, a line and an arc is q, or position and wxyz."""
 
-WORDS: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(Way)}
-"""Values of the fields that are words; the first is the default."""
+CHOICES: dict[str, tuple[str, ...]] = {"orientation": get_args(CircleOrientation), "way": get_args(ElbowDirection)}
+"""Values of the fields that have a fixed set of them; the first is the default."""
 
 Floats: TypeAlias = tuple[float, ...]
 
 MOST_WAYPOINTS = 10_000
-"""Largest number of waypoints: a motion through them has a gigabyte."""
+"""Largest number of waypoints; a motion through them takes a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waypoint:
-    """One step of a program, in plain numbers, so that waypoints can be compared and files are exact.
+    """One step of a program, as plain numbers, so that waypoints can be compared and files are exact.
 
     `Waypoint.joint`, `.line`, `.arc`, `.circle` and `.nullspace` build one from poses and arrays.
 
@@ -68,10 +68,10 @@ class Waypoint:
     """
 
     type: WaypointType
-    """joint: straight in joint space. line, arc: the tool straight, or over `via`. circle: around `center`.
-    nullspace: the elbow alone."""
+    """joint: straight in joint space. line, arc: the tool on a straight line, or through `via`. circle: around
+    `center`. nullspace: only the elbow moves."""
     q: Floats | None = None
-    """Target as joint angles, n of them, [rad]; of a line or an arc the pose and the arm angle there."""
+    """Target as joint angles, n of them, [rad]; for a line or an arc the pose and the arm angle at them."""
     position: Floats | None = None
     """Target: position of the tool in base, 3 numbers, [m]; with `wxyz`."""
     wxyz: Floats | None = None
@@ -79,35 +79,36 @@ class Waypoint:
     via: Floats | None = None
     """A point on the arc, in base, 3 numbers, [m]."""
     via_wxyz: Floats | None = None
-    """Orientation of the tool there, 4 numbers, a unit quaternion; None turns evenly from start to target."""
+    """Orientation of the tool at `via`, 4 numbers, a unit quaternion; None is a slerp from start to target."""
     center: Floats | None = None
     """Centre of the circle in base, 3 numbers, [m]."""
     axis: Floats | None = None
     """Axis of the circle in base, 3 numbers of any length; the tool goes around it by the right-hand rule."""
     angle: float | None = None
-    """How far around the circle, more than 0 up to 2 pi, [rad]; None is all around."""
+    """Angle around the circle, more than 0 up to 2 pi, [rad]; None is the full circle."""
     orientation: CircleOrientation | None = None
     """Orientation of the tool on a circle: "held" (default), or "turning" with the circle, about its axis."""
     psi: float | None = None
-    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds the one before, or in a joint move any."""
-    way: Way | None = None
+    """Arm angle of a 7-axis arm at the target, -pi to pi, [rad]; None holds that of the start; any in a joint move."""
+    way: ElbowDirection | None = None
     """Direction of a nullspace move, "shorter" (default) or "longer"; the longer one to the arm angle of the start is a
     full turn."""
     speed: float = 0.2
-    """Part of the velocity and acceleration limits to use on the way here, 0.001 to 1; jerk limits are used in full."""
+    """Part of the velocity and acceleration limits to use on the segment to this waypoint, 0.001 to 1; jerk limits
+    are used in full."""
     blend: float = 0.0
     """Radius within which the tool may leave its path to round the corner, up to 1, [m]. 0 is a stop. The tool also
     stops at the last waypoint, at one with a dwell, and at one without a motion."""
     dwell: float = 0.0
-    """How long to stay here, up to 3600, [s]; in whole cycles."""
+    """Time at standstill at this waypoint, up to 3600, [s]; in whole cycles."""
 
     def __post_init__(self) -> None:
         if self.type not in get_args(WaypointType):
             known = ", ".join(get_args(WaypointType))
             error = InvalidValueError("type", described(self.type), f"is unknown; known: {known}")
             raise error.coded("unknown", known=known)
-        allowed = (*ALLOWED[self.type], *ALWAYS)
-        for name, known in WORDS.items():
+        allowed = (*ALLOWED[self.type], *COMMON_FIELDS)
+        for name, known in CHOICES.items():
             if getattr(self, name) is None and name in allowed:
                 object.__setattr__(self, name, known[0])
         for name in _OPTIONAL:
@@ -117,11 +118,13 @@ class Waypoint:
                 raise InvalidValueError(name, described(value), problem).coded(
                     "no_meaning", type=self.type, known=", ".join(allowed)
                 )
-            if value is None and name in NEEDED[self.type]:
-                missing = InvalidValueError(name, None, f"is missing: {self.type} needs {', '.join(NEEDED[self.type])}")
-                raise missing.coded("missing", type=self.type, names=", ".join(NEEDED[self.type]))
-            if name in WORDS:
-                _require_word(name, value)
+            if value is None and name in REQUIRED[self.type]:
+                missing = InvalidValueError(
+                    name, None, f"is missing: {self.type} needs {', '.join(REQUIRED[self.type])}"
+                )
+                raise missing.coded("missing", type=self.type, names=", ".join(REQUIRED[self.type]))
+            if name in CHOICES:
+                _require_choice(name, value)
             elif value is not None and name not in ("q", "angle", "psi"):
                 object.__setattr__(self, name, vector_of(name, value))
         self._require_target()
@@ -132,8 +135,8 @@ class Waypoint:
             number = as_number(value, name, unit)
             if not lowest <= number <= highest or (name == "angle" and number == 0.0):
                 span = f"{'more than 0' if name == 'angle' else f'{lowest:.5g}'} to {highest:.5g} [{unit}]"
-                bad = InvalidValueError(name, number, f"must be from {span}")
-                raise bad.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
+                error = InvalidValueError(name, number, f"must be from {span}")
+                raise error.coded("span", low=f"{lowest:.5g}", high=f"{highest:.5g}")
             object.__setattr__(self, name, number)
 
     @classmethod
@@ -152,7 +155,7 @@ class Waypoint:
         cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
         dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns a straight line of the tool to a pose, or to that of joint angles, shape (n,), [rad]."""
+        """Returns a straight line of the tool to a pose, or to the pose at joint angles, shape (n,), [rad]."""
         return cls(type="line", **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
@@ -160,12 +163,12 @@ class Waypoint:
         cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
         blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
-        """Returns an arc of the tool over `via`: through that pose, or only that position, shape (3,), [m]."""
-        places: dict[str, Any] = {"via": via}
+        """Returns an arc of the tool through `via`: a pose, or only a position, shape (3,), [m]."""
+        via_fields: dict[str, Any] = {"via": via}
         if isinstance(via, Pose) or is_transform(via):
             via = as_pose(via, "via")
-            places = {"via": via.position, "via_wxyz": via.wxyz}
-        return cls(type="arc", **places, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
+            via_fields = {"via": via.position, "via_wxyz": via.wxyz}
+        return cls(type="arc", **via_fields, **_target(target), psi=psi, speed=speed, blend=blend, dwell=dwell)
 
     @classmethod
     def circle(
@@ -184,9 +187,9 @@ class Waypoint:
 
     @classmethod
     def nullspace(
-        cls, psi: float, *, way: Way = "shorter", speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0
+        cls, psi: float, *, way: ElbowDirection = "shorter", speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0
     ) -> Waypoint:
-        """Returns a move of the elbow alone, to an arm angle, [rad], the shorter or the longer way round."""
+        """Returns a move of only the elbow to an arm angle, [rad], in the shorter or the longer direction."""
         return cls(type="nullspace", psi=psi, way=way, speed=speed, blend=blend, dwell=dwell)
 
     @property
@@ -195,14 +198,14 @@ class Waypoint:
         return None if self.position is None or self.wxyz is None else Pose(self.position, self.wxyz)
 
     def retyped(self, type: WaypointType, via: ArrayLike | None = None) -> Waypoint:
-        """Returns the waypoint with another path type to the same target: joint, line or arc.
+        """Returns the waypoint with the same target and another path type: joint, line or arc.
 
         Args:
-            type: The other type.
+            type: New path type.
             via: A point on the arc, shape (3,), [m]; only an arc has one.
 
         Raises:
-            InvalidValueError: One of the two types has no target, or the via does not fit the type.
+            InvalidValueError: One of the two types has no target, or `via` does not fit the type.
         """
         for kind in (self.type, type):
             if "q" not in ALLOWED.get(kind, ()):
@@ -220,11 +223,11 @@ class Waypoint:
             raise missing.coded("missing", type=self.type, names="q / position, wxyz")
         if self.q is not None:
             if has_pose:
-                second = InvalidValueError("q", self.q, "is a second target besides position and wxyz; keep one")
-                raise second.coded("second_target")
+                error = InvalidValueError("q", self.q, "is a second target in addition to position and wxyz; keep one")
+                raise error.coded("second_target")
             if self.psi is not None:
-                second = InvalidValueError("psi", self.psi, "is a second arm angle: q has one; leave it out")
-                raise second.coded("second_angle")
+                error = InvalidValueError("psi", self.psi, "is a second arm angle: q has one; omit psi")
+                raise error.coded("second_angle")
             object.__setattr__(self, "q", angles_of(self.q, "q"))
         for name, other in (("position", "wxyz"), ("wxyz", "position")):
             if has_pose and getattr(self, name) is None:
@@ -248,7 +251,7 @@ def label(number: int, waypoint: Waypoint) -> str:
 
 
 def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValueError:
-    """Returns the error of a value with the name of its waypoint."""
+    """Returns the error of a value, with its waypoint added."""
     named = InvalidValueError(f"waypoint {number} ({kind}), {error.name}", error.value, error.requirement)
     if not error.code:
         return named
@@ -256,10 +259,10 @@ def named_value(number: int, kind: str, error: InvalidValueError) -> InvalidValu
 
 
 def require_count(count: int) -> None:
-    """Refuses a program without waypoints, or with too many.
+    """Requires a number of waypoints from 1 to `MOST_WAYPOINTS`.
 
     Raises:
-        InvalidValueError: It is not 1 to `MOST_WAYPOINTS`.
+        InvalidValueError: It is not.
     """
     if not 1 <= count <= MOST_WAYPOINTS:
         raise InvalidValueError("waypoints", Unquoted(str(count)), f"must be 1 to {MOST_WAYPOINTS}").coded(
@@ -268,10 +271,10 @@ def require_count(count: int) -> None:
 
 
 def require_fit(waypoint: Waypoint, robot: RobotDescription) -> None:
-    """Refuses a waypoint that does not fit this arm.
+    """Requires a waypoint that fits this arm.
 
     Raises:
-        InvalidValueError: Its q has not n angles, or it has an arm angle and the arm has none.
+        InvalidValueError: Its q does not have n angles, or it has an arm angle and the arm has none.
     """
     if waypoint.q is not None:
         angles_of(waypoint.q, "q", robot.n, robot.name)
@@ -284,7 +287,7 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
     """Returns checked joint angles, [rad].
 
     Raises:
-        InvalidValueError: Not 6 or 7 finite numbers, or not as many as the arm has axes, or more than two turns.
+        InvalidValueError: Not 6 or 7 finite numbers, not as many as the arm's axes, or more than two turns.
     """
     size = n or (np.size(value) if np.size(value) in (6, 7) else 7)
     if n is not None and np.shape(value) != (n,):
@@ -292,14 +295,14 @@ def angles_of(value: ArrayLike, name: str, n: int | None = None, robot: str = ""
         raise error.coded("axes", count=n, model=robot)
     angles: Floats = tuple(as_vector(value, size, name, "rad").tolist())
     for joint, angle in enumerate(angles, 1):
-        if abs(angle) > MOST:
-            problem = f"rad of joint {joint} is more than two turns, {MOST:.4g} rad; degrees times pi / 180 are radians"
+        if abs(angle) > MAX_ANGLE:
+            problem = f"rad of joint {joint} is more than two turns, {MAX_ANGLE:.4g} rad; multiply degrees by pi / 180"
             raise InvalidValueError(name, angle, problem).coded("turns", joint=joint)
     return angles
 
 
-def _require_word(name: str, value: object) -> None:
-    known = WORDS[name]
+def _require_choice(name: str, value: object) -> None:
+    known = CHOICES[name]
     if value is not None and not (isinstance(value, str) and value in known):
         error = InvalidValueError(name, described(value), f"is unknown; known: {', '.join(known)}")
         raise error.coded("unknown", known=", ".join(known))
@@ -310,16 +313,16 @@ def _target(target: Pose | ArrayLike) -> dict[str, Any]:
         target = as_pose(target, "target")
         return {"position": tuple(target.position.tolist()), "wxyz": tuple(target.wxyz.tolist())}
     if np.size(target) not in (6, 7):
-        problem = "is not a target: give a Pose (position and wxyz), or joint angles, 6 or 7 numbers [rad]"
+        problem = "is not a target: pass a Pose (position and wxyz), or joint angles, 6 or 7 numbers [rad]"
         raise InvalidValueError("target", described(target), problem).coded("target_shape")
     return {"q": angles_of(target, "q")}
 
 
 def vector_of(name: str, value: ArrayLike) -> Floats:
-    """Returns a checked point [m], axis or unit quaternion (a name that ends with wxyz).
+    """Returns a checked point [m], axis, or unit quaternion if the name ends with wxyz.
 
     Raises:
-        InvalidValueError: Not 3 finite numbers, or 4 of a quaternion; too far away, of no length, or not a unit one.
+        InvalidValueError: Not 3 finite numbers, or 4 for a quaternion; too far away, or its length is not valid.
     """
     numbers: Floats = tuple(
         as_vector(
@@ -327,13 +330,15 @@ def vector_of(name: str, value: ArrayLike) -> Floats:
         ).tolist()
     )
     if name.endswith("wxyz"):
-        if abs(math.hypot(*numbers) - 1.0) > _UNIT:
-            problem = f"has length {math.hypot(*numbers):.4g}, must be 1 within {_UNIT:g}: a unit quaternion, w first"
+        if abs((length := math.hypot(*numbers)) - 1.0) > _UNIT_TOLERANCE:
+            problem = f"has length {length:.4g}, must be 1 within {_UNIT_TOLERANCE:g}: a unit quaternion, w first"
             raise InvalidValueError(name, numbers, problem).coded("no_unit")
     elif name == "axis":
         if math.hypot(*numbers) < 1e-12:
             raise InvalidValueError(name, numbers, "has no direction: its length is zero").coded("no_direction")
-    elif max(map(abs, numbers)) > FARTHEST:
-        error = InvalidValueError(name, numbers, f"is beyond {FARTHEST:g} m; millimetres divided by 1000 are metres")
-        raise error.coded("beyond", most=f"{FARTHEST:g}")
+    elif max(map(abs, numbers)) > MAX_COORDINATE:
+        error = InvalidValueError(
+            name, numbers, f"is beyond {MAX_COORDINATE:g} m; if it is in millimetres, divide by 1000"
+        )
+        raise error.coded("beyond", most=f"{MAX_COORDINATE:g}")
     return numbers

@@ -43,7 +43,7 @@ def test_check_plans_a_program_for_its_own_arm_and_says_what_was_shortened(file,
 
 def test_check_refuses_another_arm_and_a_spoiled_file_in_one_line(file, capsys):
     assert main(["check", str(file), "--model", "xMate3"]) == 2
-    assert "program: 'xMatePro7' is the arm it is for, not xMate3" in capsys.readouterr().err
+    assert "program: 'xMatePro7' is the model of the program, not xMate3" in capsys.readouterr().err
     file.write_text(file.read_text().replace('"speed": 1.0', '"speed": 7', 1))
     assert main(["check", str(file)]) == 2
     said = capsys.readouterr().err

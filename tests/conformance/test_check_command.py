@@ -42,7 +42,7 @@ def test_bad_input_is_an_error_of_ours_which_the_command_line_turns_into_2(tmp_p
     with pytest.raises(InvalidValueError, match="for 6 joints, xMatePro7 has 7"):
         run(tmp_path / "a.npz", "--model", "xMatePro7")
     np.savez(tmp_path / "c.npz", photo=np.zeros(3))
-    with pytest.raises(InvalidValueError, match="holds no motion"):
+    with pytest.raises(InvalidValueError, match="does not contain a motion"):
         run(tmp_path / "c.npz", "--model", "xMate3")
 
 

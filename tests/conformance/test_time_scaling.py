@@ -18,7 +18,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import Motion, PiecewisePolynomial, differences_from_derivatives, plan_joint
-from rcilab.motion.motion import standing
+from rcilab.motion.motion import stationary_motion
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.8, 0.4, -0.6, 1.2, 0.3, 0.2, -1.5])
@@ -78,7 +78,7 @@ def test_a_motion_that_passes_is_returned_as_it_is():
     result = report.slow_down()
     assert (result.factor, result.motion, result.report, result.decisive) == (1.0, FULL, report, None)
     assert str(result) == "No slow-down is needed."
-    still = check(standing(GOAL), MODEL).slow_down()
+    still = check(stationary_motion(GOAL), MODEL).slow_down()
     assert still.factor == 1.0
 
 

@@ -86,7 +86,7 @@ def test_a_pose_out_of_reach_is_told_with_its_place_and_reason(model):
     goal = moved(model, (2.0, 0.0, 0.0))
     with pytest.raises(
         PlanningError,
-        match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, .* % of the way, tool .* out of reach by",
+        match=r"the line cannot be followed at 0\.\d+ of 2\.000 m \(t = .* s, .* % of the path, tool .* out of reach",
     ):
         plan_line(model, model.home, goal, law="s_profile")
 
@@ -180,7 +180,7 @@ def test_the_elbow_alone_by_the_s_profile():
         ),
         ({"center": (0.5, 0.0, 0.5), "axis": (0.0, 0.0, 0.0)}, InvalidValueError, "axis: .* has no direction"),
         ({"center": (0.5, 0.0, 0.4), "axis": (0.0, 0.0, 1.0)}, PlanningError, r"mm out of the plane .* choose the"),
-        ({"center": moved(SEVEN, (0, 0, 0)).position, "axis": (0, 0, 1.0)}, PlanningError, "where the tool is"),
+        ({"center": moved(SEVEN, (0, 0, 0)).position, "axis": (0, 0, 1.0)}, PlanningError, "is the tool's position"),
         (
             {"center": moved(SEVEN, (-0.1, 0, 0)).position, "axis": (0, 0, 1.0), "angle": 7.0},
             InvalidValueError,
@@ -283,16 +283,16 @@ def test_the_elbow_takes_the_shorter_way_round_across_pi_without_a_jump(name, la
 def test_where_the_shorter_way_round_is_blocked_the_longer_is_named_and_goes(law):
     q = elbow_below(SEVEN, 1.0)
     with pytest.raises(
-        PlanningError, match=r'null-space motion .* the longer way round is free: way="longer"'
+        PlanningError, match=r'null-space motion .* the longer direction is free: way="longer"'
     ) as caught:
         plan_nullspace(SEVEN, q, -1.0, law=law)
     assert caught.value.share == pytest.approx(0.45, abs=0.1)
     motion = plan_nullspace(SEVEN, q, -1.0, law=law, way="longer", speed=0.1)
     assert SEVEN.arm_angle(motion.q[-1]) == pytest.approx(-1.0, abs=1e-9)
     assert check(motion, SEVEN).ok
-    with pytest.raises(PlanningError, match='the shorter way round is free: way="shorter"'):
+    with pytest.raises(PlanningError, match='the shorter direction is free: way="shorter"'):
         plan_nullspace(SEVEN, q, 1.5, law=law, way="longer")
-    with pytest.raises(PlanningError, match=r"the longer way round is not free either; model\.feasible_arcs returns"):
+    with pytest.raises(PlanningError, match=r"the longer direction is not free either; model\.feasible_arcs returns"):
         plan_nullspace(SEVEN, q, 0.0, law=law)
 
 

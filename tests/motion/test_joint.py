@@ -116,7 +116,7 @@ def test_from_rest_it_is_ruckigs_trajectory_where_all_joints_are_bound_alike():
         start, goal = random_angles(rng), random_angles(rng)
         bounds = [bound * np.abs(goal - start) for bound in rng.uniform((0.1, 0.5, 100.0), (1.0, 10.0, 1000.0))]
         ours = _ruckig.plan_profile(start, goal, *bounds, rest, rest)
-        theirs = _ruckig._timed(start, goal, *bounds, rest, rest)
+        theirs = _ruckig._plan_synchronized(start, goal, *bounds, rest, rest)
         times = np.linspace(0.0, ours.duration, 100)
         assert ours.duration == pytest.approx(theirs.duration, rel=1e-6)
         assert np.allclose(ours.sample(times), theirs.sample(times), rtol=0.0, atol=1e-6)

@@ -9,7 +9,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, PiecewisePolynomial, plan_joint
-from rcilab.motion.motion import standing
+from rcilab.motion.motion import stationary_motion
 
 MODEL = load_model("xMatePro7")
 GOAL = np.array([0.4, 0.3, -0.2, 0.9, 0.1, 0.5, -1.0])
@@ -127,7 +127,7 @@ def test_a_pickled_motion_is_the_same_motion():
 
 
 def test_speed_law_and_goal_are_checked_when_a_motion_is_built():
-    curve = standing(GOAL).polynomial
+    curve = stationary_motion(GOAL).polynomial
     with pytest.raises(InvalidValueError, match="speed"):
         Motion(polynomial=curve, goal=GOAL, law="samples", speed=0.0)
     with pytest.raises(InvalidValueError, match="known: jerk_limited"):
@@ -192,7 +192,7 @@ def test_a_motion_slowed_by_one_is_itself_and_two_slow_downs_multiply():
     assert motion.slowed(1.0).fingerprint == motion.fingerprint
     twice, once = motion.slowed(2.0).slowed(4.0), motion.slowed(8.0)  # Powers of two do not round.
     assert twice.fingerprint == once.fingerprint != motion.fingerprint
-    assert len(standing(GOAL).slowed(3.0)) == 1
+    assert len(stationary_motion(GOAL).slowed(3.0)) == 1
 
 
 @pytest.mark.parametrize("factor", [0.999, 0.0, -2.0, np.inf, np.nan, "twice", None])

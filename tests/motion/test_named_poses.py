@@ -70,10 +70,10 @@ def test_what_is_no_pose_is_not_stored(file, q):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("{", "no JSON"),
-        ("[]", "no file of poses"),
-        ('{"format": "rcilab poses", "version": 1, "poses": {"xMatePro7": []}}', "no file of poses"),
-        ('{"format": "rcilab poses", "version": 1}', "no file of poses"),
+        ("{", "not valid JSON"),
+        ("[]", "not a pose file"),
+        ('{"format": "rcilab poses", "version": 1, "poses": {"xMatePro7": []}}', "not a pose file"),
+        ('{"format": "rcilab poses", "version": 1}', "not a pose file"),
     ],
 )
 def test_a_file_that_is_none_is_named_and_left_alone(file, text, said):
@@ -100,7 +100,9 @@ def test_a_file_of_another_version_is_left_alone(file):
         NamedPoseStore(PRO7, file).names()
 
 
-@pytest.mark.parametrize(("angles", "said"), [([9.0] + [0.0] * 6, "joint 1"), ([0.0] * 6, "mend"), ("here", "mend")])
+@pytest.mark.parametrize(
+    ("angles", "said"), [([9.0] + [0.0] * 6, "joint 1"), ([0.0] * 6, "delete"), ("here", "or delete")]
+)
 def test_a_pose_that_somebody_has_written_by_hand_is_looked_at(file, angles, said):
     file.parent.mkdir()
     content = {"format": "rcilab poses", "version": 1, "poses": {"xMatePro7": {"bad": angles}}}

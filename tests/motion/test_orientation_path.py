@@ -72,7 +72,7 @@ def test_the_whole_may_turn_further_than_half_round():
     turning = turn_through(about(0.0), about(2.0), about(4.0), 0.5)
     whole = turns_between(turning.sample(np.linspace(0.0, 1.0, 101))).sum(axis=0)
     assert np.linalg.norm(whole) == pytest.approx(4.0, abs=1e-9)
-    assert turning.fastest == pytest.approx(4.0, abs=1e-3)
+    assert turning.max_rate == pytest.approx(4.0, abs=1e-3)
 
 
 @given(rotations, rotations, st.floats(0.0, 1.0))

@@ -231,5 +231,5 @@ def test_a_path_beside_a_singularity_is_refused_with_its_place(roll):
 )
 def test_what_cannot_be_followed_is_told_with_its_place_and_reason(step, reason):
     T = SEVEN.forward(SEVEN.home)
-    with pytest.raises(PlanningError, match=rf"line cannot be followed at \d.* % of the way, tool at .*{reason}"):
+    with pytest.raises(PlanningError, match=rf"line cannot be followed at \d.* % of the path, tool at .*{reason}"):
         plan_line(SEVEN, SEVEN.home, Pose(T.position + step, T.wxyz))

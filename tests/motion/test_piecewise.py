@@ -77,7 +77,7 @@ def test_joined_pieces_follow_each_joints_own_pieces():
         ([0.0, 1.0], np.full((1, 2, 1), np.inf), "finite"),
         ([0.5, 1.0], np.zeros((1, 2, 1)), "begin at 0"),
         ([0.0, 2.0, 1.0], np.zeros((2, 2, 1)), "never decrease"),
-        ([0.0, 1.0], np.zeros((1, 0, 1)), "a joint and a power"),
+        ([0.0, 1.0], np.zeros((1, 0, 1)), "one joint and one power"),
     ],
 )
 def test_unsound_pieces_are_refused_in_words(breaks, coefficients, word):

@@ -19,7 +19,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.blend import build_blend
 from rcilab.motion.segment import build_segments
-from rcilab.motion.segment_spline import build_chain
+from rcilab.motion.segment_spline import build_segment_spline
 
 TOOL = Pose((0.0, 0.02, 0.1))
 MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda")}
@@ -114,9 +114,9 @@ def require_joint_limits(model, motion):
 
 
 def radius_at(segments, i):
-    """The radius that the tool may leave its way within at the end of a segment; 0 where it stops."""
+    """The radius that the tool may exit_share its way within at the end of a segment; 0 where it stops."""
     waypoint, ahead = segments[i].waypoint, segments[i + 1 : i + 2]
-    is_stop = waypoint.dwell > 0.0 or not ahead or segments[i].stands or ahead[0].stands
+    is_stop = waypoint.dwell > 0.0 or not ahead or segments[i].is_stationary or ahead[0].is_stationary
     return 0.0 if is_stop else waypoint.blend
 
 
@@ -192,20 +192,20 @@ def test_every_pair_of_types_blends_inside_the_radius(name, seed, first, second,
         before, after = build_segments(model, program(model, *two))
     except PlanningError:
         assume(False)
-    assume(not before.stands and not after.stands)
+    assume(not before.is_stationary and not after.is_stationary)
     blend = build_blend(model, before, after)
     assert 0.0 < blend.radius <= radius
-    assert 0.5 <= blend.leave <= 1.0
-    assert 0.0 <= blend.join <= 0.5
-    chain = build_chain(model, [before, after], [blend], 1.0)
-    steps = np.diff(chain.knots)[:, np.newaxis]
-    powers = [power[:, : model.n] for power in chain.powers]
+    assert 0.5 <= blend.exit_share <= 1.0
+    assert 0.0 <= blend.entry_share <= 0.5
+    spline = build_segment_spline(model, [before, after], [blend], 1.0)
+    steps = np.diff(spline.knots)[:, np.newaxis]
+    powers = [power[:, : model.n] for power in spline.powers]
     for _ in range(3):
         end = sum(power * steps**order for order, power in enumerate(powers))
         assert np.abs(end[:-1] - powers[0][1:]).max() < 1e-9
         powers = [float(order) * power for order, power in enumerate(powers)][1:]
-    s = np.concatenate((np.linspace(0.0, chain.knots[-1], 150), np.linspace(-0.5, 0.5, 150) + chain.middles[0]))
-    points = model.position_path(chain.sample(s)[0][:, : model.n])
+    s = np.concatenate((np.linspace(0.0, spline.knots[-1], 150), np.linspace(-0.5, 0.5, 150) + spline.corners[0]))
+    points = model.position_path(spline.sample(s)[0][:, : model.n])
     ways = [segment.positions(model, np.linspace(0.0, 1.0, 2001)) for segment in (before, after)]
     off = np.minimum(*(distance_to_way(points, way) for way in ways))
     away = np.sqrt(((points - after.positions(model, np.zeros(1))[0]) ** 2).sum(axis=1))
@@ -396,7 +396,7 @@ def test_a_line_to_angles_on_another_branch_is_refused():
     [
         (("xMatePro7", program(SEVEN, Waypoint.joint(SEVEN.home))), "is a name; use load_model"),
         ((SEVEN, "program.json"), "program must be a Program"),
-        ((SIX, program(SEVEN, Waypoint.joint(SEVEN.home))), "is the arm it is for, not xMate3"),
+        ((SIX, program(SEVEN, Waypoint.joint(SEVEN.home))), "is the model of the program, not xMate3"),
         ((SEVEN, program(SEVEN, Waypoint.joint(SEVEN.home)), 0.0), "speed must be above 0.*, got 0.0"),
         (
             (SEVEN, program(SEVEN, Waypoint.joint(SEVEN.home, speed=0.002)), 0.1),

@@ -22,7 +22,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, located_json, plan_program
 from rcilab.motion.program_file import SCHEMA
-from rcilab.motion.waypoint import ALLOWED, ALWAYS, WORDS
+from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS
 
 MODEL = load_model("xMatePro7")
 HOME = MODEL.forward(MODEL.home)
@@ -131,18 +131,18 @@ def test_the_schema_knows_what_the_class_knows():
     schema = validator().schema
     validator().check_schema(schema)
     properties = schema["$defs"]["waypoint"]["properties"]
-    assert set(properties) == {"type", *ALWAYS, *(name for names in ALLOWED.values() for name in names)}
+    assert set(properties) == {"type", *COMMON_FIELDS, *(name for names in ALLOWED.values() for name in names)}
     assert properties["type"]["enum"] == list(ALLOWED)
     for key, default in (("speed", 0.2), ("blend", 0.0), ("dwell", 0.0)):
         assert properties[key]["default"] == default
-    for key, words in WORDS.items():
+    for key, words in CHOICES.items():
         assert properties[key]["enum"] == list(words)
         assert properties[key]["default"] == words[0]
     alone = {**schema, "$ref": "#/$defs/waypoint", "required": [], "properties": {}, "additionalProperties": True}
     waypoint_alone = validator().evolve(schema=alone)
     for kind, allowed in ALLOWED.items():
         assert waypoint_alone.is_valid({"type": kind, **_least(kind)})
-        for key in set(properties) - {"type", *ALWAYS, *allowed}:
+        for key in set(properties) - {"type", *COMMON_FIELDS, *allowed}:
             value = {"angle": 1.0, "psi": 1.0, "orientation": "held", "way": "longer"}.get(key, [1.0, 0.0, 0.0])
             assert not waypoint_alone.is_valid({"type": kind, **_least(kind), key: value}), (kind, key)
 
@@ -173,10 +173,10 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
 @pytest.mark.parametrize(
     ("waypoint", "hint"),
     [
-        ('{"type": "nullspace", "psi": NaN}', "line 6: NaN is no value"),
+        ('{"type": "nullspace", "psi": NaN}', "line 6: NaN is not a value"),
         ('{"type": "nullspace", "psi": 1e400}', "line 6: 1e400 is beyond the largest number, 1.8e308"),
-        ('{"type": "nullspace", "psi": -Infinity}', "line 6: -Infinity is no value"),
-        ('{"type": "nullspace", "psi": 0x10}', "line 6: 0x10 is no value"),
+        ('{"type": "nullspace", "psi": -Infinity}', "line 6: -Infinity is not a value"),
+        ('{"type": "nullspace", "psi": 0x10}', "line 6: 0x10 is not a value"),
         ('{"type": "nullspace", "psi": "0.1"}', "line 6, waypoint 2, psi must be a number.*, got '0.1'"),
         ('{"type": "nullspace", "psi": true}', "line 6, waypoint 2, psi must be a number.*, got True"),
         (
@@ -194,7 +194,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "nullspace", "psi": 0.1, "sped": 1}', "line 6, waypoint 2, sped: 1.0 is unknown; known: type, q,"),
         (
             '{"type": "nullspace", "psi": 0.1, "psi": 0.1}',
-            'line 6: "psi" is there already, in line 6; keep one|is there already',
+            'line 6: "psi" is a duplicate of the key in line 6; keep one|is a duplicate of the key in line 6',
         ),
         ('{"type": "nullspace", "psi": 0.1, "q": [1]}', "q: .* has no meaning here; nullspace takes: psi, way, speed"),
         ('{"psi": 0.1}', "line 6, waypoint 2, type is missing; known: joint, line"),
@@ -204,7 +204,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ('{"type": "line", "position": [0.5, 0, 0.5]}', r"wxyz is missing: a pose has position"),
         (
             '{"type": "line", "position": [500, 0, 500], "wxyz": [1,0,0,0]}',
-            "position: .* is beyond 10 m; millimetres divided",
+            "position: .* is beyond 10 m; if it is in millimetres",
         ),
         ('{"type": "line", "position": [0.5, 0], "wxyz": [1,0,0,0]}', r"position: .* has shape \(2,\), needs \(3,\)"),
         ('{"type": "line", "position": [0.5, 0, [1]], "wxyz": [1,0,0,0]}', "position, number 3 must be a number"),
@@ -222,7 +222,7 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ),
         (
             '{"type": "joint", "q": [0,90,0,0,0,0,0]}',
-            "q: 90.0 rad of joint 2 is more than two turns, 12.57 rad; degrees",
+            "q: 90.0 rad of joint 2 is more than two turns, 12.57 rad; multiply degrees",
         ),
         ('{"type": "circle", "center": [0.5, 0, 0.5], "axis": [0,0,0]}', "axis: .* has no direction"),
         (
@@ -243,9 +243,9 @@ GOOD = '{"type": "nullspace", "psi": 0.1}'
         ),
         ('{"type": "arc", "q": [0,0,0,0,0,0,0]}', "via is missing: arc needs via"),
         ('{"type": "line" "q": 1}', 'line 6: "q" is neither a comma|is neither a comma nor the end of the object'),
-        ('{"type": "line", q: 1}', "line 6: q is no key; a key is text in double quotes"),
-        ('{"type" "line"}', "is no colon; one must follow the key 'type'"),
-        ('{"type": "li\nne"}', "line 6: .* is no text: invalid control character"),
+        ('{"type": "line", q: 1}', "line 6: q is not a key; a key is text in double quotes"),
+        ('{"type" "line"}', "is not a colon; the key 'type' needs one"),
+        ('{"type": "li\nne"}', "line 6: .* is not valid text: invalid control character"),
         ('{"type": "line", "q": [1 2]}', "line 6: 2 is neither a comma nor the end of the list"),
         ('{"type": "line", "q": [[[[[[[[1]]]]]]]]}', "line 6: .* opens more than 8 levels"),
     ],
@@ -259,13 +259,13 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("", "line 1: the end of the text is no value"),
+        ("", "line 1: the end of the text is not a value"),
         ("[]", r"line 1 must be a program: an object.*, got \[\]"),
-        ('{"waypoints"', "line 1: the end of the text is no colon"),
-        (lines(GOOD) + "{}", "line 8: { follows after the end|follows after the end of the first value"),
+        ('{"waypoints"', "line 1: the end of the text is not a colon"),
+        (lines(GOOD) + "{}", "line 8: { follows the end|follows the end of the first value"),
         (lines(GOOD, head='"format": "x", "version": 1'), "line 2, format must be 'rcilab program'.*, got 'x'"),
         (lines(GOOD, head='"version": 1'), 'format is missing; a program has "rcilab program"'),
-        (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is no robot: .*known robots: .*xMatePro3"),
+        (lines(GOOD, model="kuka"), "line 3, model: 'kuka' is not a known model: .*known robots: .*xMatePro3"),
         (
             lines(GOOD, model="xMate3", start=[0.1] * 6),
             r"line 5, waypoint 1 \(nullspace\), psi: 0.1 has no meaning for xMate3",
@@ -285,7 +285,7 @@ def test_what_is_wrong_with_a_waypoint_is_told_with_its_line_key_value_and_bound
         (lines(GOOD).replace(f"[\n    {GOOD}\n  ]", "{}"), "line 4, waypoints must be a list.*, got {}"),
         ("[" * 100_000, "opens more than 8 levels"),
         (" " * 8_000_001, "8.0 MB is above 8 MB"),
-        ("\ud800", "line 1: .* is no text in UTF-8"),
+        ("\ud800", "line 1: .* is not UTF-8 text"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_told(text, hint):
@@ -330,7 +330,7 @@ def test_values_from_python_are_checked_as_well():
 
 
 def test_a_position_alone_is_no_target_and_the_error_says_what_is() -> None:
-    with pytest.raises(InvalidValueError, match=r"target: \[0\.5, 0, 0\.3\] is not a target: give a Pose"):
+    with pytest.raises(InvalidValueError, match=r"target: \[0\.5, 0, 0\.3\] is not a target: pass a Pose"):
         Waypoint.line([0.5, 0, 0.3])
 
 

@@ -88,7 +88,7 @@ def test_an_error_has_the_number_of_its_waypoint_and_one_on_the_way_to_the_start
     with pytest.raises(PlanningError, match=r"waypoint 4 \(line\)") as caught:
         plan_program(MODEL, far, start=np.array(MODEL.home) + 0.1)
     assert caught.value.waypoint == 4
-    with pytest.raises(PlanningError, match="the way to the start") as caught:
+    with pytest.raises(PlanningError, match="the move to the start") as caught:
         plan_program(MODEL, PROGRAM, start=MODEL.limits.joint.upper + 0.1)
     assert caught.value.waypoint is None
 

@@ -97,11 +97,11 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
-        ("", {}, "moves.csv' holds no rows"),
-        ("t,q1\n", {}, "no rows below its header"),
-        ("0,1\n0.1,x\n", {}, "line 2: 'x' in column 2 is no finite number"),
+        ("", {}, "moves.csv' has no rows"),
+        ("t,q1\n", {}, "no rows below the header"),
+        ("0,1\n0.1,x\n", {}, "line 2: 'x' in column 2 is not a finite number"),
         ("# a\n\nt,q1\n0,1\n0.1,nan\n", {}, "line 5: 'nan' in column 2"),
-        ("0;1,5\n1;1,6\n", {}, "line 1: '1,5' in column 2 is no finite number; decimals need a point"),
+        ("0;1,5\n1;1,6\n", {}, "line 1: '1,5' in column 2 is not a finite number; use a point for decimals"),
         ("0,1,2\n0.1,1\n", {}, "line 2: 2 columns; the first line has 3"),
         ("0,1,2\n0.1\n", {}, "line 2: 1 column; the first line has 3"),
         ("0,1\n0.1,1\n0.1,1\n", {}, "line 3: 0.1 s is not later than the sample before"),
@@ -113,7 +113,7 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("q1,q2\n0,1\n", {}, "no times; pass rate_hz"),
         ("t,q1\n0,1\n", {"rate_hz": 100}, "is not needed"),
         ("t,q1\n0,1\n1,90\n", {}, r"line 3: 90.0 rad of joint 1 .*unit='deg'"),
-        (b"t,q1\n0,1\n\xff\xfe,2\n", {}, "line 3: .*no text in UTF-8"),
+        (b"t,q1\n0,1\n\xff\xfe,2\n", {}, "line 3: .*not UTF-8 text"),
         ("t,q1\n0,1\n", {"unit": "gon"}, "unit: 'gon' is unknown; known: rad, deg"),
         ("0,1\n", {"rate_hz": 0}, "rate_hz must be above 0.*, got 0.0"),
     ],
@@ -128,7 +128,7 @@ def test_a_bad_csv_is_named_with_its_line_in_one_sentence(tmp_path, text, option
 @pytest.mark.parametrize(
     ("arrays", "message"),
     [
-        ({"x": np.zeros(3)}, r"holds no array q of joint angles \(found: x\)"),
+        ({"x": np.zeros(3)}, r"has no array q of joint angles \(found: x\)"),
         ({"q": np.zeros(3)}, r"needs shape \(N, n\)"),
         ({"q": np.zeros((3, 8)), "t": np.arange(3.0)}, "at most 7 joints"),
         ({"q": np.zeros((3, 7)), "t": np.zeros(2)}, r"t: .* needs \(3,\)"),
@@ -145,7 +145,7 @@ def test_a_bad_npz_is_named_with_its_row(tmp_path, arrays, message):
 
 def test_what_is_no_file_of_samples_is_named(tmp_path):
     PLANNED.save(tmp_path / "saved.npz")
-    with pytest.raises(InvalidValueError, match=r"saved motion; Motion\.load reads it"):
+    with pytest.raises(InvalidValueError, match=r"saved motion; load it with Motion\.load"):
         Motion.load_samples(tmp_path / "saved.npz")
     with pytest.raises(InvalidValueError, match="does not exist"):
         Motion.load_samples(tmp_path / "none.csv")
@@ -179,7 +179,7 @@ def test_times_that_do_not_increase_are_refused():
 
 def test_samples_that_go_on_for_hours_are_refused_before_they_fill_the_memory(tmp_path):
     with pytest.raises(
-        InvalidValueError, match=r"duration: 1000000000\.0 s is more than 7200 s, .* are the times in s"
+        InvalidValueError, match=r"duration: 1000000000\.0 s is more than 7200 s, .* check that times are in s"
     ):
         Motion.load_samples(file_of(tmp_path, "t,q1\n0,0.1\n1e9,0.2\n"))
     with pytest.raises(InvalidValueError, match="duration"):

@@ -34,14 +34,14 @@ def test_held_and_gone_on_with_it_keeps_every_condition_and_arrives(plan, speed,
     motion = plan(speed)
     cycle = int(share * len(motion))
     held = plan_speed_override(as_planned(motion), cycle, 0.0, MODEL, "joint_position")
-    if not held.holds:  # So near to its end it arrives before it could be held.
+    if not held.is_held:  # So near to its end it arrives before it could be held.
         assert np.array_equal(held.q[-1], motion.goal)
         return
     assert np.array_equal(held.q[: cycle + 1], motion.q[: cycle + 1])
     on = plan_speed_override(held, len(held.q) + 700, 0.4, MODEL, "joint_position")
     on = plan_speed_override(on, len(held.q) + 1000, 1.0, MODEL, "joint_position")
     assert np.array_equal(on.q[-1], motion.goal)
-    assert on.place[-1] == motion.duration
+    assert on.plan_time[-1] == motion.duration
     assert check(on.as_motion(), MODEL, distance=None).ok
 
 
@@ -49,9 +49,9 @@ def test_the_way_stays_the_same():
     motion = joint_motion(0.5)
     slow = plan_speed_override(as_planned(motion), 300, 0.5, MODEL, "joint_position")
     for row in range(0, len(slow.q) - 1, 97):
-        assert slow.q[row] == pytest.approx(motion.at(float(slow.place[row])).q, abs=1e-12)
+        assert slow.q[row] == pytest.approx(motion.at(float(slow.plan_time[row])).q, abs=1e-12)
     assert slow.duration > motion.duration
-    assert (np.diff(slow.place) >= 0.0).all()
+    assert (np.diff(slow.plan_time) >= 0.0).all()
 
 
 def test_a_change_in_the_middle_of_a_change_continues_it():
@@ -71,7 +71,7 @@ def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rat
     run = paced.as_motion()
     assert np.array_equal(run.q, paced.q)
     for row in range(1, len(paced.q) - 1, 41):
-        there, rate, drate = motion.at(float(paced.place[row])), paced.rate[row], paced.drate[row]
+        there, rate, drate = motion.at(float(paced.plan_time[row])), paced.rate[row], paced.drate[row]
         assert run.dq[row] == pytest.approx(there.dq * rate, abs=1e-12)
         assert run.ddq[row] == pytest.approx(there.ddq * rate**2 + there.dq * drate, abs=1e-9)
     assert not run.dq[-1].any()
@@ -102,7 +102,7 @@ def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, speed_ov
     assert np.array_equal(slow.q[0], motion.q[0])
     assert np.array_equal(slow.q[-1], motion.goal)
     for row in range(0, len(slow.q) - 1, 97):
-        assert slow.q[row] == pytest.approx(motion.at(float(slow.place[row])).q, abs=1e-12)
+        assert slow.q[row] == pytest.approx(motion.at(float(slow.plan_time[row])).q, abs=1e-12)
     assert check(slow.as_motion(), MODEL, distance=None, mode=mode).ok
     fast = plan_speed_override(slow, 200, 1.0, MODEL, mode)
     assert np.array_equal(fast.q[-1], motion.goal)
@@ -120,8 +120,8 @@ def test_nothing_asked_for_leaves_the_motion_itself():
     assert paced.as_motion() is motion
     assert plan_start(motion, 1.0, MODEL, "joint_position").as_motion() is motion
     assert paced.q is motion.q
-    assert paced.place_at(10) == pytest.approx(10 * CYCLE_TIME)
-    assert not paced.holds
+    assert paced.plan_time_at(10) == pytest.approx(10 * CYCLE_TIME)
+    assert not paced.is_held
 
 
 @pytest.mark.parametrize("speed_override", [0.0, 0.05, 1.01, np.nan, "fast"])

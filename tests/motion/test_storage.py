@@ -46,8 +46,8 @@ def test_a_motion_goes_through_a_stream():
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"kind": "holiday photos"}, "holds no motion"),
-        ({"kind": None}, "holds no motion"),
+        ({"kind": "holiday photos"}, "does not contain a motion"),
+        ({"kind": None}, "does not contain a motion"),
         ({"goal": None}, "incomplete"),
         ({"speed": 3.0}, "speed"),
         ({"law": "teleport"}, "law"),
@@ -164,7 +164,7 @@ def test_no_text_of_numpy_or_zip_reaches_the_user(tmp_path):
 
 def test_another_version_says_what_to_do_with_the_file(tmp_path):
     np.savez(tmp_path / "x.npz", **fields(version=VERSION + 1))
-    with pytest.raises(VersionMismatchError, match="plan the motion again") as caught:
+    with pytest.raises(VersionMismatchError, match="plan and save the motion again") as caught:
         Motion.load(tmp_path / "x.npz")
     assert "both sides" not in str(caught.value)
 
@@ -197,7 +197,7 @@ def test_samples_say_their_rate():
     assert Motion.from_samples(rows, times=0.02 * np.arange(len(rows))).duration == pytest.approx(
         0.02 * (len(rows) - 1)
     )
-    with pytest.raises(InvalidValueError, match=r"^dt is missing: pass the seconds .* go into Motion\.from_cycles$"):
+    with pytest.raises(InvalidValueError, match=r"^dt is missing: pass the seconds .* use Motion\.from_cycles$"):
         Motion.from_samples(rows)
     with pytest.raises(InvalidValueError, match=r"^dt: 0\.01 is not needed"):
         Motion.from_samples(rows, dt=0.01, times=[0.0])

@@ -62,7 +62,7 @@ def test_a_program_runs_by_the_s_profile_where_it_stops_at_every_waypoint():
     line = plan_line(MODEL, MODEL.home, away, speed=0.2, law="s_profile")
     assert np.array_equal(motion.q[: len(line)], line.q)
     assert motion.law == "s_profile"
-    with pytest.raises(PlanningError, match="blend 20 mm, but by the S profile the tool stops at every waypoint"):
+    with pytest.raises(PlanningError, match="blend 20 mm, but with the S profile the tool stops at every waypoint"):
         plan_program(MODEL, program(0.02), law="s_profile")
     with pytest.raises(InvalidValueError, match="known: jerk_limited, torque_rate_limited, s_profile"):
         plan_program(MODEL, program(0.0), law="fast")

@@ -183,7 +183,7 @@ class JogActions:
         if float(np.abs(preview.q - state.goal.q).max()) > _SAME:
             self._goal.pose(preview.q)
         if press is None:
-            self._preview = None if preview.is_at_rest else preview
+            self._preview = None if preview.is_stationary else preview
         elif float(np.abs(preview.dq).max()) < STILL:
             change_jog(self._store, said=at_limit(state.model, preview.q, press.axis))
 

@@ -46,4 +46,4 @@ def played_at(state: UiState, moment: float) -> float:
 def moment_played(state: UiState, t: float) -> float:
     """Returns which moment of the plan was run at a time, [s]."""
     paced = paced_of(state)
-    return t if paced is None else paced.place_at(round(t / CYCLE_TIME))
+    return t if paced is None else paced.plan_time_at(round(t / CYCLE_TIME))
