@@ -10,7 +10,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
-from rcilab.app.text import message
+from rcilab.i18n.translator import message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

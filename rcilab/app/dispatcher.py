@@ -34,10 +34,10 @@ from rcilab.app.setup.configuration_state import name_parts
 from rcilab.app.setup.setup_actions import SetupActions, is_setup_field
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import memory_needed
+from rcilab.i18n.translator import message
 
 _TICK = 0.03  # [s] About the display's rate; also how often the robot is looked at.
 _AGAIN = 1.0  # [s] A page that acts without the controls is answered once in that time.

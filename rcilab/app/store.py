@@ -17,8 +17,8 @@ from rcilab.app.run.active_force import PushState
 from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.app.state_store import StateStore
-from rcilab.app.text import Message
 from rcilab.core.safety_box import SafetyBox
+from rcilab.i18n.translator import Message
 from rcilab.i18n.units import USUAL, Units
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from rcilab.app.learn.learn_state import exhibited
 from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
-from rcilab.app.text import LANGUAGES, message
+from rcilab.i18n.locale import LANGUAGES
+from rcilab.i18n.translator import message
 from rcilab.i18n.units import ANGLES, LENGTHS
 
 if TYPE_CHECKING:

@@ -12,10 +12,11 @@ import numpy as np
 
 from rcilab.app.control_lock import ControlLock
 from rcilab.app.request import Request, TypeField
-from rcilab.app.text import Message, Text
+from rcilab.app.text import Text
 from rcilab.app.view_actions import DropProblem
 from rcilab.core.spatial import Pose
 from rcilab.i18n.rounding import format_fixed
+from rcilab.i18n.translator import Message
 from rcilab.i18n.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.status_text import tell_error
-from rcilab.app.text import Text, message
+from rcilab.app.text import Text
 from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
 from rcilab.conformance.limit_violation import LimitViolation
@@ -24,7 +24,7 @@ from rcilab.core.spatial import Pose
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
-from rcilab.i18n.translator import Remark
+from rcilab.i18n.translator import Remark, message
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.driver.address import RciAddress

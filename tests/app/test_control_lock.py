@@ -11,9 +11,9 @@ from rcilab.app.control_lock_actions import AnswerControls, ControlLockActions, 
 from rcilab.app.dispatcher import Dispatcher
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.store import Store, UiState
-from rcilab.app.text import message
 from rcilab.app.view_actions import Seek
 from rcilab.control_process import SupervisorStatus
+from rcilab.i18n.translator import message
 from rcilab.model.robot_model import load_model
 
 MODEL = load_model("xMatePro7")

@@ -9,16 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
+from rcilab.app.text import Text
+from rcilab.i18n.catalogue import load_ui_catalogue
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.number_parsing import parse_number
-from rcilab.i18n.translator import ComparedValue
+from rcilab.i18n.translator import ComparedValue, message
 from rcilab.i18n.units import SI, Unit, Units
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_every_unit_in_a_catalogue_belongs_to_a_variable(language):
     """What does not would stay as it is when the units change, beside numbers that do not."""
-    for code, entry in load_catalogue(language).items():
+    for code, entry in load_ui_catalogue("rcilab.app", language).items():
         if code.startswith(("unit.", "source.", "limit.")):  # The last two quote the makers' manuals.
             continue
         bare = re.sub(r"\{[^}]*\}", "", entry)

@@ -6,7 +6,7 @@ import numpy as np
 
 from browser.page import close_toasts
 from rcilab.app.goal.goal_actions import SetSpeed
-from rcilab.app.text import message
+from rcilab.i18n.translator import message
 
 
 def test_plan_check_execute_and_the_arm_arrives(page):

@@ -9,8 +9,9 @@ import time
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
-from rcilab.app.text import Text, message
+from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
+from rcilab.i18n.translator import message
 from rcilab.i18n.units import USUAL
 
 

@@ -17,10 +17,11 @@ from rcilab.app.run.played_motion import played_path
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
-from rcilab.app.text import Text, load_catalogue
+from rcilab.app.text import Text
 from rcilab.app.view_actions import ShowPlot
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.core.state import MODES
+from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.rokae.controller.settings import Settings
@@ -98,7 +99,7 @@ def test_what_the_page_takes_for_defaults_is_what_the_virtual_controller_wakes_u
 def test_every_part_says_its_unit_and_range_and_has_its_words():
     groups = parameters_of(MODEL)
     assert format_ranges(find_group(groups, "joint_stiffness")) == "[0…3000, 300 N·m/rad]"
-    words = load_catalogue("en")
+    words = load_ui_catalogue("rcilab.app", "en")
     for mode in MODES:
         assert {f"mode.{mode}", f"mode.{mode}_note"} <= words.keys()
     assert {f"control.{group.name}" for group in groups} <= words.keys()

@@ -17,7 +17,9 @@ from rcilab.app.learn.learn_state import exhibited
 from rcilab.app.learn.lessons import LESSONS, lessons_of
 from rcilab.app.run.recording import Recording
 from rcilab.app.store import Store, UiState
-from rcilab.app.text import LANGUAGES, Text, load_catalogue
+from rcilab.app.text import Text
+from rcilab.i18n.catalogue import load_ui_catalogue
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -135,7 +137,7 @@ def test_an_arm_of_six_axes_is_told_that_it_has_no_elbow() -> None:
 
 
 def test_every_button_step_and_lesson_has_words() -> None:
-    known = set(load_catalogue("en"))
+    known = set(load_ui_catalogue("rcilab.app", "en"))
     wanted = {f"label.{fault.key}" for fault in Fault}
     wanted |= {f"lesson.{name}" for name in LESSONS}
     wanted |= {f"lesson.{name}.{step.name}" for name, steps in LESSONS.items() for step in steps}

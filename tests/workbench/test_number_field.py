@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from rcilab.app.request import Request, TypeField
-from rcilab.app.text import message
 from rcilab.app.view_actions import DropProblem
+from rcilab.i18n.translator import message
 from rcilab.workbench import widgets
 from rcilab.workbench.widgets import BoundControl, NumberField
 

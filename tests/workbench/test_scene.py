@@ -17,10 +17,11 @@ from rcilab.app.goal.goal_actions import SETTLED, GoalActions, MoveTarget, PlanG
 from rcilab.app.request import TypeField
 from rcilab.app.scene.scene_actions import DragElbow, HighlightBranch, SceneActions, ShowExtra, ShowViolation
 from rcilab.app.store import Store, UiState
-from rcilab.app.text import LANGUAGES, Text
+from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.model.robot_model import load_model
 from rcilab.workbench.live import Here, Home, LiveChannel, PageMessage, Peek
 from rcilab.workbench.panels.branches import BranchesPanel

@@ -21,12 +21,13 @@ from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
 from rcilab.app.setup.configuration_state import SetupState, describe_held, describe_part, pending_parts, setup_obstacle
 from rcilab.app.setup.setup_actions import MoveSetup, OpenTab, PressSetup, ResizeBox, SetSetup
 from rcilab.app.setup.setup_fields import FACE_NAMES, FIELD_NAMES, faces, read_field, with_field
-from rcilab.app.text import Message, Text
+from rcilab.app.text import Text
 from rcilab.app.view_actions import SetView
 from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import CommandRejectedError
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message
 from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration
 from rcilab.makers.rokae import wire as rci
 from rcilab.workbench.app import Workbench

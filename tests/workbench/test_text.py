@@ -10,12 +10,15 @@ import pytest
 import rcilab
 from rcilab.app.planning import LAWS
 from rcilab.app.status_text import tell_remedy
-from rcilab.app.text import LANGUAGES, Text, load_catalogue, message
+from rcilab.app.text import Text
 from rcilab.app.view_actions import QUALITIES
 from rcilab.control_process.status import PHASES
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.state import ControllerMode, RobotMode
 from rcilab.i18n.catalogue import load_catalogue as load_room_catalogue
+from rcilab.i18n.catalogue import load_ui_catalogue
+from rcilab.i18n.locale import LANGUAGES
+from rcilab.i18n.translator import message
 from rcilab.makers.maker import all_makers
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from tests.catalogues import require_equal
@@ -25,7 +28,7 @@ SOURCES = sorted(path for part in ("app", "workbench") for path in (_ROOT / part
 
 
 def test_every_language_has_the_same_keys_and_places_to_fill():
-    require_equal(load_catalogue, LANGUAGES)
+    require_equal(lambda language: load_ui_catalogue("rcilab.app", language), LANGUAGES)
 
 
 def test_no_key_of_the_page_is_also_a_shared_one():
@@ -34,7 +37,7 @@ def test_no_key_of_the_page_is_also_a_shared_one():
 
 
 def test_every_key_written_in_the_code_exists():
-    known = load_catalogue("en")
+    known = load_ui_catalogue("rcilab.app", "en")
     written = {
         key
         for path in SOURCES
@@ -46,7 +49,7 @@ def test_every_key_written_in_the_code_exists():
 
 
 def test_every_name_that_becomes_a_key_has_one():
-    known = set(load_catalogue("en"))
+    known = set(load_ui_catalogue("rcilab.app", "en"))
     wanted = [f"condition.{row.id}" for row in RCI_CONDITIONS.conditions]
     wanted += [f"phase.{phase}" for phase in PHASES]
     wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from rcilab.app.text import Message
+from rcilab.i18n.translator import Message
 
 if TYPE_CHECKING:
     from rcilab.app.planning import Plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rcilab.app.setup.configuration_state import name_parts
-from rcilab.app.text import Message, message
+from rcilab.i18n.translator import Message, message
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

@@ -8,11 +8,11 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.errors import KinematicsError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message, message
 from rcilab.model.kinematics.elbow_circle import ElbowCircle
 from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs
 from rcilab.model.robot_model import RobotModel

@@ -18,10 +18,10 @@ from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
 from rcilab.app.state_store import StateStore
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
+from rcilab.i18n.translator import Message, message
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"

@@ -10,10 +10,9 @@ from typing import Literal
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.i18n.error_messages import describe_error
-from rcilab.i18n.translator import LiteralText
+from rcilab.i18n.translator import LiteralText, message
 from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
 
 

@@ -12,10 +12,10 @@ from rcilab.app.arm_features import tell_lack_to_run
 from rcilab.app.request import Moving
 from rcilab.app.setup.configuration_state import setup_obstacle
 from rcilab.app.status_text import tell_status
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.i18n.translator import Message, message
 from rcilab.motion.online import POSITION_MARGIN
 from rcilab.motion.twist import DAMPED_BELOW
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from rcilab.app.goal.target_status import evaluate_pose
 from rcilab.app.jog.jog_state import AXES, Axis, Frame, JogState, at_limit
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message, message
 from rcilab.motion.online import POSITION_MARGIN
 
 if TYPE_CHECKING:

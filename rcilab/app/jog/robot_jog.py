@@ -32,9 +32,9 @@ from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.core.clearance import ADVISED_DISTANCE, link_name
 from rcilab.core.errors import RcilabError
+from rcilab.i18n.translator import message
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus

@@ -19,10 +19,10 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.recording import Recording
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode
+from rcilab.i18n.translator import message
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

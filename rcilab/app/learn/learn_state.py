@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rcilab.app.run.recording import Recording
-from rcilab.app.text import Message
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.fault import FaultCode
+from rcilab.i18n.translator import Message
 
 if TYPE_CHECKING:
     from rcilab.app.exhibition import Exhibition

@@ -13,9 +13,9 @@ from rcilab.app.program.waypoint_fields import default_via, proposed
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.translator import Message, message
 from rcilab.motion.waypoint import Waypoint
 
 LONGEST_NAME = 80

@@ -18,11 +18,11 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
 from rcilab.i18n.error_messages import describe_error
+from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import load_model
 from rcilab.motion.program import Program
 

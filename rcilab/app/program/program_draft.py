@@ -9,9 +9,8 @@ import numpy as np
 
 from rcilab.app.goal.target_status import Tone
 from rcilab.app.planning import Plan
-from rcilab.app.text import Message, message
 from rcilab.core.spatial import Pose
-from rcilab.i18n.translator import Remark
+from rcilab.i18n.translator import Message, Remark, message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.program import Program
 from rcilab.motion.waypoint import Floats, Waypoint, WaypointType

@@ -8,7 +8,7 @@ from typing import Any
 
 from rcilab.app.program.program_draft import Draft, ProgramState
 from rcilab.app.store import Store
-from rcilab.app.text import Message, message
+from rcilab.i18n.translator import Message, message
 
 _UNDO_DEPTH = 200
 

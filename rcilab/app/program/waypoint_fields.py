@@ -10,11 +10,11 @@ import numpy as np
 
 from rcilab.app.goal.goal_actions import FURTHEST, POSE_FIELDS
 from rcilab.app.program.program_draft import Draft, target_of
-from rcilab.app.text import Message
 from rcilab.core.arrays import Array
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint

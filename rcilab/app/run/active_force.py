@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.app.text import Message, message
 from rcilab.core.arrays import JointVector, Vector3
+from rcilab.i18n.translator import Message, message
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState

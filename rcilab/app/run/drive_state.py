@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from rcilab.app.run.mode_parameters import control_obstacle, find_group, is_control_pending
-from rcilab.app.text import Message
 from rcilab.core.state import Mode
+from rcilab.i18n.translator import Message
 from rcilab.makers.configuration import ControllerParameters
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import ParameterGroup

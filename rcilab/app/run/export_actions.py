@@ -13,8 +13,8 @@ from typing import IO, TYPE_CHECKING, TypeAlias
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.status_text import tell_error
-from rcilab.app.text import message
 from rcilab.core.errors import RcilabError
+from rcilab.i18n.translator import message
 from rcilab.recording.export import write_export
 from rcilab.recording.optional_deps import MissingExtraError
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
-from rcilab.app.text import message
+from rcilab.i18n.translator import message
 from rcilab.recording.folder import keep_newest, stored_runs
 
 KEEPS = (100, 20, 5, 0)

@@ -16,10 +16,10 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_override_refusal
 from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.state_store import StateStore
-from rcilab.app.text import Message, message
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import MODES, Mode
 from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters

@@ -12,7 +12,7 @@ from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, is_moving, 
 from rcilab.app.setup.configuration_state import setup_obstacle, tool_outside
 from rcilab.app.status_text import tell_status
 from rcilab.app.store import UiState
-from rcilab.app.text import Message, message
+from rcilab.i18n.translator import Message, message
 
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus

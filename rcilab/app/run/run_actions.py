@@ -21,7 +21,6 @@ from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
 from rcilab.app.status_text import StartingError, tell_error, tell_incident
 from rcilab.app.store import Store, UiState
-from rcilab.app.text import Message, message
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import (
     SAFETY_STOP,
@@ -32,6 +31,7 @@ from rcilab.core.errors import (
     RcilabError,
     UsageError,
 )
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import load_model

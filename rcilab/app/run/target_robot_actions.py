@@ -12,8 +12,8 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
 from rcilab.app.status_text import tell_error
 from rcilab.app.store import Store
-from rcilab.app.text import message
 from rcilab.core.errors import RcilabError
+from rcilab.i18n.translator import message
 from rcilab.makers.driver import parse_address
 
 _ADDRESS = "address"

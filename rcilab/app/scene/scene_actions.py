@@ -17,7 +17,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.scene.path_strip import look_at_path
 from rcilab.app.scene.scene_extras import EXTRAS, look_at_dexterity, look_at_reach, look_at_sweep
 from rcilab.app.store import Store
-from rcilab.app.text import message
+from rcilab.i18n.translator import message
 from rcilab.views.elbow_view import OUTWARD
 
 

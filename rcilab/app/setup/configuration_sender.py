@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.connection import Connection
 from rcilab.app.status_text import StartingError, tell_error
-from rcilab.app.text import Message
 from rcilab.core.errors import RcilabError
+from rcilab.i18n.translator import Message
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.app.text import Message, message
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import (
     SETUP_PARTS,
     ForceControlFrame,

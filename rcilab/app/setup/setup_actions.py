@@ -39,10 +39,10 @@ from rcilab.app.setup.setup_fields import (
     with_pose,
 )
 from rcilab.app.store import Store, UiState
-from rcilab.app.text import Message, message
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration, SetupPart, SoftJointLimits
 from rcilab.makers.maker import capabilities_of
 from rcilab.robots import describe_robot

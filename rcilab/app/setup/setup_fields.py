@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcilab.app.setup.configuration_state import SetupState
-from rcilab.app.text import Message, message
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.dynamics.payload import LARGEST_INERTIA, Payload
 

@@ -9,8 +9,9 @@ from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.text import Text, message
+from rcilab.app.text import Text
 from rcilab.core.state import MODES, Mode
+from rcilab.i18n.translator import message
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import ParameterGroup
 from rcilab.workbench.panels.jog import problems_html

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.control_lock_actions import TakeControls
 from rcilab.app.run.run_actions import ChooseRobot
-from rcilab.app.text import LANGUAGES, Text
+from rcilab.app.text import Text
 from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
+from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.units import ANGLES, LENGTHS
 from rcilab.robots import ROBOT_NAMES
 from rcilab.views.viser_ext.message_guard import allow_spectators
