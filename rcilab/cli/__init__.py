@@ -1,4 +1,4 @@
-"""The command line: `rcilab [COMMAND]`, the workbench when no command is named."""
+"""The command line: `rcilab [COMMAND]`; without a command it starts the workbench."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from rcilab.core.errors import RcilabError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
 COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
-"""Each is a module here with `add_parser(subparsers)` and `run(args) -> int`."""
+"""Each command is a module of this package with `add_parser(subparsers)` and `run(args) -> int`."""
 
-_USAGE = 2  # Exit status of a request that cannot be served, as argparse uses it.
-_TOO_FEW_FILES = "fewer files may be open than this needs; close other programs or raise the limit: ulimit -n 256"
-_INTERRUPTED = 130  # Exit status after Ctrl-C, as shells use it.
-_CLOSED_PIPE = 141  # Exit status of a command that ended early because its output was no longer read, as shells use it.
+_USAGE = 2  # Exit status for a usage error, as in argparse.
+_TOO_FEW_FILES = "the limit of open files is too low; close other programs or raise it: ulimit -n 256"
+_INTERRUPTED = 130  # Exit status after Ctrl-C, as in shells.
+_CLOSED_PIPE = 141  # Exit status after a closed output pipe, as in shells.
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command and returns its exit status; an error of ours is one line on stderr."""
+    """Runs one command and returns its exit status; an `RcilabError` is printed on stderr without a traceback."""
     prepare_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or (arguments[0].startswith("-") and arguments[0] not in ("-h", "--help", "--version")):
         arguments.insert(0, "workbench")
-    if "_ARGCOMPLETE" in os.environ:  # The shell asks how to go on: this prints the answers and ends the process.
+    if "_ARGCOMPLETE" in os.environ:  # A request for completions: prints them and ends the process.
         import argcomplete
 
         argcomplete.autocomplete(_build_parser())
     try:
-        # A named command loads that one only; a wrong name is answered with all of them.
+        # Loads only the module of the named command; the error for an unknown command lists all of them.
         args = _build_parser(arguments[:1] if arguments[0] in COMMANDS else COMMANDS).parse_args(arguments)
         code = int(args.run(args) or 0)
         _flush()
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _flush() -> None:
-    """Writes what stdout has kept; what a reader that has gone does not take changes nothing about the exit status."""
+    """Flushes stdout; a closed pipe does not change the exit status."""
     try:
         sys.stdout.flush()
     except BrokenPipeError:

@@ -1,4 +1,4 @@
-"""`rcilab bench`: how fast this machine is, beside what we promise."""
+"""`rcilab bench`: measures the speed of this machine against the targets."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from rcilab.diagnostics.bench.measure import Absent, Measurement
 
 BENCHES = tuple(ROWS)
-"""In the order they run; the slow ones last."""
+"""In the order of execution; the slow ones are last."""
 COMPARE = "compare"
-"""Runs only when it is named: what it measures are others' packages."""
+"""Runs only if it is named, because it measures other packages."""
 
-EPILOG = """compare: the same tasks done by rcilab, ssik, pinocchio, pink and toppra, on the same poses and lines of an
-xMatePro7, in processor time of one process. Its rows are named TASK/WHO:
-  home      one answer of the inverse to a random reachable pose, asked from the home pose
-  near      the same with the arm 0.1 rad away in every joint
-  branches  every answer at 16 arm angles
+EPILOG = """compare: the same tasks with rcilab, ssik, pinocchio, pink and toppra, on the same poses and lines of an
+xMatePro7, in processor time of one process. Its rows are named TASK/PACKAGE:
+  home      one inverse kinematics solution of a random reachable pose, starting at the home pose
+  near      the same, starting 0.1 rad away in every joint
+  branches  all solutions at 16 arm angles
   line      the timing of a straight line
-They promise nothing and are not part of the default. What is not installed is a row that says what to install;
-pip install -e '.[compare]' in a checkout installs all of it.
+These rows have no targets and do not run by default. The row of a package that is not installed says what to install;
+pip install -e '.[compare]' in a checkout installs all of them.
 
 examples:
   rcilab bench inverse plan_line
@@ -44,33 +44,33 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds `rcilab bench`."""
     parser = subparsers.add_parser(
         "bench",
-        help="measure this machine beside what we promise",
-        description="Measures how fast rcilab is on this machine, one row a task, beside what we promise.\n"
-        "Exit code: 0 every promise is kept, 1 one is not, 2 a name is unknown.",
+        help="measure this machine against the targets",
+        description="Measures how fast rcilab is on this machine, one row per task, against the targets.\n"
+        "Exit code: 0 every target is met, 1 one is not, 2 a name is unknown.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    known = f"one or more of: {', '.join(BENCHES)} (default: all of these); or {COMPARE}: us beside others' packages"
+    known = f"one or more of: {', '.join(BENCHES)} (default: all of these); or {COMPARE}: rcilab and other packages"
     parser.add_argument("names", nargs="*", metavar="NAME", help=known)
     parser.add_argument("--json", action="store_true", help="print one JSON list instead of a table")
     parser.add_argument(
         "--seconds",
         type=float,
         default=_STREAMING,
-        help="how long control_loop and spectators stream, [s] (default: %(default)s)",
+        help="duration of streaming in control_loop and spectators, [s] (default: %(default)s)",
     )
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measures and prints, the machine first; returns 1 when a promise is not kept, else 0.
+    """Prints the machine and the measurements; returns 1 if a target is not met, else 0.
 
     Raises:
-        UsageError: A bench is unknown, or the time is no time.
+        UsageError: A bench is unknown, or the duration is out of range.
     """
-    names = _chosen(args.names)
+    names = _requested(args.names)
     if not 0.5 <= args.seconds <= 600.0:
-        raise UsageError(f"--seconds {args.seconds:g} is not from 0.5 to 600 s")
+        raise UsageError(f"--seconds must be from 0.5 to 600 s, got {args.seconds:g}")
     from rcilab.diagnostics.bench.machine import describe_machine
 
     machine = describe_machine()
@@ -80,24 +80,24 @@ def run(args: argparse.Namespace) -> int:
         _print_machine(machine)
     from rcilab.diagnostics.bench.cpu_speed_monitor import CpuSpeedMonitor
 
-    kept, out, pace = True, sys.stdout, CpuSpeedMonitor()
+    is_met, out, speed = True, sys.stdout, CpuSpeedMonitor()
     for name in names:
         if not args.json and sys.stderr.isatty():
             print(f"{name} ...", end="\r", file=sys.stderr, flush=True)
-        with redirect_stdout(sys.stderr), pace:  # What libraries have to say is no part of the list.
-            for found in _measured(name, args.seconds):
-                kept = kept and found.ok is not False
-                found = replace(found, note=_with_pace(found.note, pace))
+        with redirect_stdout(sys.stderr), speed:  # Output of libraries does not belong to the list.
+            for found in _measure(name, args.seconds):
+                is_met = is_met and found.ok is not False
+                found = replace(found, note=_with_slowdown(found.note, speed))
                 if args.json:
                     print(",\n" + json.dumps(found.as_json()), end="", file=out, flush=True)
                 else:
                     print(_row(found), file=out, flush=True)
     if args.json:
         print("\n]")
-    return 0 if kept else 1
+    return 0 if is_met else 1
 
 
-def _chosen(names: list[str]) -> list[str]:
+def _requested(names: list[str]) -> list[str]:
     known = (*BENCHES, COMPARE)
     unknown = [name for name in names if name not in known]
     if unknown:
@@ -105,26 +105,27 @@ def _chosen(names: list[str]) -> list[str]:
     return [name for name in known if name in (names or BENCHES)]
 
 
-def _measured(name: str, seconds: float) -> Iterable[Measurement | Absent]:
-    """Returns the rows of one name; most have a single one."""
+def _measure(name: str, seconds: float) -> Iterable[Measurement | Absent]:
     if name == COMPARE:
         from rcilab.diagnostics.bench.compare.comparison import compare
 
         return compare()
-    from rcilab.diagnostics.bench.isolated_run import measure_apart
+    from rcilab.diagnostics.bench.isolated_run import measure_isolated
 
-    return (measure_apart(name, seconds),)
+    return (measure_isolated(name, seconds),)
 
 
-def _with_pace(note: str, pace: CpuSpeedMonitor) -> str:
-    """Returns the note of a row, with a word about the machine where that was slow meanwhile."""
+def _with_slowdown(note: str, speed: CpuSpeedMonitor) -> str:
+    """Returns the note of a row; adds the slowdown if the machine was slow during the measurement."""
     from rcilab.diagnostics.bench.cpu_speed_monitor import SLOW
 
-    slowness = pace.slowness
+    slowness = speed.slowness
     if slowness < SLOW:
         return note
-    word = f"meanwhile this machine took {slowness:.1f} times as long for the same Python as at its best"
-    return f"{note}; {word}" if note else word
+    slowdown = (
+        f"during this measurement the machine took {slowness:.1f} times as long for the same Python as at its best"
+    )
+    return f"{note}; {slowdown}" if note else slowdown
 
 
 def _print_machine(machine: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""`rcilab check FILE --model NAME`: the report on a motion or program in a file, and a slowed motion that passes."""
+"""`rcilab check FILE --model NAME`: checks a motion or program in a file, and writes a slowed motion that conforms."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ def add_parser(subparsers: Any) -> None:
     parser: ArgumentParser = subparsers.add_parser(
         "check",
         help="check a saved motion or program by the robot's conditions",
-        description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles) or on "
-        "that of a program saved with Program.save. Exit code: 0 it conforms, or what was written does; 1 it does not; "
-        "2 the file or the model name is not valid, or the program cannot be planned.",
+        description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles) or on the "
+        "motion of a program (.json from Program.save). Exit code: 0 it conforms, or the written motion does; 1 it "
+        "does not; 2 the file or the model name is not valid, or the program cannot be planned.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument(
-        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); a program names its own when left out"
+        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); default for a program: its own"
     )
     parser.add_argument(
         "--slow-down",
         type=Path,
         metavar="OUT",
-        help="also write the motion (.npz), slowed down by the least factor that passes; nothing when none does",
+        help="also write the motion (.npz), slowed down by the smallest factor that conforms; nothing if none does",
     )
     parser.add_argument(
         "--mode",
         metavar="MODE",
         default="joint_position",
-        help="how it will be sent, which decides what is checked: %(default)s, cartesian_position, torque ...",
+        help="command mode, which determines the conditions: %(default)s, cartesian_position, torque ...",
     )
     add_max_rows(parser)
     form = parser.add_mutually_exclusive_group()
-    form.add_argument("--explain", choices=tuple(LANGUAGES), help="say it in whole sentences, in English or Chinese")
+    form.add_argument("--explain", choices=tuple(LANGUAGES), help="print sentences, in English or Chinese")
     form.add_argument("--json", action="store_true", help="print one JSON object instead; SI units")
     parser.set_defaults(run=run)
 
@@ -60,11 +60,11 @@ def run(args: Namespace) -> int:
 
     out: Path | None = args.slow_down
     if out is not None and out.exists() and out.samefile(args.file):
-        raise InvalidValueError("--slow-down", str(out), "is the file that is checked; name another one to write")
+        raise InvalidValueError("--slow-down", str(out), "is the file to check; choose another one")
     found = read_file(args.file, args.max_rows)
     name = found.model if args.model is None and isinstance(found, Program) else args.model
     if name is None:
-        raise UsageError("a motion does not say for which arm it is: add --model NAME, such as --model xMatePro7")
+        raise UsageError("a motion file does not name its arm: add --model NAME, such as --model xMatePro7")
     model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
     motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show, max_rows=args.max_rows)
     report = check(motion, model, mode=args.mode)

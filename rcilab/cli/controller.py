@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from rcilab.sim.controller_config import ControllerConfig
 
 DESCRIPTION = """\
-Runs the virtual controller of an arm. Any client of its maker's interface can connect to it: this package, or a C++
+Runs the virtual controller of an arm. Any client of the maker's interface can connect to it: this package, or a C++
 program that uses the vendor's client library. It prints one line when it is ready, a second one with the address of its
 world port, and ends on Ctrl-C.
 """
 
-MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, and answers whatever it finds then.
+MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, then answers the states in its buffer.
 
 _OPTIONS = {"limit table": "--limits", "client_host": "--client", "client_port": "--client"}
-"""Where an option is not called as what it sets."""
+"""Options whose names differ from those of their settings."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,46 +30,50 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser("controller", help="run a virtual controller", description=DESCRIPTION)
     parser.add_argument("--model", required=True, metavar="NAME", help="arm, such as xMatePro7")
     parser.add_argument("--host", default="127.0.0.2", metavar="ADDR", help="address to listen on (%(default)s)")
-    parser.add_argument("--port", type=int, metavar="N", help="TCP port (the interface's; RCI: 1337); 0: any free one")
+    parser.add_argument(
+        "--port", type=int, metavar="N", help="TCP port (default: that of the interface, RCI: 1337); 0: any free one"
+    )
     parser.add_argument("--udp-port", type=int, metavar="N", help="UDP port for commands (as --port); 0: any free one")
     parser.add_argument(
-        "--client", metavar="HOST[:PORT]", help="where states go from power-up on (for any client; at --port)"
+        "--client",
+        metavar="HOST[:PORT]",
+        help="destination of the states from the start on, also without a connection (port: as --port)",
     )
-    parser.add_argument("--plant", default="ideal", metavar="KIND", help="what moves: ideal or mujoco (%(default)s)")
-    parser.add_argument("--lockstep", action="store_true", help="advance a motion only as its commands come")
+    parser.add_argument("--plant", default="ideal", metavar="KIND", help="simulated arm: ideal or mujoco (%(default)s)")
+    parser.add_argument("--lockstep", action="store_true", help="advance a motion only when its commands arrive")
     parser.add_argument(
         "--mode-delay",
         type=float,
         metavar="S",
-        help="from StartMove to the new mode (1.05, for any client; lock-step: 0.02; 0.2 is enough for most)",
+        help="delay from StartMove to the new mode (1.05, for any client; lock-step: 0.02; 0.2 is enough for most)",
     )
     parser.add_argument(
         "--prefill",
         type=int,
         metavar="N",
-        help="play commands N cycles late, which absorbs jitter (10, torques 2; lock-step: 0)",
+        help="delay commands by N cycles, which absorbs jitter (10, torques 2; lock-step: 0)",
     )
     parser.add_argument(
         "--patience",
         type=float,
         metavar="S",
-        help="lock-step: how long to wait for a command (60; 0.05 with --corrupt)",
+        help="lock-step: timeout for a command (60; 0.05 with --corrupt)",
     )
     parser.add_argument(
         "--lost-limit",
         type=int,
         default=20,
         metavar="N",
-        help="lost commands in a row that stop a motion, 10 to 20; 0: none do (%(default)s). Fewer stop it all the "
-        "same where what comes next could only be reached with a jump: --prefill helps there",
+        help="number of consecutive lost commands that stops a motion, 10 to 20; 0: none (%(default)s). Fewer stop it "
+        "if the next command could only be reached with a jump: --prefill helps there",
     )
     parser.add_argument(
         "--auto-limit",
         action="store_true",
-        help="lead commands to rest inside the soft joint limits, each joint by itself: under poses the tool "
-        "then leaves the pose that is commanded",
+        help="stop commands inside the soft joint limits, each joint by itself: with commanded poses the tool then "
+        "leaves the commanded pose",
     )
-    parser.add_argument("--loop-back", action="store_true", help="wire digital outputs to the inputs")
+    parser.add_argument("--loop-back", action="store_true", help="connect digital outputs to the inputs")
     parser.add_argument(
         "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"
     )
@@ -80,54 +84,54 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_world_options(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("world port", "through which things happen to the robot from outside")
+    group = parser.add_argument_group("world port", "control of the simulated environment of the robot")
     choice = group.add_mutually_exclusive_group()
     choice.add_argument("--world-port", type=int, default=0, metavar="N", help="TCP port, on loopback (any free one)")
-    choice.add_argument("--no-world", action="store_true", help="have none")
+    choice.add_argument("--no-world", action="store_true", help="no world port")
 
 
 def _add_network_options(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("faults", "of the network and of the controller's clock")
+    group = parser.add_argument_group("faults", "faults of the network and of the controller's clock")
     for name, meaning in (
-        ("loss", "of the datagrams that never arrive"),
-        ("reorder", "that are overtaken by later ones"),
-        ("duplicate", "that arrive twice"),
-        ("corrupt", "in which a bit is flipped"),
+        ("loss", "lost datagrams"),
+        ("reorder", "datagrams overtaken by later ones"),
+        ("duplicate", "datagrams that arrive twice"),
+        ("corrupt", "datagrams with a flipped bit"),
     ):
-        group.add_argument(f"--{name}", type=float, default=0.0, metavar="SHARE", help=f"share {meaning}, 0 to 1")
+        group.add_argument(f"--{name}", type=float, default=0.0, metavar="SHARE", help=f"share of {meaning}, 0 to 1")
     group.add_argument("--delay", type=float, default=0.0, metavar="S", help="delay of every datagram")
     group.add_argument("--jitter", type=float, default=0.0, metavar="S", help="largest random delay in addition")
     group.add_argument(
-        "--faults-on", default="both", metavar="WAY", help="datagrams meant: commands, states or both (%(default)s)"
+        "--faults-on", default="both", metavar="WAY", help="affected datagrams: commands, states or both (%(default)s)"
     )
-    group.add_argument("--tcp-delay", type=float, default=0.0, metavar="S", help="delay of every answer over TCP")
+    group.add_argument("--tcp-delay", type=float, default=0.0, metavar="S", help="delay of every TCP reply")
     group.add_argument(
-        "--tcp-split", nargs="?", type=int, const=1, default=0, metavar="N", help="answers come N bytes at a time (1)"
+        "--tcp-split", nargs="?", type=int, const=1, default=0, metavar="N", help="send replies N bytes at a time (1)"
     )
-    group.add_argument("--tcp-break", type=int, metavar="N", help="TCP breaks after N bytes of answers")
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (%(default)s)")
+    group.add_argument("--tcp-break", type=int, metavar="N", help="close TCP after N bytes of replies")
+    group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of random faults (%(default)s)")
     group.add_argument(
         "--stall",
         action="append",
         default=[],
         metavar="S[@T][/P]",
-        help="the clock stands still for S seconds, first after T, then every P, such as 0.05@2.0 or 0.02/1.0",
+        help="stop the clock for S seconds, first after T, then every P, such as 0.05@2.0 or 0.02/1.0",
     )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Runs the controller until it is asked to end."""
+    """Runs the controller until it receives a signal to end."""
     from rcilab.core.errors import InvalidValueError
     from rcilab.makers.virtual_controller import build_virtual_controller
 
     try:
         server = build_virtual_controller(_config(args))
     except InvalidValueError as error:
-        raise _named(error, args) from error
+        raise _with_option_name(error, args) from error
     signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
     if args.exit_with_parent is None:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())
-    else:  # An interrupt is for who has started us. VS Code sends a kernel's to all that is below it.
+    else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not args.host.startswith("127.") and args.host != "localhost":
         print(
@@ -136,14 +140,14 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
             flush=True,
         )
-    # In one piece, so that a reader that waits for the first line has the second one, too.
+    # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
-    def say_ready() -> None:
+    def announce() -> None:
         sys.stdout.write(f"{server.description}{world}\n")
         sys.stdout.flush()
 
-    server.run(say_ready)
+    server.run(announce)
     return 0
 
 
@@ -177,8 +181,8 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
     )
 
 
-def _named(error: InvalidValueError, args: argparse.Namespace) -> InvalidValueError:
-    """Returns an error about a value by the name of the option that gave it."""
+def _with_option_name(error: InvalidValueError, args: argparse.Namespace) -> InvalidValueError:
+    """Returns an error with the name of the option instead of that of the setting."""
     if error.name not in _OPTIONS and error.name not in vars(args):
         return error
     option = _OPTIONS.get(error.name, "--" + error.name.replace("_", "-"))
@@ -197,7 +201,7 @@ def _client(text: str | None) -> tuple[str | None, int | None]:
 
 
 def _networks(args: argparse.Namespace) -> tuple[NetworkFaults, NetworkFaults]:
-    """Returns what is wrong with the network towards the controller, and towards the client."""
+    """Returns the network faults towards the controller, and towards the client."""
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import DIRECTIONS, NetworkFaults
 
@@ -211,10 +215,10 @@ def _networks(args: argparse.Namespace) -> tuple[NetworkFaults, NetworkFaults]:
 
 
 def parse_stall(text: str) -> Stall:
-    """Returns the pause that `S[@T][/P]` means: S seconds, first after T, then every P.
+    """Parses a stall of the clock, `S[@T][/P]`: S seconds, first after T, then every P.
 
     Raises:
-        InvalidValueError: It is not one.
+        InvalidValueError: The text is not valid.
     """
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import Stall

@@ -13,9 +13,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "mjcf",
         help="print an arm as MJCF for MuJoCo, or write it with its meshes",
         description="Prints the arm as MJCF for MuJoCo: geometry and limits of its maker's manual, torque motors; a "
-        "comment in it names every source. Printed, its links are capsules and no further file is needed; with "
-        "--output they have meshes, which are written, too. Exit code: 0 done; 2 the name is unknown, or DIR cannot be "
-        "written.",
+        "comment names every source. The printed links are capsules, without further files; with --output they have "
+        "meshes, which are written too. Exit code: 0 done; 2 the name is unknown, or DIR cannot be written.",
         epilog="example: rcilab mjcf xMatePro7 --output robots && python -m mujoco.viewer --mjcf robots/xMatePro7.xml",
     )
     parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3, xMate7 or Panda, in any case")
@@ -24,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the MJCF (capsules only, no file needed), or writes it and its meshes into a directory."""
+    """Prints the MJCF with capsules, or writes it and its meshes to a directory."""
     from rcilab.robots import describe_robot
     from rcilab.robots.files import write_model
     from rcilab.robots.mjcf import build_mjcf

@@ -1,4 +1,4 @@
-"""The files that commands take for a motion: one saved with `Motion.save`, or a program in JSON that is planned."""
+"""Motion files of the commands: a motion saved with `Motion.save`, or a program in JSON, which is planned."""
 
 from __future__ import annotations
 
@@ -18,31 +18,31 @@ HELP = "motion (.npz or .csv, from Motion.save) or program (.json, from Program.
 
 
 def add_max_rows(parser: ArgumentParser) -> None:
-    """Adds the option that lets a large file in."""
+    """Adds the option `--max-rows`, for large files."""
     parser.add_argument(
         "--max-rows",
         type=int,
         default=DEFAULT_MAX_ROWS,
         metavar="N",
-        help="cycles of 1 ms that the file may hold, with 1 KiB each, unpacked (default: %(default)s, 17 minutes)",
+        help="largest number of 1 ms cycles in the file, of 1 KiB each, unpacked (default: %(default)s, 17 minutes)",
     )
 
 
 def read_file(file: Path, max_rows: int = DEFAULT_MAX_ROWS) -> Motion | Program:
-    """Returns the motion or, where the name ends in .json, the program in a file.
+    """Returns the motion or, if the name ends in .json, the program in a file.
 
     Args:
-        file: Its name.
-        max_rows: How many cycles of 1 ms a motion may have.
+        file: Path of the file.
+        max_rows: Largest number of 1 ms cycles of a motion.
 
     Raises:
-        InvalidValueError: There is no such file, it holds neither, or too much.
+        InvalidValueError: The file does not exist, is neither, or is too large.
         VersionMismatchError: It was written by another version of its format.
     """
     from rcilab.motion import Motion, Program
 
     if file.suffix.lower() == ".rcirun" and file.is_file():
-        raise InvalidValueError("motion file", file.name, f"is a recorded run: look at it with `rcilab replay {file}`")
+        raise InvalidValueError("motion file", file.name, f"is a recorded run: open it with `rcilab replay {file}`")
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file, max_rows=max_rows)
 
 
@@ -56,11 +56,11 @@ def as_motion(
     """Returns the motion; a program is planned, and the notes of its planner are shown.
 
     Args:
-        found: What `read_file` has returned.
+        found: Result of `read_file`.
         model: The arm.
-        file: What it was read from, to name the line of a waypoint that cannot be planned.
+        file: Its file, for the line of a waypoint that cannot be planned.
         show: Called with every line of text.
-        max_rows: How many cycles of 1 ms it may take.
+        max_rows: Largest number of 1 ms cycles.
 
     Raises:
         PlanningError: The program cannot be planned.
@@ -84,7 +84,7 @@ def as_motion(
 
 
 def _line_of(waypoint: int, file: Path) -> int:
-    """Returns the line of a waypoint, from 1, in the file of a program that was read before."""
+    """Returns the line, from 1, of a waypoint in a valid program file."""
     from rcilab.motion.located_json import read_json
 
     content: Any = read_json(file.read_bytes(), file.name).value

@@ -1,4 +1,4 @@
-"""What commands print, where the reader may have gone (as in `rcilab check FILE | head`) or takes nothing."""
+"""Output of commands, robust to closed pipes (as in `rcilab check FILE | head`) and closed streams."""
 
 from __future__ import annotations
 
@@ -14,24 +14,23 @@ _UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG, errno.EBADF}
 
 
 def prepare_streams() -> None:
-    """Makes the standard streams fit for any text, and stands in for those that were closed (`>&-`).
+    """Makes the standard streams accept any text, and replaces closed ones (`>&-`).
 
-    What the encoding of a stream does not have is printed with its escapes. The number of a closed stream goes to
-    nothing else: a file that got it would take what is meant for a person. A closed stdout counts as a reader that
-    has gone.
+    Characters that a stream cannot encode are escaped. The file descriptor of a closed stream is occupied: a file with
+    this descriptor would receive messages for the user. A closed stdout is treated like a closed pipe.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         stream = getattr(sys, name)
         if stream is None:
-            nowhere = os.open(os.devnull, os.O_RDWR)  # The lowest free number: this one.
-            setattr(sys, name, _Gone() if number == 1 else os.fdopen(nowhere, "w" if number else "r"))
+            null = os.open(os.devnull, os.O_RDWR)  # Takes the lowest free descriptor, which is that of this stream.
+            setattr(sys, name, _ClosedStream() if number == 1 else os.fdopen(null, "w" if number else "r"))
         elif number and hasattr(stream, "reconfigure"):
-            with suppress(OSError):  # A stream that is read as well, such as a socket, cannot be changed any more.
+            with suppress(OSError):  # A stream that can also be read, such as a socket, cannot be reconfigured.
                 stream.reconfigure(errors="backslashreplace")
 
 
 def show(content: object) -> None:
-    """Prints on stdout; once the reader has gone the rest is dropped, and the exit code still says what was found."""
+    """Prints on stdout; after the pipe is closed, output is dropped and the exit status is not affected."""
     try:
         print(content, flush=True)
     except BrokenPipeError:
@@ -39,27 +38,27 @@ def show(content: object) -> None:
 
 
 def drop_output() -> None:
-    """Sends what is still to be written on stdout nowhere; otherwise Python complains about the pipe as it ends."""
-    if isinstance(sys.stdout, _Gone):
-        sys.stdout = open(os.devnull, "w")  # For as long as this process lives.
+    """Redirects stdout to the null device; otherwise Python reports the closed pipe when it ends."""
+    if isinstance(sys.stdout, _ClosedStream):
+        sys.stdout = open(os.devnull, "w")  # Open until the process ends.
         return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, sys.stdout.fileno())
-    os.close(nowhere)
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, sys.stdout.fileno())
+    os.close(null)
 
 
 def is_unwritable(error: OSError) -> bool:
-    """Returns whether this is about writing to a stream that is open already, as to a full disk."""
+    """Returns whether writing to an open stream failed, for example because the disk is full."""
     return error.filename is None and error.errno in _UNWRITABLE
 
 
 def one_line_each(text: str) -> str:
-    """Returns text for a terminal: what would act on it is shown with its escapes, line by line."""
+    """Returns text for a terminal, with control characters escaped in every line."""
     return "\n".join(map(plain_text, text.splitlines()))
 
 
-class _Gone(io.TextIOBase):
-    """Stands for a stdout that is closed."""
+class _ClosedStream(io.TextIOBase):
+    """Replaces a closed stdout."""
 
     def write(self, text: str) -> int:
         raise BrokenPipeError(errno.EPIPE, "the output is closed")

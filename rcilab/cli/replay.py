@@ -15,10 +15,10 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "replay",
         help="open the page on a recorded run",
-        description="Opens the page with a run that was recorded by the page or by run.save('….rcirun'): the timeline "
-        "scrubs plan and actual. Nothing is connected until you ask for it on the Run tab.",
+        description="Opens the page with a run recorded by the page or saved by run.save('….rcirun'); its timeline "
+        "shows plan and actual. Nothing is connected until you connect on the Run tab.",
     )
-    parser.add_argument("file", type=Path, help="the run, .rcirun; one that was cut off by a crash opens, too")
+    parser.add_argument("file", type=Path, help="the run, .rcirun, also one truncated by a crash")
     add_max_rows(parser)
     add_page_options(parser)
     parser.set_defaults(run=run)

@@ -1,4 +1,4 @@
-"""Reports and runs as JSON, for `rcilab check --json` and `rcilab run --json`. SI units; what is not finite is null."""
+"""Reports and runs as JSON, for `rcilab check --json` and `rcilab run --json`. SI units; null for NaN and infinity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def motion_as_json(motion: Motion) -> dict[str, Any]:
 
 
 def report_as_json(report: Report) -> dict[str, Any]:
-    """Returns the verdict, every condition with its worst value, and the violations and warnings in sentences."""
+    """Returns the result of a check, every condition with its worst value, and violations and warnings as sentences."""
     return {
         "ok": report.ok,
         "title": str(report.title),
@@ -30,7 +30,7 @@ def report_as_json(report: Report) -> dict[str, Any]:
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
-    """Returns how long a run lasted, [s], why it was stopped or null, and its largest joint error, [rad]."""
+    """Returns the duration of a run, [s], the reason of its stop or null, and its largest joint error, [rad]."""
     return {"duration": _finite(run.duration), "stopped": run.stopped, "largest_error": _finite(run.largest_error)}
 
 

@@ -1,4 +1,4 @@
-"""`rcilab run FILE --robot rci://...`: a saved motion or program on a robot, after its report and a yes."""
+"""`rcilab run FILE --robot rci://...`: runs a saved motion or program on a robot, after a report and a confirmation."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 _DONE, _NOT_DONE = 0, 1
-_TO_START_SPEED = 0.2  # Part of the limits; slow, because the way is not the program's.
-_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # Ctrl-C, kill, a terminal that was closed.
+_TO_START_SPEED = 0.2  # Fraction of the limits; slow, because this path is not part of the program.
+_STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # Ctrl-C, kill, a closed terminal.
 
 
 def add_parser(subparsers: Any) -> None:
@@ -38,25 +38,26 @@ def add_parser(subparsers: Any) -> None:
     parser: ArgumentParser = subparsers.add_parser(
         "run",
         help="run a saved motion or program on a robot",
-        description="Checks a motion (.npz from Motion.save, .csv with times and joint angles) or that of a program "
-        "saved with Program.save, shows the report, asks for a yes, runs it. Exit code: 0 it ran to its end; 1 it does "
-        "not conform, the answer was not yes, or it was stopped; 2 bad input, no robot or a fault of the robot.",
+        description="Checks a motion (.npz from Motion.save, .csv with times and joint angles) or the motion of a "
+        "program (.json from Program.save), shows the report, asks for confirmation and runs it. Exit code: 0 it ran "
+        "to its end; 1 it does not conform, was not confirmed, or was stopped; 2 bad input, no robot or a fault.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument("--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT")
-    parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; asked of the robot when left out")
+    parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; default: that of the robot")
     parser.add_argument(
         "--to-start",
         action="store_true",
-        help="first clear a fault and move the arm from where it is to the start of the motion, after a report and a "
-        "yes of its own",
+        help="first clear a fault and move the arm to the start of the motion, with its own report and confirmation",
     )
-    parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked already")
+    parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object, SI units; reports and questions go to stderr"
     )
     add_max_rows(parser)
-    parser.add_argument("--timeout", type=float, default=3.0, metavar="S", help="for every answer of the robot [s]")
+    parser.add_argument(
+        "--timeout", type=float, default=3.0, metavar="S", help="timeout of every reply of the robot [s]"
+    )
     parser.set_defaults(run=run)
 
 
@@ -72,41 +73,41 @@ def run(args: Namespace) -> int:
         except KeyboardInterrupt:
             print("\nNothing was sent.", file=sys.stderr)
             return _NOT_DONE
-        except BrokenPipeError:  # Before the motion: a report or a question that was not read is not agreed to.
+        except BrokenPipeError:  # Before the motion: the operator cannot have read the report or the question.
             drop_output()
             print("The output is closed, so the report cannot be read: nothing was sent.", file=sys.stderr)
             return _NOT_DONE
 
 
 class _Stopper:
-    """What a signal does: before the motion it ends the command, in the motion it brings the arm to rest."""
+    """Signal handler: before the motion it ends the command, during the motion it stops the arm."""
 
     def __init__(self) -> None:
         self._robot: RobotSession | None = None
-        self._is_asked = False
+        self._is_requested = False
 
     def execute(self, robot: RobotSession, motion: Motion, certificate: Certificate | None) -> Run:
-        """Runs the motion, or the part of it up to a signal."""
+        """Runs the motion until its end or a signal."""
         self._robot = robot
-        return robot.execute(motion, certificate, progress=lambda t, duration: self._insist())
+        return robot.execute(motion, certificate, progress=lambda t, duration: self._stop_again())
 
     def on_signal(self, number: int, frame: object) -> None:
-        """Serves a signal, between two steps of the main thread."""
+        """Handles a signal in the main thread."""
         if self._robot is None:
             raise KeyboardInterrupt
-        self._is_asked = True
+        self._is_requested = True
         self._robot.stop()
 
-    def _insist(self) -> None:
-        """Stops for a signal that came after the start was decided and before anything moved."""
-        if self._is_asked and self._robot is not None:
+    def _stop_again(self) -> None:
+        """Repeats the stop of a signal that arrived between the start request and the first cycle of the motion."""
+        if self._is_requested and self._robot is not None:
             self._robot.stop()
 
 
 @contextmanager
 def _stopping_on_signals() -> Iterator[_Stopper]:
     stopper = _Stopper()
-    if threading.current_thread() is not threading.main_thread():  # Only there can signals be served.
+    if threading.current_thread() is not threading.main_thread():  # Only the main thread can handle signals.
         yield stopper
         return
     before = {number: signal.signal(number, stopper.on_signal) for number in _STOP_SIGNALS}
@@ -128,13 +129,13 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
     model = load_model(args.model) if args.model else None
     moves: list[_Move] = []
     with connect(args.robot, model, args.timeout) as robot:
-        tell = partial(print, file=_reader(args))
-        motion = as_motion(found, robot.model, args.file, show=tell, max_rows=args.max_rows)
+        show_note = partial(print, file=_text_stream(args))
+        motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
         state = robot.state
         mismatch = describe_start_mismatch(motion.q[0], state.q_c)
         if mismatch is None or not args.to_start:
-            if mismatch is not None:  # Before the report: every one of its violations would only say this again.
-                raise UsageError(f"{mismatch}; in the shell, rcilab run --to-start does that after a yes of its own")
+            if mismatch is not None:  # Before the report, whose violations would all have this cause.
+                raise UsageError(f"{mismatch}; in the shell, rcilab run --to-start does that after a confirmation")
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
@@ -153,38 +154,38 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
     return _DONE if moves[-1].outcome == "done" else _NOT_DONE
 
 
-def _reader(args: Namespace) -> TextIO:
-    """Returns where text for people goes: stdout belongs to the JSON where that was asked for."""
+def _text_stream(args: Namespace) -> TextIO:
+    """Returns the stream for text: with --json, stdout is reserved for the JSON."""
     return sys.stderr if args.json else sys.stdout
 
 
 def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[Motion]:
-    """Returns what leads from `q` to the start of a motion; the first part leads back inside the joint ranges."""
+    """Plans from `q` to the start of a motion; a first motion returns to the joint ranges if `q` is outside them."""
     from rcilab.motion import plan_joint, plan_recovery
 
     if len(motion.q[0]) != len(q):
-        raise UsageError(f"the motion is for {len(motion.q[0])} joints and the arm has {len(q)}: it is for another arm")
+        raise UsageError(f"the motion has {len(motion.q[0])} joints but the arm has {len(q)}: it is for another arm")
     back = plan_recovery(robot.model, q)
-    way = plan_joint(robot.model, back.q[-1], motion.q[0], speed=_TO_START_SPEED, law="torque_rate_limited")
-    return [back, way] if back.duration > 0.0 else [way]
+    approach = plan_joint(robot.model, back.q[-1], motion.q[0], speed=_TO_START_SPEED, law="torque_rate_limited")
+    return [back, approach] if back.duration > 0.0 else [approach]
 
 
 def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
     names = name_faults(state.faults)
-    print(f"The robot is stopped by {names}; clearing it. Nothing moves yet.", file=_reader(args))
+    print(f"The robot is stopped by {names}; clearing it. Nothing moves yet.", file=_text_stream(args))
     robot.recover()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Move:
-    """One motion of the command, and what became of it."""
+    """One motion of the command and its outcome."""
 
     outcome: Literal["done", "stopped", "not_conforming", "not_agreed"]
     report: Report
     run: Run | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Returns the entry that `rcilab run --json` prints."""
+        """Returns the entry for `rcilab run --json`."""
         from rcilab.cli.report_json import report_as_json, run_as_json
 
         run = None if self.run is None else run_as_json(self.run)
@@ -192,16 +193,16 @@ class _Move:
 
 
 def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace) -> _Move:
-    """Checks a motion, shows the report, asks, and runs the motion."""
+    """Checks a motion, shows the report, asks for confirmation, and runs the motion."""
     from rcilab.conformance.check import check
 
-    out = _reader(args)
+    out = _text_stream(args)
     report = check(motion, robot.model, start=robot.state.q_c)
     if not report.ok:
         return _refuse(report, args)
     print(report, file=out)
-    print(_what_will_move(motion, robot), file=out, flush=True)
-    if not args.yes and not _agreed(out):
+    print(_describe_move(motion, robot), file=out, flush=True)
+    if not args.yes and not _is_confirmed(out):
         return _Move(outcome="not_agreed", report=report)
     if not robot.is_powered():
         robot.power_on()
@@ -211,33 +212,34 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
     if result.stopped:
         print(
             f"stopped {result.stopped} at t = {result.duration:.2f} s; the arm is at rest; plan the next motion from "
-            "where it is (robot.state.q_c), or bring it to the start of a file: rcilab run FILE --to-start",
+            "its position (robot.state.q_c), or move it to the start of a file: rcilab run FILE --to-start",
             file=sys.stderr,
         )
     return _Move(outcome="stopped" if result.stopped else "done", report=report, run=result)
 
 
 def _refuse(report: Report, args: Namespace) -> _Move:
-    print(report, file=_reader(args))
+    print(report, file=_text_stream(args))
     print("The motion does not conform; nothing was sent.", file=sys.stderr)
     return _Move(outcome="not_conforming", report=report)
 
 
-def _what_will_move(motion: Motion, robot: RobotSession) -> str:
+def _describe_move(motion: Motion, robot: RobotSession) -> str:
     from rcilab.motion.extent import measure_extent
 
     extent = measure_extent(motion, robot.model)
     return (
         f"{robot.model.name} at {robot.address} will move for {extent.duration:.2f} s. "
-        f"Joints {extent.describe_joints() or 'stay'}. "
-        f"The tool goes up to {1e3 * extent.tool_distance:.0f} mm from where it is. "
-        f"Top speeds: joint {extent.fastest_joint} with {math.degrees(extent.joint_speed):.1f}°/s, "
-        f"the tool with {extent.tool_speed:.2f} m/s."
+        f"Joints: {extent.describe_joints() or 'none moves'}. "
+        f"The tool moves up to {1e3 * extent.tool_distance:.0f} mm from its current position. "
+        f"Top speeds: joint {extent.fastest_joint} {math.degrees(extent.joint_speed):.1f}°/s, "
+        f"tool {extent.tool_speed:.2f} m/s."
     )
 
 
-def _agreed(out: TextIO) -> bool:
-    print("Keep clear of the arm and the emergency stop at hand. Move it? Type yes: ", end="", file=out, flush=True)
+def _is_confirmed(out: TextIO) -> bool:
+    question = "Keep clear of the arm and keep the emergency stop within reach. Move it? Type yes: "
+    print(question, end="", file=out, flush=True)
     try:
         answer = input().strip()
     except EOFError:

@@ -13,19 +13,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "urdf",
         help="print an arm as URDF, or write it with its meshes",
         description="Prints the arm as URDF: geometry and limits of its maker's manual, shapes made by rcilab (no "
-        "meshes of the vendor); a comment in it names every source. Lengths in m, angles in rad. Without --output only "
-        "the text is printed, and its meshes are named but not written. Exit code: 0 done; 2 the name is unknown, or "
-        "DIR cannot be written.",
+        "meshes of the vendor); a comment names every source. Lengths in m, angles in rad. Without --output the text "
+        "is printed, without meshes. Exit code: 0 done; 2 the name is unknown, or DIR cannot be written.",
         epilog="example: rcilab urdf xMatePro7 --output robots --mesh-dir package://my_robots/meshes/xMatePro7",
     )
     parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3, xMate7 or Panda, in any case")
     parser.add_argument("--output", metavar="DIR", type=Path, help="write DIR/NAME.urdf and DIR/meshes/NAME/*.stl")
-    parser.add_argument("--mesh-dir", metavar="PREFIX", help="what stands before mesh names, such as package://...")
+    parser.add_argument("--mesh-dir", metavar="PREFIX", help="prefix of mesh names, such as package://...")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Prints the URDF, or writes it and its meshes into a directory."""
+    """Prints the URDF, or writes it and its meshes to a directory."""
     from rcilab.robots import describe_robot
     from rcilab.robots.files import write_model
     from rcilab.robots.urdf import build_urdf

@@ -1,4 +1,4 @@
-"""`rcilab [workbench]`: opens the page."""
+"""`rcilab [workbench]`: serves the page."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def add_parser(subparsers: Any) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options, for `rcilab workbench` and for a bare `rcilab`."""
-    parser.add_argument("--model", default="xMatePro7", help="robot to show first (default: %(default)s)")
+    parser.add_argument("--model", default="xMatePro7", help="initial arm (default: %(default)s)")
     parser.add_argument("--robot", default="virtual", metavar="rci://HOST:PORT", help="controller to connect to")
     add_page_options(parser)
 
@@ -37,19 +37,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def add_page_options(parser: argparse.ArgumentParser) -> None:
     """Adds the options of every page."""
     parser.add_argument(
-        "--host", default="127.0.0.1", help="address to listen on; others than loopback have every page bring a token"
+        "--host",
+        default="127.0.0.1",
+        help="address to listen on; with any other than loopback, every page needs a token",
     )
     parser.add_argument("--port", type=_port, default=None, help="port of the page (default: 8080; 0: any free one)")
     parser.add_argument(
         "--private",
         action="store_true",
-        help="have every page bring a token on loopback, too: other accounts of this machine are kept out",
+        help="require a token on loopback too: excludes other accounts of this machine",
     )
     parser.add_argument(
         "--token-file",
         type=Path,
         metavar="FILE",
-        help="file that holds the token, at least 16 characters; else it is $RCILAB_TOKEN, else a new one is made",
+        help="file with the token, at least 16 characters; default: $RCILAB_TOKEN, else a new token",
     )
     parser.add_argument("--no-browser", action="store_true", help="do not open a browser")
     parser.add_argument(
@@ -57,13 +59,13 @@ def add_page_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FOLDER",
         default=Path.home() / "rcilab-runs",
-        help="folder that every motion is recorded in, cycle by cycle (default: %(default)s)",
+        help="folder for the recordings of all motions, cycle by cycle (default: %(default)s)",
     )
-    parser.add_argument("--language", choices=("en", "zh"), help="language of the page (the one that was chosen last)")
+    parser.add_argument("--language", choices=("en", "zh"), help="language of the page (default: the last one chosen)")
     parser.add_argument(
         "--quality",
         choices=("full", "light"),
-        help="light: for software rendering; full, or light where the browser has no graphics card, when left out",
+        help="light: for software rendering; default: full, or light if the browser has no graphics card",
     )
 
 
@@ -72,26 +74,26 @@ def run(args: argparse.Namespace) -> int:
     from rcilab.workbench.security import require_openable
 
     token = find_page_token(args)
-    require_openable(args.host, token, args.robot, args.model)  # Before the page and its libraries are loaded.
+    require_openable(args.host, token, args.robot, args.model)  # Before the libraries of the page are loaded.
     return serve(page_config(args, token, model=args.model, target=args.robot), browser=not args.no_browser)
 
 
 def find_page_token(args: argparse.Namespace) -> str | None:
-    """Returns the token that pages must bring, from the options of `add_page_options`; None where none is needed."""
+    """Returns the token of the page from the options of `add_page_options`; None if none is needed."""
     from rcilab.workbench.access import VARIABLE, find_token
 
     token = find_token(args.host, is_private=args.private, file=args.token_file)
-    is_made = token is not None and args.token_file is None and not os.environ.get(VARIABLE)
-    if is_made and args.no_browser and not sys.stdout.isatty():
+    is_new = token is not None and args.token_file is None and not os.environ.get(VARIABLE)
+    if is_new and args.no_browser and not sys.stdout.isatty():
         raise UsageError(
-            f"the token would stay unknown: it is not printed where the output is no terminal; give one in ${VARIABLE} "
-            "or with --token-file FILE"
+            f"the new token would be unknown: it is printed only on a terminal; set one in ${VARIABLE} or with "
+            "--token-file FILE"
         )
     return token
 
 
 def page_config(args: argparse.Namespace, token: str | None, **options: Any) -> WorkbenchConfig:
-    """Returns how to start the page, from the options of `add_page_options` and more."""
+    """Returns the configuration of the page from the options of `add_page_options` and further ones."""
     from rcilab.workbench.app import WorkbenchConfig
     from rcilab.workbench.security import DEFAULT_PORT
 
@@ -113,34 +115,34 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     ending = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ending.set())
-    with _ended_by_starving(ending), Workbench(config) as bench:
+    with _ended_by_memory_error(ending), Workbench(config) as bench:
         is_secret = config.token is not None and not sys.stdout.isatty()
         address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
         print(f"rcilab workbench: {address}  (Ctrl-C ends it)", flush=True)
-        trouble = ""
+        problem = ""
         with _browser(bench.url if browser else None, is_private=config.token is not None):
             while not ending.wait(0.5):
-                trouble = _tell_trouble(bench.session.status(), trouble)
+                problem = _print_problem(bench.session.status(), problem)
     return 0
 
 
 @contextmanager
-def _ended_by_starving(ending: threading.Event) -> Iterator[None]:
-    """Ends the page when a thread of ours has died for want of memory: half a page is worse than none.
+def _ended_by_memory_error(ending: threading.Event) -> Iterator[None]:
+    """Ends the page when a thread has ended for lack of memory: the page would not work without it.
 
     Raises:
-        UsageError: That has happened.
+        UsageError: A thread has ended for lack of memory.
     """
     before, died = threading.excepthook, threading.Event()
 
-    def hear(args: threading.ExceptHookArgs) -> None:
+    def on_exception(args: threading.ExceptHookArgs) -> None:
         if args.exc_value is None or not is_out_of_memory(args.exc_value):
             before(args)
             return
         died.set()
         ending.set()
 
-    threading.excepthook = hear
+    threading.excepthook = on_exception
     try:
         yield
     finally:
@@ -151,7 +153,7 @@ def _ended_by_starving(ending: threading.Event) -> Iterator[None]:
 
 @contextmanager
 def _browser(url: str | None, *, is_private: bool) -> Iterator[None]:
-    """Opens an address in a browser, if there is one to open; a token in it does not show among the processes."""
+    """Opens an address in a browser, unless it is None; a token in it is not visible in the list of processes."""
     if url is None:
         yield
         return
@@ -164,8 +166,8 @@ def _browser(url: str | None, *, is_private: bool) -> Iterator[None]:
         yield
 
 
-def _tell_trouble(status: SupervisorStatus, printed: str) -> str:
-    """Prints why the robot is not there, once until it is there again; returns what was printed last."""
+def _print_problem(status: SupervisorStatus, printed: str) -> str:
+    """Prints why the robot is not connected, once until it is connected again; returns the last printed message."""
     if status.phase not in ("lost", "crashed"):
         return "" if status.phase in ("idle", "moving") else printed
     if status.message != printed:
@@ -177,7 +179,7 @@ def _port(text: str) -> int:
     try:
         port = int(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is no port number; give one from 0 to 65535") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port number; use 0 to 65535") from None
     if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f"{port} is no port number; give one from 0 to 65535")
+        raise argparse.ArgumentTypeError(f"{port} is not a port number; use 0 to 65535")
     return port

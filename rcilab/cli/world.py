@@ -1,4 +1,4 @@
-"""`rcilab world ADDRESS REQUEST [FIELD=VALUE ...]`: something happens to a virtual robot, from the command line."""
+"""`rcilab world ADDRESS REQUEST [FIELD=VALUE ...]`: controls the simulated environment of a virtual robot."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command."""
     parser = subparsers.add_parser(
         "world",
-        help="push a virtual robot, put a box in its way, press its emergency stop",
-        description="Something happens to a virtual robot, through its world port.",
+        help="push a virtual robot, place an obstacle, press its emergency stop",
+        description="Controls the simulated environment of a virtual robot through its world port.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("address", metavar="ADDRESS", help="world port, HOST:PORT, as the controller prints it")
-    parser.add_argument("request", metavar="REQUEST", help="what happens, such as push, place_box, press or status")
+    parser.add_argument("request", metavar="REQUEST", help="request, such as push, place_box, press or status")
     parser.add_argument(
-        "fields", nargs="*", metavar="FIELD=VALUE", default=[], help="what it needs; values are JSON, or a word"
+        "fields", nargs="*", metavar="FIELD=VALUE", default=[], help="arguments; values are JSON or plain words"
     )
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Asks for it and prints what the answer says, as JSON when that is more than that it was done."""
+    """Sends the request and prints the reply: a status as JSON, else "done"."""
     from rcilab.core.errors import InvalidValueError
     from rcilab.execution.simulation_control import SimulationControl
     from rcilab.sim.api import WorldStatus, status_as_dict

@@ -1,4 +1,4 @@
-"""What bench and doctor both ask this machine: its browsers, and whether our loops get real-time scheduling."""
+"""Properties of this machine used by bench and doctor: browsers, and permission for real-time scheduling."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ import subprocess
 import sys
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "firefox", "microsoft-edge")
-"""Names a browser may have on the path."""
+"""Names of browser executables."""
 
 _CHROMIUM = BROWSERS[:4]
-_PRIORITY = 80  # The highest that any of our processes asks for: the controller.
+_PRIORITY = 80  # The highest priority of any rcilab process: that of the controller.
 
 
 def find_browser(names: tuple[str, ...] = BROWSERS) -> str | None:
-    """Returns the path of the first browser that is installed, or None."""
+    """Returns the path of the first installed browser, or None."""
     return next((path for name in names if (path := shutil.which(name))), None)
 
 
 def find_chromium() -> str | None:
-    """Returns the path of a browser that can run without a display and draw in software, or None."""
+    """Returns the path of a browser that can run headless with software rendering, or None."""
     return find_browser(_CHROMIUM)
 
 
 def probe_realtime() -> tuple[bool, bool]:
-    """Returns whether a control process gets SCHED_FIFO and locked memory, tried in a process that then ends."""
+    """Returns whether a control process gets SCHED_FIFO and locked memory; tested in a separate process."""
     code = (
         "from rcilab.realtime.scheduling import enter_realtime\n"
         f"s = enter_realtime({_PRIORITY}); print(s.policy, s.memory_locked)"

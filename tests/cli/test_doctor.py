@@ -60,5 +60,5 @@ def test_a_question_that_is_none_is_refused_before_anything_is_asked(
 def test_a_finding_is_one_line_and_the_bad_ones_are_named_at_the_end() -> None:
     findings = [Finding("one", "ok", "fine"), Finding("two", "bad", "broken", "mend it")]
     assert str(findings[1]).split() == ["bad", "two", "broken;", "mend", "it"]
-    assert summary(findings) == "1 to mend: two"
-    assert summary(findings[:1]) == "ready: nothing is in the way"
+    assert summary(findings) == "1 to fix: two"
+    assert summary(findings[:1]) == "ready: no problem found"

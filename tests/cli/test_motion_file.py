@@ -70,7 +70,7 @@ def test_a_slow_down_does_not_take_the_place_of_what_is_judged(file, tmp_path, c
     plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(rows)
     before = rows.read_bytes()
     assert main(["check", str(rows), "--model", "xMatePro7", "--slow-down", str(tmp_path / "." / "rows.csv")]) == 2
-    assert "is the file that is checked" in capsys.readouterr().err
+    assert "is the file to check" in capsys.readouterr().err
     assert rows.read_bytes() == before
 
 
@@ -114,4 +114,4 @@ def test_a_recorded_run_is_refused_with_the_command_that_shows_it(tmp_path, caps
     run = tmp_path / "mine.rcirun"
     run.write_bytes(b"of a run")
     assert main(["check", str(run), "--model", "xMatePro7"]) == 2
-    assert f"look at it with `rcilab replay {run}`" in capsys.readouterr().err
+    assert f"open it with `rcilab replay {run}`" in capsys.readouterr().err

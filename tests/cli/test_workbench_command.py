@@ -68,7 +68,7 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
     ("arguments", "answer"),
     [
         (["--model", "kuka"], "known robots: Panda, xMatePro3"),
-        (["--host", "0.0.0.0"], "the token would stay unknown"),
+        (["--host", "0.0.0.0"], "the new token would be unknown"),
         (["--private"], "RCILAB_TOKEN"),
         (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
         (["--robot", "http://x"], "rci://"),

@@ -1,1 +1,1 @@
-"""How fast this machine runs what a person or a robot waits for, beside what we promise."""
+"""Benchmarks of the operations that a user or a robot waits for, with targets."""

@@ -1,4 +1,4 @@
-"""An empty page of viser's own: the reference, and a place for parts of ours to be measured."""
+"""An empty viser page: the reference, and the page on which single parts are measured."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.views.viser_server import GuardedServer, listen
 
 @contextmanager
 def bare_page() -> Iterator[tuple[Any, str]]:
-    """Serves an empty page on loopback; yields viser's server and the address."""
+    """Serves an empty page on loopback; yields the viser server and the address."""
     bound = listen("127.0.0.1", 0)
     port = bound.getsockname()[1]
     with GuardedServer(bound, AccessPolicy(host="127.0.0.1", port=port)) as guard:

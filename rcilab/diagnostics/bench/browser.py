@@ -1,4 +1,4 @@
-"""A page in a real headless browser, driven by playwright: what a control loop shares its machine with."""
+"""A page in a real headless browser, driven by playwright, as load next to a control loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.diagnostics.host import find_chromium
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-PAGE_TIMEOUT = 60.0  # [s] For anything on a page: software rendering on a busy machine takes several seconds.
+PAGE_TIMEOUT = 60.0  # [s] For every step on a page: software rendering on a busy machine takes several seconds.
 
 _FLAGS = (
     "--no-sandbox",
@@ -21,13 +21,13 @@ _FLAGS = (
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--disable-gpu-rasterization",  # Off where there is no graphics processor; Debian's launcher switches it on.
+    "--disable-gpu-rasterization",  # Needs a graphics processor; Debian's launcher enables it.
 )
 _VIEW = {"width": 1280, "height": 800}
 
 
 def why_no_page() -> str | None:
-    """Returns why no page can be opened here and what to install, or None when one can."""
+    """Returns why no page can be opened on this machine and what to install, or None."""
     if find_spec("playwright") is None:
         return "PLAYWRIGHT IS NOT INSTALLED: pip install 'rcilab[bench]'"
     if find_chromium() is None:
@@ -37,7 +37,7 @@ def why_no_page() -> str | None:
 
 @contextmanager
 def open_page(url: str) -> Iterator[Page]:
-    """Opens an address in a browser of its own and waits until that is loaded; closes the browser afterwards.
+    """Opens an address in a new browser and waits until it is loaded; closes the browser afterwards.
 
     Raises:
         DeadlineError: The browser did not respond.
@@ -51,13 +51,13 @@ def open_page(url: str) -> Iterator[Page]:
             yield open_window(browser, url)
             browser.close()
     except TimeoutError as error:
-        raise DeadlineError(f"bench: {_first_line(error)}; look at `rcilab doctor`, then try again") from error
+        raise DeadlineError(f"bench: {_first_line(error)}; check `rcilab doctor`, then try again") from error
     except Error as error:
         raise RcilabError(f"bench: the browser failed: {_first_line(error)}") from error
 
 
 def open_window(browser: Any, url: str) -> Page:
-    """Opens an address in another window of the same browser; all windows draw."""
+    """Opens an address in another window of the same browser; all windows are rendered."""
     page = browser.new_page(viewport=_VIEW)
     page.set_default_timeout(1e3 * PAGE_TIMEOUT)
     page.goto(url)
@@ -65,7 +65,7 @@ def open_window(browser: Any, url: str) -> Page:
 
 
 def wait_on_page(page: Page, what: str, script: str) -> Any:
-    """Waits until an expression is true on a page and returns it.
+    """Waits until an expression is true on a page and returns its value.
 
     Raises:
         DeadlineError: It did not become true.
@@ -76,7 +76,7 @@ def wait_on_page(page: Page, what: str, script: str) -> Any:
         return page.wait_for_function(script, polling=50).json_value()
     except TimeoutError as error:
         raise DeadlineError(
-            f"bench: waited {PAGE_TIMEOUT:g} s for {what}; look at `rcilab doctor`, then try again"
+            f"bench: waited {PAGE_TIMEOUT:g} s for {what}; check `rcilab doctor`, then try again"
         ) from error
 
 

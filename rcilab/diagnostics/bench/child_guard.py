@@ -1,8 +1,8 @@
-"""Programs that a bench starts and that end with it, whatever ends it: its own end, Ctrl-C, SIGTERM or SIGKILL.
+"""Programs started by a benchmark that end together with it, also after Ctrl-C, SIGTERM or SIGKILL.
 
-A guard stands between: a small process in a session of its own that runs the program and holds one end of a pipe. The
-system closes the other end when the bench ends, however that happens; then the guard ends the program with all its
-helpers and removes its directory.
+A guard is a small process in its own session that runs the program and holds one end of a pipe. The system closes the
+other end when the benchmark ends for any reason; then the guard ends the program with all its child processes and
+removes its directory.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from typing import IO
 
 from rcilab.core.errors import ConnectionLostError
 
-_PATIENCE = 10.0  # [s] Between asking a program to end and ending it.
+_TIMEOUT = 10.0  # [s] Between SIGTERM and SIGKILL.
 
 
 @contextmanager
 def guard(
     command: Sequence[str], *, directory: str = "", output: IO[str] | None = None
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Holds a program ready to run until the block is left: `launch` starts it.
+    """Starts the guard of a program, which `launch` then starts; both end when the block is left.
 
     Args:
         command: The program and its arguments.
-        directory: What it may fill, and is removed after it.
-        output: Where its output goes; nowhere when absent.
+        directory: Directory of the program, removed after its end.
+        output: Destination of its output; None discards it.
 
     Yields:
-        The guard's process; it ends when the program does, with its exit code.
+        The process of the guard; it ends together with the program, with the same exit code.
 
     Raises:
         ConnectionLostError: The guard did not start.
@@ -44,19 +44,19 @@ def guard(
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL if output is None else output,
-        start_new_session=True,  # What is sent to our group, such as Ctrl-C, is not for it.
+        start_new_session=True,  # Signals to the process group of the benchmark, such as Ctrl-C, do not reach it.
     )
     assert process.stdin is not None
     assert process.stdout is not None
     try:
         if not process.stdout.readline():
-            raise ConnectionLostError(f"bench: {command[0]} could not be started; look at `rcilab doctor`")
+            raise ConnectionLostError(f"bench: {command[0]} could not be started; check `rcilab doctor`")
         yield process
     finally:
         process.stdout.close()
         with suppress(BrokenPipeError):
             process.stdin.close()
-        process.wait(3.0 * _PATIENCE)
+        process.wait(3.0 * _TIMEOUT)
 
 
 def launch(process: subprocess.Popen[bytes]) -> None:
@@ -67,7 +67,7 @@ def launch(process: subprocess.Popen[bytes]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the guard: a directory, or nothing, and the command; returns the program's exit code."""
+    """Runs the guard with a directory, or "", and the command; returns the exit code of the program."""
     directory, *command = arguments
     sys.stdout.write("ready\n")
     sys.stdout.flush()
@@ -78,12 +78,12 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _run(command: Sequence[str]) -> int:
-    # A group of its own: its helpers end with it, and nothing else does.
+    # Its own process group, so that its child processes can be ended with it.
     program = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, start_new_session=True)
     threading.Thread(target=_end_with_bench, args=(program,), daemon=True).start()
     code = program.wait()
     with suppress(ProcessLookupError):
-        os.killpg(program.pid, signal.SIGKILL)  # Helpers that it left behind.
+        os.killpg(program.pid, signal.SIGKILL)  # Remaining child processes.
     return code
 
 
@@ -93,7 +93,7 @@ def _end_with_bench(program: subprocess.Popen[bytes]) -> None:
         with suppress(ProcessLookupError):
             os.killpg(program.pid, kind)
         with suppress(subprocess.TimeoutExpired):
-            program.wait(_PATIENCE)
+            program.wait(_TIMEOUT)
             return
 
 

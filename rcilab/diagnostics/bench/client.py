@@ -1,4 +1,4 @@
-"""How fast the client answers a state."""
+"""Response time of the client to a state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _DURATION = 3.0  # [s]
 
 
 def bench_client_answer() -> Measurement:
-    """From a state out of its socket to the command into it, with a callback that does nothing, free-running."""
+    """From the receipt of a state to the sending of its command, with a minimal callback, free-running."""
     model = load_model(_ROBOT)
 
     def stay(state: RobotState, t: float) -> JointPosition:
@@ -26,7 +26,7 @@ def bench_client_answer() -> Measurement:
         cycles = robot.control(stay).cycles
     answered = cycles[cycles["sent_ns"] != 0]
     times = 1e-9 * (answered["sent_ns"] - answered["received_ns"])
-    # States that waited behind another one count from its arrival, not from their own: leave those out.
+    # Queued states have the time of arrival of an earlier state: they are excluded.
     alone = np.flatnonzero(np.diff(answered["received_ns"], prepend=0))
     note = f"{_ROBOT}, {len(answered)} states of a controller at 1 kHz, decoding, checks, record and encoding included"
     return summarise("client_answer", times[alone], "us", 120.0, note)

@@ -1,4 +1,4 @@
-"""What planning and checking cost: the calls a user waits for at every drag of the target."""
+"""Cost of planning and checking: the calls that run at every drag of the target."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LENGTHS = (1.0, 10.0, 100.0)  # [s] of motion.
 
 
 def bench_forward() -> Measurement:
-    """Forward kinematics of a 7-axis arm at random poses, and of whole paths in the note."""
+    """Forward kinematics of a 7-axis arm at random poses; of whole paths in the note."""
     model = load_model(_ROBOT)
     times = time_calls(model.forward, list(_random_q(model, 5000)))
     growth = _growth(model.forward_path, {n: _random_q(model, n) for n in (10, 100, 1000, 10_000)})
@@ -40,7 +40,7 @@ def bench_forward() -> Measurement:
 
 
 def bench_inverse() -> Measurement:
-    """Every branch of the inverse at one arm angle."""
+    """All branches of the inverse kinematics at one arm angle."""
     model = load_model(_ROBOT)
     cases = [(model.forward(q), model.arm_angle(q)) for q in _random_q(model, 2000)]
     branches: list[int] = []
@@ -48,7 +48,7 @@ def bench_inverse() -> Measurement:
     def solve(case: Any) -> None:
         try:
             branches.append(len(model.inverse(case[0], psi=case[1])))
-        except UnreachableError:  # Cannot happen: each pose was made from joint angles inside the limits.
+        except UnreachableError:  # Cannot happen: each pose is computed from joint angles inside the limits.
             branches.append(0)
 
     times = time_calls(solve, cases)
@@ -61,21 +61,21 @@ def bench_inverse() -> Measurement:
 
 
 def bench_inverse_batch() -> Measurement:
-    """Every branch of the inverse for many poses in one call, by pose."""
+    """All branches of the inverse kinematics for many poses in one call, per pose."""
     model, count = load_model(_ROBOT), 10_000
     poses = model.forward_path(_random_q(model, count))
     times = time_calls(model.inverse_batch, [poses] * 20, warm_up=2)
     growth = _growth(model.inverse_batch, {n: poses[:n] for n in (10, 100, 1000, count)})
     one, many = _panda_inverse(count)
     note = (
-        f"{_ROBOT}, time a pose in batches of {count}, limits checked; whole batches: {growth}; Panda, whose offsets "
-        f"make it a polynomial of degree 16: {one:.0f} us single, {many:.1f} us a pose"
+        f"{_ROBOT}, time per pose in batches of {count}, limits checked; whole batches: {growth}; Panda, whose offsets "
+        f"lead to a polynomial of degree 16: {one:.0f} us single, {many:.1f} us per pose"
     )
     return summarise("inverse_batch", np.array(times) / count, "us", 2.0, note)
 
 
 def _panda_inverse(count: int) -> tuple[float, float]:
-    """Returns what every solution of a Panda's inverse costs at a held elbow: alone, and one of many, [us]."""
+    """Returns the time of a Panda's inverse kinematics at a given elbow: single, and in a batch, [us]."""
     model = load_model("Panda")
     q = _random_q(model, count)
     poses = model.forward_path(q)
@@ -86,7 +86,7 @@ def _panda_inverse(count: int) -> tuple[float, float]:
 
 
 def bench_feasible_arcs() -> Measurement:
-    """The arm angles that a pose leaves, with the reasons against the others."""
+    """The feasible arm angles of a pose, with the reasons against the others."""
     model = load_model(_ROBOT)
     poses = [model.forward(q) for q in _random_q(model, 500)]
     arcs = np.mean([len(model.feasible_arcs(pose).arcs) for pose in poses])
@@ -134,9 +134,9 @@ def bench_program() -> Measurement:
 
 
 def bench_program_close() -> Measurement:
-    """A program of 1000 waypoints a few mm apart, every blend shortened, planned as one motion; growth in the note."""
+    """A program of 1000 waypoints a few mm apart, every blend shortened, planned as one motion; scaling in the note."""
     model = load_model(_ROBOT)
-    plan_program(model, close_program_of(model, 20))  # The first one loads the planner.
+    plan_program(model, close_program_of(model, 20))  # The first call loads the planner.
     medians: dict[int, list[float]] = {
         count: time_calls(lambda steps: plan_program(model, steps), [close_program_of(model, count)] * 3, warm_up=0)
         for count in (250, 500, 1000)
@@ -144,31 +144,33 @@ def bench_program_close() -> Measurement:
     program = close_program_of(model, 1000)
     gentle = time_calls(lambda steps: plan_program(model, steps, law="torque_rate_limited"), [program], warm_up=0)
     growth = ", ".join(f"{count} waypoints {np.median(times):.2f} s" for count, times in medians.items())
-    note = f"{_ROBOT}, lines of 4 mm at speed 0.5, blends of 10 mm asked for; {growth}; torque_rate_limited, which the "
-    note += f"page plans programs with: 1000 waypoints {gentle[0]:.2f} s"
+    note = f"{_ROBOT}, lines of 4 mm at speed 0.5, blends of 10 mm requested; {growth}; torque_rate_limited, as the "
+    note += f"page plans programs: 1000 waypoints {gentle[0]:.2f} s"
     return summarise("program_close", medians[1000], "s", 3.0, note)
 
 
 def bench_check() -> Measurement:
-    """The check of a 7-joint motion of 10 s during a drag: every condition but collisions."""
+    """The check of a 7-joint motion of 10 s during a drag: all conditions except collisions."""
     model = load_model(_ROBOT)
     return _bench_check("check", lambda motion: check(motion, model, distance=None), model, 10.0)
 
 
 def bench_check_full() -> Measurement:
-    """The check of a 7-joint motion of 10 s by every condition, torques and collisions too."""
+    """The check of a 7-joint motion of 10 s by all conditions, including torques and collisions."""
     model = load_model(_ROBOT)
     found = _bench_check("check_full", lambda motion: check(motion, model), model, 150.0)
     geometry, motion = model.collision_geometry(), motion_of(model, 10.0)
-    query, looks = ClearanceQuery(geometry), 0
-    for ask in (query.links, query.floor):
-        looks += clearance_path(ask, motion.q, motion.start, geometry.levers, (0.0, ADVISED_DISTANCE)).queries
+    query, count = ClearanceQuery(geometry), 0
+    for compute_distance in (query.links, query.floor):
+        count += clearance_path(
+            compute_distance, motion.q, motion.start, geometry.levers, (0.0, ADVISED_DISTANCE)
+        ).queries
     travel = float((np.abs(np.diff(motion.q, axis=0)) @ geometry.levers).sum())
-    return replace(found, note=f"{found.note}; {looks} looks for collisions on {travel:.1f} m of travel")
+    return replace(found, note=f"{found.note}; {count} distance queries on {travel:.1f} m of travel")
 
 
 def bench_check_joint_rows() -> Measurement:
-    """The check of a 7-joint motion of 10 s by the conditions on joint angles alone."""
+    """The check of a 7-joint motion of 10 s by the conditions on joint angles only."""
     model = load_model(_ROBOT)
     assert model.description.conditions is not None
     check_again = check(motion_of(model, 1.0), model, distance=None).check_again
@@ -177,7 +179,7 @@ def bench_check_joint_rows() -> Measurement:
 
 
 def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel, target: float) -> Measurement:
-    """Measures a check, each time of a new motion, so that nothing is cached, and how it grows with length."""
+    """Measures a check on new motions, so that nothing is cached, and its scaling with the length."""
     motions = [motion_of(model, 10.0) for _ in range(30)]
     times = time_calls(call, motions, warm_up=0)
     some = ([motion_of(model, duration) for _ in range(5)] for duration in _LENGTHS)
@@ -187,7 +189,7 @@ def _bench_check(name: str, call: Callable[[Motion], object], model: RobotModel,
 
 
 def bench_jog() -> Measurement:
-    """One cycle of on-line re-planning while the tool is jogged by changing twists, other commands in the note."""
+    """One cycle of on-line re-planning while the tool is jogged with changing twists; other commands in the note."""
     model = load_model(_ROBOT)
     twists = 0.05 * np.random.default_rng(_SEED).normal(size=(20, 6))
 
@@ -219,7 +221,7 @@ def bench_jog() -> Measurement:
 
 
 def program_of(model: RobotModel, count: int) -> Program:
-    """Returns a program around home: the tool along a rising square, some corners by arcs, some ways in joint space.
+    """Returns a program around home: the tool along a rising square, with some arcs and some joint motions.
 
     Args:
         model: The arm.
@@ -227,7 +229,7 @@ def program_of(model: RobotModel, count: int) -> Program:
     """
     T = model.forward(model.home)
 
-    def place(x: float, y: float, z: float, turn: float) -> Pose:
+    def pose(x: float, y: float, z: float, turn: float) -> Pose:
         return Pose(T.position + (x, y, z), (T @ Pose.from_rpy((0.0, 0.0, 0.0), (0.0, turn, 0.0))).wxyz)
 
     corners = ((0.0, 0.12), (-0.12, 0.12), (-0.12, -0.12), (0.0, -0.12))
@@ -242,13 +244,13 @@ def program_of(model: RobotModel, count: int) -> Program:
             waypoints.append(
                 Waypoint.arc(
                     (*(T.position[:2] + (x - 0.08, y / 2.0)), T.position[2]),
-                    place(x, y, height, turn),
+                    pose(x, y, height, turn),
                     speed=0.5,
                     blend=0.02,
                 )
             )
         else:
-            waypoints.append(Waypoint.line(place(x, y, height, turn), speed=0.5, blend=0.02))
+            waypoints.append(Waypoint.line(pose(x, y, height, turn), speed=0.5, blend=0.02))
     return Program(model=model.name, start=tuple(model.home.tolist()), waypoints=tuple(waypoints))
 
 
@@ -257,24 +259,24 @@ def close_program_of(model: RobotModel, count: int) -> Program:
 
     Args:
         model: The arm.
-        count: Number of waypoints; 100 go once round.
+        count: Number of waypoints; 100 per revolution.
     """
     T = model.forward(model.home)
-    places = (
+    positions = (
         T.position + (0.05 * (np.cos(turn) - 1.0), 0.05 * np.sin(turn), -5e-5 * i + 2e-3 * (i % 2))
         for i, turn in enumerate(np.arange(1, count + 1) * 2.0 * np.pi / 100.0)
     )
-    waypoints = tuple(Waypoint.line(Pose(place, T.wxyz), speed=0.5, blend=0.01) for place in places)
+    waypoints = tuple(Waypoint.line(Pose(position, T.wxyz), speed=0.5, blend=0.01) for position in positions)
     return Program(model=model.name, start=tuple(model.home.tolist()), waypoints=waypoints)
 
 
 def motion_of(model: RobotModel, duration: float, start: Array | None = None) -> Motion:
-    """Returns a fresh motion of about this duration, [s], towards the far end of every joint's range, or back home.
+    """Returns a new motion of about this duration towards the upper end of every joint's range, or back home.
 
     Args:
         model: The arm.
-        duration: How long it is to take, [s].
-        start: Where it starts, shape (n,), [rad]; the near end of every joint's range when absent.
+        duration: Duration, [s].
+        start: Start, shape (n,), [rad]; None: near the lower end of every joint's range.
     """
     near = -0.9 * model.limits.joint.upper if start is None else start
     far = 0.9 * model.limits.joint.upper
@@ -287,7 +289,7 @@ def motion_of(model: RobotModel, duration: float, start: Array | None = None) ->
 
 
 def _ratios(model: RobotModel, ends: Array) -> tuple[Array, Array]:
-    """Returns how much longer motions at full speed last than the fastest straight one, and than one joint needs."""
+    """Returns the durations of motions at full speed relative to the fastest straight one, and to the slowest joint."""
     limits = model.limits.joint
     durations = [plan_joint(model, start, goal, speed=1.0).duration for start, goal in ends]
     bounds = np.array([(fastest_straight(limits, b - a), slowest_alone(limits, b - a)) for a, b in ends])
@@ -296,13 +298,13 @@ def _ratios(model: RobotModel, ends: Array) -> tuple[Array, Array]:
 
 
 def _random_q(model: RobotModel, count: int) -> Array:
-    """Returns joint angles spread over the joint ranges, shape (count, n), [rad], the same on every machine."""
+    """Returns joint angles distributed over the joint ranges, shape (count, n), [rad], the same on every machine."""
     limits = model.limits.joint
     return np.random.default_rng(_SEED).uniform(0.98 * limits.lower, 0.98 * limits.upper, (count, model.n))
 
 
 def _growth(call: Any, cases: dict[int, Any]) -> str:
-    """Returns how the cost of a call grows with the size of its argument, in words."""
+    """Returns the cost of a call by the size of its argument, as text."""
     costs = []
     for size, argument in cases.items():
         start = time.perf_counter()

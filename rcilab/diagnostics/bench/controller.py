@@ -1,4 +1,4 @@
-"""What a millisecond costs the virtual controller, and how even its milliseconds are."""
+"""Computing time of a cycle of the virtual controller, and the regularity of its period."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ _ROBOT = "xMatePro7"
 _DURATION = 5.0  # [s] of simulated motion.
 _DEPTH = 0.05  # [m] that the tool goes down and up.
 _TARGETS: dict[PlantKind, float] = {"ideal": 150.0, "mujoco": 250.0}  # [us]
-_EVENNESS = 100.0  # [us] What 99.9 % of the periods may be off.
-_PATIENCE = 10.0  # [s]
-_MEMORY = 0.005  # [s] How long after a core stood still a period may still suffer from it.
-_SO_TIMESTAMPNS = 35  # Linux, socket(7): the kernel stamps every datagram's arrival.
+_JITTER_TARGET = 100.0  # [us] Largest deviation of 99.9 % of the periods.
+_TIMEOUT = 10.0  # [s]
+_RECOVERY_TIME = 0.005  # [s] After a stall of a core, for which it can still delay a period.
+_SO_TIMESTAMPNS = 35  # Linux, socket(7): the kernel adds the time of arrival to every datagram.
 
 Command = Callable[[int, int], bytes]
 """`(message id, cycle) -> datagram`."""
 
 
 def bench_controller_ideal() -> Measurement:
-    """A cycle while every joint moves: command in, checked, plant moved, state out."""
+    """A cycle while every joint moves: command received and checked, plant advanced, state sent."""
     return _bench_plant("ideal")
 
 
 def bench_controller_mujoco() -> Measurement:
-    """The same with an arm that has mass."""
+    """The same with MuJoCo."""
     return _bench_plant("mujoco")
 
 
@@ -64,7 +64,7 @@ def bench_controller_cartesian() -> Measurement:
 
 
 def bench_controller_impedance() -> Measurement:
-    """The same with springs at the tool, the mode that computes most; joint impedance and torque in the note."""
+    """The same with Cartesian impedance, the most expensive mode; joint impedance and torque in the note."""
     model = load_model(_ROBOT)
     found = _in_both_plants("controller_impedance", model, rci.StartMove(3, 2), _line_commands(model, _DURATION))
     others: list[str] = []
@@ -84,40 +84,41 @@ def _in_both_plants(name: str, model: RobotModel, start: rci.StartMove, commands
 
 
 def bench_state_period(seconds: float = 10.0) -> Measurement:
-    """How far the time between two states is from 1 ms, free-running and moving, by the kernel's own stamps.
+    """Deviation of the time between two states from 1 ms, free-running and moving, by the kernel's time stamps.
 
-    The promise is about 99.9 % of the periods, and only where the controller gets SCHED_FIFO.
+    The target is for 99.9 % of the periods, and only if the controller gets SCHED_FIFO.
     """
     model = load_model(_ROBOT)
     commands = joint_commands(model, seconds)
     controller = start_controller(_ROBOT)
     try:
         assert controller.address is not None
-        place = parse_address(controller.address)
-        with CpuStallMonitor() as watch:
-            stamps, is_faulty = _stream(place.host, place.port, commands, round(seconds / CYCLE_TIME))
+        address = parse_address(controller.address)
+        with CpuStallMonitor() as stalls:
+            stamps, is_faulty = _stream(address.host, address.port, commands, round(seconds / CYCLE_TIME))
     finally:
         controller.end()
-    off = np.abs(np.diff(stamps) - CYCLE_TIME)
-    found = summarise("state_period", off, "us", _EVENNESS)
-    p999, largest = 1e6 * float(np.quantile(off, 0.999)), 1e6 * float(off.max())
+    deviation = np.abs(np.diff(stamps) - CYCLE_TIME)
+    found = summarise("state_period", deviation, "us", _JITTER_TARGET)
+    p999, largest = 1e6 * float(np.quantile(deviation, 0.999)), 1e6 * float(deviation.max())
     has_fifo = probe_realtime()[0]
-    uneven = stamps[1:][1e6 * off > _EVENNESS]
+    irregular = stamps[1:][1e6 * deviation > _JITTER_TARGET]
     note = (
         f"|period - 1 ms| of {len(stamps)} states while moving; p99.9 {p999:.0f}, max {largest:.0f} us; "
-        f"{len(uneven)} off by more than {_EVENNESS:g} us, {int(watch.explains(uneven, _MEMORY).sum())} of them when a "
-        f"core of this machine had stood still, as one did {len(watch.pauses)} times; beside it an empty loop of the "
-        f"highest priority woke up late by p99.9 {1e6 * float(np.quantile(watch.lateness, 0.999)):.0f} us"
+        f"{len(irregular)} off by more than {_JITTER_TARGET:g} us, "
+        f"{int(stalls.explains(irregular, _RECOVERY_TIME).sum())} of them after one of {len(stalls.pauses)} stalls "
+        "of a core; lateness of an empty loop with the highest priority: p99.9 "
+        f"{1e6 * float(np.quantile(stalls.lateness, 0.999)):.0f} us"
     )
     if not has_fifo:
-        note += "; SCHED_FIFO NOT PERMITTED, so nothing is promised"
+        note += "; SCHED_FIFO NOT PERMITTED, so there is no target"
     if is_faulty:
         note += "; THE MOTION WAS STOPPED BY A FAULT"
-    return replace(found, note=note, ok=p999 <= _EVENNESS and not is_faulty if has_fifo else None)
+    return replace(found, note=note, ok=p999 <= _JITTER_TARGET and not is_faulty if has_fifo else None)
 
 
 def joint_commands(model: RobotModel, duration: float) -> Command:
-    """Returns the commands of a motion of every joint from the home pose; it stands at its end afterwards."""
+    """Returns the commands of a motion of all joints from the home pose; after its end they are constant."""
     rows = [(*row, *[0.0] * (7 - model.n)) for row in motion_of(model, duration, model.home).q.tolist()]
 
     def command(message_id: int, cycle: int) -> bytes:
@@ -160,7 +161,7 @@ def _mode_name(start: rci.StartMove) -> str:
 
 
 def _times(cycle: RciController, command: Callable[[int, int], bytes | None], count: int) -> Array:
-    """Returns what each cycle took, from the command's bytes to the state's, shape (count,), [s]."""
+    """Returns the time of each cycle, from the bytes of the command to those of the state, shape (count,), [s]."""
     times = np.empty(count)
     for k in range(count):
         datagram = command(cycle.state.message_id, k)
@@ -173,23 +174,23 @@ def _times(cycle: RciController, command: Callable[[int, int], bytes | None], co
 
 
 def _stream(host: str, port: int, command: Command, count: int) -> tuple[Array, bool]:
-    """Runs a motion as the smallest client can; returns the states' arrival, monotonic, [s], and if one was faulty."""
+    """Runs a motion with a minimal client; returns the arrival times of the states, [s], and whether one had faults."""
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
-        socket.create_connection((host, port), timeout=_PATIENCE) as tcp,
+        socket.create_connection((host, port), timeout=_TIMEOUT) as tcp,
     ):
         udp.bind(("127.0.0.1", 0))
         udp.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
-        udp.settimeout(_PATIENCE)
+        udp.settimeout(_TIMEOUT)
         requests = rci.Connect(udp.getsockname()[1]), rci.SetMotorPower(1), rci.StartMove(0, 1)
         for number, request in enumerate(requests):
             tcp.sendall(rci.encode_request(request, number))
             tcp.recv(rci.HEADER.size + 1)
         state, _ = _receive(udp)
-        deadline = time.monotonic() + _PATIENCE
+        deadline = time.monotonic() + _TIMEOUT
         while state.motion_generator_mode is MotionGeneratorMode.IDLE:
             if time.monotonic() > deadline:
-                raise DeadlineError(f"bench: the controller at {host}:{port} did not begin to move; try again")
+                raise DeadlineError(f"bench: the controller at {host}:{port} did not start the motion; try again")
             state, _ = _receive(udp)
         stamps, offset = np.empty(count), time.monotonic() - time.time()
         for k in range(count):

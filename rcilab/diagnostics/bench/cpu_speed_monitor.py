@@ -1,7 +1,7 @@
-"""How fast this machine computes while something is measured on it.
+"""Monitoring of the speed of this machine during a measurement.
 
-Other people's work on the same processor makes a virtual machine slower for seconds or minutes, without any sign inside
-of it: neither load nor stolen time shows it. A fixed piece of Python that is timed now and then does.
+Other virtual machines on the same processor can slow this one down for seconds or minutes, which neither its load nor
+its stolen time shows. The time of a fixed Python loop, measured repeatedly, does.
 """
 
 from __future__ import annotations
@@ -10,45 +10,45 @@ import statistics
 import threading
 import time
 
-_ROUNDS = 20_000  # Some 1 ms of Python.
-_PERIOD = 0.5  # [s] between two looks: 0.2 % of a core.
-SLOW = 1.2  # Reported from here on: other rows vary by 10 % from run to run, so that less says nothing.
+_ROUNDS = 20_000  # About 1 ms of Python.
+_PERIOD = 0.5  # [s] Between two samples: 0.2 % of a core.
+SLOW = 1.2  # Reported from this factor on: rows vary by 10 % from run to run, so smaller factors mean nothing.
 
 
 class CpuSpeedMonitor:
-    """Looks again and again from `with` to its end. Use one for several things, one after the other."""
+    """Samples the speed inside its `with` block. Can be used for several measurements in sequence."""
 
     def __init__(self) -> None:
-        self._fastest = min(_look() for _ in range(50))
-        self._looks: list[float] = []
+        self._fastest = min(_time_loop() for _ in range(50))
+        self._samples: list[float] = []
         self._is_over = threading.Event()
-        self._watcher: threading.Thread | None = None
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> CpuSpeedMonitor:
-        self._looks, self._is_over = [_look()], threading.Event()
-        self._watcher = threading.Thread(target=self._watch, name="pace-watch", daemon=True)
-        self._watcher.start()
+        self._samples, self._is_over = [_time_loop()], threading.Event()
+        self._thread = threading.Thread(target=self._run, name="cpu-speed-monitor", daemon=True)
+        self._thread.start()
         return self
 
     def __exit__(self, *exc_info: object) -> None:
-        assert self._watcher is not None
+        assert self._thread is not None
         self._is_over.set()
-        self._watcher.join()
+        self._thread.join()
 
     @property
     def slowness(self) -> float:
-        """How many times as long as ever at best the piece has taken, in the median, since the last `with`."""
-        looks = tuple(self._looks)
-        self._fastest = min(self._fastest, *looks)
-        return statistics.median(looks) / self._fastest
+        """Median time of the loop in the last `with` block, relative to the shortest time ever."""
+        samples = tuple(self._samples)
+        self._fastest = min(self._fastest, *samples)
+        return statistics.median(samples) / self._fastest
 
-    def _watch(self) -> None:
+    def _run(self) -> None:
         while not self._is_over.wait(_PERIOD):
-            self._looks.append(_look())
+            self._samples.append(_time_loop())
 
 
-def _look() -> float:
-    """Returns what the piece takes, [s]: of processor time, so that waiting for a core does not count."""
+def _time_loop() -> float:
+    """Returns the processor time of the loop, [s], which excludes waiting for a core."""
     start, total = time.thread_time_ns(), 0
     for number in range(_ROUNDS):
         total += number * number

@@ -1,8 +1,8 @@
-"""Watches the machine's cores while something else runs on them: how often a core itself stood still.
+"""Monitoring of the cores of this machine during a measurement, for stalls of a whole core.
 
-On every core a loop that does nothing wakes up each millisecond under the highest priority there is. When it wakes up
-late, nothing on that core ran in time: the hypervisor had taken the core away, or the kernel did not let go of it. No
-program can be punctual there, so a control loop is blamed only for what is left.
+On every core an empty loop wakes up each millisecond with the highest priority. If it wakes up late, no program on that
+core could run in time: the hypervisor had taken the core away, or the kernel was busy. Late cycles of a control loop
+that coincide with such a stall are not its fault.
 
 `python -m rcilab.diagnostics.bench.cpu_stall_monitor CORE` is one of those loops; it runs until its standard input
 ends.
@@ -24,18 +24,18 @@ from numpy.typing import NDArray
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.realtime.scheduling import enter_realtime
 
-SHORTEST_PAUSE = 2e-4  # [s] Later than this is a pause; a loop in Python wakes up within some 0.1 ms otherwise.
+SHORTEST_PAUSE = 2e-4  # [s] A longer delay is a stall; normally a loop in Python wakes up within about 0.1 ms.
 
-_PRIORITY = 99  # Above everything else, so that only the machine itself can hold it up.
+_PRIORITY = 99  # Above all other processes, so that only the machine itself can delay it.
 
 
 class CpuStallMonitor:
-    """One loop a core, from `with` to its end. Owned by one thread.
+    """Runs one loop per core inside its `with` block. Owned by one thread.
 
     Attributes:
-        pauses: After the end: every pause as a row (begin, end), monotonic, shape (m, 2), [s].
-        lateness: After the end: how late the empty loops woke up, shape (k,), [s].
-        stolen: After the end: how long the hypervisor says it has kept the cores from us, all together, [s].
+        pauses: After the block: every stall as a row (begin, end), monotonic, shape (m, 2), [s].
+        lateness: After the block: lateness of the empty loops, shape (k,), [s].
+        stolen: After the block: time for which the hypervisor took the cores, sum over all, [s].
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class CpuStallMonitor:
             self._loops.append(subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
         for loop in self._loops:
             assert loop.stdout is not None
-            loop.stdout.readline()  # It watches from now on.
+            loop.stdout.readline()  # The loop has started.
         return self
 
     def __exit__(
@@ -64,14 +64,14 @@ class CpuStallMonitor:
         self.stolen += _stolen_time()
 
     def explains(self, times: NDArray[np.float64], window: NDArray[np.float64] | float) -> NDArray[np.bool_]:
-        """Returns for each time, shape (k,), monotonic, [s], whether a core stood still then or up to `window` before.
+        """Returns for each time, shape (k,), monotonic, [s], whether a core was stalled then or up to `window` before.
 
-        The beginning of a pause is known to one cycle only: it may have begun that much earlier.
+        The beginning of a stall is known to within one cycle: it may have begun one cycle earlier.
         """
         ends = np.sort(self.pauses[:, 1])
         begins = self.pauses[np.argsort(self.pauses[:, 1]), 0] - CYCLE_TIME
         first = np.searchsorted(ends, times - window)
-        latest = np.append(np.minimum.accumulate(begins[::-1])[::-1], np.inf)  # Earliest begin of any later pause.
+        latest = np.append(np.minimum.accumulate(begins[::-1])[::-1], np.inf)  # Earliest begin of any later stall.
         return latest[first] <= times
 
 
@@ -80,12 +80,12 @@ def _stolen_time() -> float:
         return int(file.readline().split()[8]) / 100.0  # proc(5): in hundredths of a second.
 
 
-def _watch(core: int) -> dict[str, list[float]]:
+def _run_loop(core: int) -> dict[str, list[float]]:
     os.sched_setaffinity(0, {core})
     enter_realtime(_PRIORITY)
     deadlines: list[float] = []
     wakes: list[float] = []
-    print("watching", flush=True)
+    print("started", flush=True)
     deadline = time.monotonic()
     while True:
         deadline += CYCLE_TIME
@@ -99,4 +99,4 @@ def _watch(core: int) -> dict[str, list[float]]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(_watch(int(sys.argv[1]))))
+    print(json.dumps(_run_loop(int(sys.argv[1]))))

@@ -1,4 +1,4 @@
-"""The least time of a straight motion from rest to rest: what planned durations are held against."""
+"""Minimum times of motions from rest to rest, as reference for planned durations."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from rcilab.core.arrays import JointVector
 from rcilab.core.limits import JointLimits
 
 
-def fastest_straight(limits: JointLimits, way: JointVector, part: float = 1.0, jerk_part: float = 1.0) -> float:
-    """Returns the least time in which all joints go straight, and together, by a way from rest to rest, [s].
+def fastest_straight(
+    limits: JointLimits, displacement: JointVector, part: float = 1.0, jerk_part: float = 1.0
+) -> float:
+    """Returns the minimum time of a straight, synchronised joint motion from rest to rest, [s].
 
-    The way is a single coordinate from 0 to 1, bounded by whichever joint allows least, and driven in seven steps
+    The path is a single coordinate from 0 to 1, bounded by the most restrictive joint, with a profile of seven segments
     (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, 3.4).
 
     Args:
         limits: Bounds of the joints.
-        way: By how far each joint moves, shape (n,), not all zero, [rad].
-        part: Part of the velocity and acceleration limits to use.
-        jerk_part: Part of the jerk limits to use.
+        displacement: Displacement of each joint, shape (n,), not all zero, [rad].
+        part: Fraction of the velocity and acceleration limits to use.
+        jerk_part: Fraction of the jerk limits to use.
     """
-    moves = way != 0.0
-    size = np.abs(way[moves])
+    moves = displacement != 0.0
+    size = np.abs(displacement[moves])
     v, a, j = (
         float((bound[moves] / size).min())
         for bound in (part * limits.velocity, part * limits.acceleration, jerk_part * limits.jerk)
@@ -34,12 +36,13 @@ def fastest_straight(limits: JointLimits, way: JointVector, part: float = 1.0, j
     return 4.0 * float(np.cbrt(0.5 / j))
 
 
-def slowest_alone(limits: JointLimits, way: JointVector) -> float:
-    """Returns the least time of the joint that needs most by itself, [s]: a bound for any motion, straight or not.
+def slowest_alone(limits: JointLimits, displacement: JointVector) -> float:
+    """Returns the minimum time of the slowest joint by itself, [s], a lower bound for any motion.
 
     Args:
         limits: Bounds of the joints.
-        way: By how far each joint moves, shape (n,), not all zero, [rad].
+        displacement: Displacement of each joint, shape (n,), not all zero, [rad].
     """
-    alone = (np.where(np.arange(len(way)) == joint, way, 0.0) for joint in np.flatnonzero(way))
+    joints = np.arange(len(displacement))
+    alone = (np.where(joints == joint, displacement, 0.0) for joint in np.flatnonzero(displacement))
     return max(fastest_straight(limits, one) for one in alone)

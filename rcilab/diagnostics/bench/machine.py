@@ -1,4 +1,4 @@
-"""The machine that was measured: without it a number means nothing."""
+"""Description of the measured machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PACKAGES = ("rcilab", "numpy", "pin", "ruckig", "mujoco", "viser")
 
 
 def describe_machine() -> dict[str, Any]:
-    """Returns cpu, cores, load, versions, and whether SCHED_FIFO and locked memory are in force for our loops."""
+    """Returns CPU, cores, load, versions, and whether a loop gets SCHED_FIFO and locked memory."""
     fifo, locked = probe_realtime()
     return {
         "name": "machine",

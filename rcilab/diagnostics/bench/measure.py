@@ -16,20 +16,20 @@ UNIT_SECONDS: dict[Unit, float] = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measurement:
-    """What one bench found."""
+    """Result of one benchmark."""
 
     name: str
     median: float
     p99: float
     unit: Unit
     target: float | None
-    """What we promise, in `unit`; None when nothing is promised."""
+    """Target, in `unit`; None without a target."""
     ok: bool | None
-    """Whether the promise is kept; None when nothing is promised."""
+    """Whether the target is met; None without a target."""
     note: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """Returns the entry that `rcilab bench --json` prints."""
+        """Returns the entry for `rcilab bench --json`."""
         return asdict(self)
 
 
@@ -39,9 +39,9 @@ class Absent:
 
     name: str
     note: str
-    """The reason, and what to do."""
+    """Reason and remedy."""
     ok: bool | None = None
-    """False when it was tried and failed; None when it cannot be tried here."""
+    """False if the measurement failed; None if it is not possible on this machine."""
 
     def as_json(self) -> dict[str, Any]:
         """Returns an entry with the keys of a `Measurement`, its figures null."""
@@ -49,14 +49,14 @@ class Absent:
 
 
 def summarise(name: str, seconds: ArrayLike, unit: Unit, target: float | None, note: str = "") -> Measurement:
-    """Returns the median and 99th percentile of measured times; the promise is about the median.
+    """Returns median and 99th percentile of measured times; the target is for the median.
 
     Args:
         name: Name of the bench.
         seconds: Measured times, [s].
         unit: Unit to report in.
         target: Largest median, in `unit`.
-        note: What else the reader should know.
+        note: Further facts.
     """
     values = np.asarray(seconds, dtype=np.float64) / UNIT_SECONDS[unit]
     median, p99 = float(np.median(values)), float(np.percentile(values, 99))
@@ -67,7 +67,7 @@ def summarise(name: str, seconds: ArrayLike, unit: Unit, target: float | None, n
 
 
 def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, warm_up: int = 5) -> list[float]:
-    """Returns the time of each call, [s], one a given argument, after a few that do not count."""
+    """Returns the time of each call, [s], one per argument, after a few warm-up calls."""
     for argument in arguments[:warm_up]:
         call(argument)
     times: list[float] = []
@@ -79,11 +79,11 @@ def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, wa
 
 
 def cost_by_length(call: Callable[[Any], object], cases: Iterable[tuple[float, Sequence[object]]]) -> str:
-    """Returns as text how the cost of a call grows with the length of the motion that it plans or checks.
+    """Returns the cost of a call by the length of the motion that it plans or checks, as text.
 
     Args:
-        call: What to time.
-        cases: For each length, [s], arguments to call with, once each; the median counts.
+        call: The call.
+        cases: For each length, [s], the arguments of its calls, of which the median is taken.
     """
     costs = [
         f"{plain(length)} s {plain(1e3 * float(np.median(time_calls(call, arguments, warm_up=0))))} ms"
@@ -93,5 +93,5 @@ def cost_by_length(call: Callable[[Any], object], cases: Iterable[tuple[float, S
 
 
 def plain(value: float) -> str:
-    """Returns a number to three digits and without an exponent, as a person reads it."""
+    """Returns a number with three digits and without an exponent."""
     return f"{value:.0f}" if abs(value) >= 999.5 else f"{value:.3g}"

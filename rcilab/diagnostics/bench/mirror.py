@@ -1,4 +1,4 @@
-"""What it costs to let the page show where the arm is."""
+"""Cost of showing the position of the arm on a page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rcilab.views.viser_scene import ViserScene
 
 _ROBOT = "xMatePro7"
 _RATE = 60.0  # [Hz]
-_PART = 1.5  # [s] of standing still and of moving, in turns, so that other load on the machine affects both.
+_PART = 1.5  # [s] Standstill and motion alternate, so that other load on the machine affects both.
 _PARTS = 6
 _PAGE = """
 import sys
@@ -32,11 +32,11 @@ with connect("ws" + url[4:], origin=url.rstrip("/"), subprotocols=[protocol], ma
     for _ in link:
         pass
 """
-"""Receives everything and draws nothing, in a process of its own: the cost of a page is not the cost of mirroring."""
+"""A client that receives everything and draws nothing, in its own process, so that only the mirroring is measured."""
 
 
 def bench_mirror() -> Measurement:
-    """What it costs this process, in processor time a second, to keep the arm on one page at 60 Hz."""
+    """Processor time per second of this process for updating the arm on one page at 60 Hz."""
     model = load_model(_ROBOT)
     poses = model.home + 0.3 * np.sin(0.1 * np.arange(int(_RATE * _PART))[:, np.newaxis] + np.arange(model.n))
     with bare_page() as (server, url):
@@ -46,13 +46,13 @@ def bench_mirror() -> Measurement:
             for _ in range(_PARTS):
                 idle, moving = _processor_time(lambda step: None), _processor_time(lambda step: arm.show(poses[step]))
                 costs.append(max(moving - idle, 0.0) / _PART)
-    note = f"{_RATE:.0f} poses a second of an {_ROBOT}, one page connected; 50 ms a second are 5 % of a core"
+    note = f"{_RATE:.0f} poses per second of an {_ROBOT}, one page connected; 50 ms per second are 5 % of a core"
     return summarise("mirror", costs, "ms", 50.0, note)
 
 
 @contextmanager
 def _receiving(url: str) -> Iterator[None]:
-    """Keeps a client connected that receives what a page does."""
+    """Keeps a client connected that receives the messages of a page."""
     command = [sys.executable, "-c", _PAGE, url, f"viser-v{version('viser')}"]
     page = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     try:

@@ -1,4 +1,4 @@
-"""Latencies of a notebook: the lab in its cell, and the arm behind a slider."""
+"""Latencies of a notebook: display of the lab, and motion of the arm by a slider."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.diagnostics.bench.measure import Measurement, summarise
 
 _KERNELS = 3
 _SLIDES = 200
-_PATIENCE = 60.0  # [s]
+_TIMEOUT = 60.0  # [s]
 _MAKE = """
 import time, rcilab
 model = rcilab.load_model("xMatePro7")
@@ -44,27 +44,27 @@ def slide(angle):
 
 
 def bench_lab_shown() -> Measurement:
-    """`Lab(model)` in a fresh kernel, from its import to all that is seen of it sent to the browser."""
-    shown, opened = zip(*(_ask_kernel(_SHOW, _OPEN) for _ in range(_KERNELS)), strict=True)
+    """`Lab(model)` in a fresh kernel, from its import until everything visible has been sent to the browser."""
+    shown, opened = zip(*(_run_cells(_SHOW, _OPEN) for _ in range(_KERNELS)), strict=True)
     note = (
-        f"{_KERNELS} fresh kernels, the model loaded; imports included; the other tabs are made when they are "
+        f"{_KERNELS} fresh kernels, the model loaded; imports included; the other tabs are built when they are "
         f"opened, {statistics.median(opened):.2f} s for all of them"
     )
     return summarise("lab_shown", shown, "s", 2.0, note)
 
 
 def bench_lab_slider() -> Measurement:
-    """From a slider's message in the kernel to the new pose on its way to the inline scene, with all of `Lab` open."""
-    *_, times = _ask_kernel(_SHOW, _OPEN, _SLIDE)
-    note = f"{_SLIDES} messages of a joint slider; scene, target, arm-angle circle and tables follow each"
+    """From a slider's message in the kernel until the new pose is sent to the scene, with all tabs of `Lab` open."""
+    *_, times = _run_cells(_SHOW, _OPEN, _SLIDE)
+    note = f"{_SLIDES} messages of a joint slider; each updates scene, target, arm-angle circle and tables"
     return summarise("lab_slider", times, "ms", 50.0, note)
 
 
-def _ask_kernel(*cells: str) -> list[Any]:
-    """Returns the value of each cell, run one after the other in a kernel of its own."""
+def _run_cells(*cells: str) -> list[Any]:
+    """Runs cells in a new kernel and returns their values."""
     from jupyter_client.manager import start_new_kernel
 
-    manager, client = start_new_kernel(startup_timeout=_PATIENCE, stderr=subprocess.DEVNULL)
+    manager, client = start_new_kernel(startup_timeout=_TIMEOUT, stderr=subprocess.DEVNULL)
     try:
         _run(client, _MAKE)
         return [_run(client, cell) for cell in cells]
@@ -77,9 +77,9 @@ def _run(client: Any, code: str) -> Any:
     request, value = client.execute(code), None
     while True:
         try:
-            reply = client.get_iopub_msg(timeout=_PATIENCE)
+            reply = client.get_iopub_msg(timeout=_TIMEOUT)
         except queue.Empty as error:
-            raise DeadlineError(f"bench: the kernel sent nothing for {_PATIENCE:g} s") from error
+            raise DeadlineError(f"bench: the kernel sent nothing for {_TIMEOUT:g} s") from error
         if reply["parent_header"].get("msg_id") != request:
             continue
         content = reply["content"]

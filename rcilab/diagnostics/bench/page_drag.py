@@ -1,4 +1,4 @@
-"""How long the pixels lag behind the mouse that drags the target."""
+"""Latency from the mouse that drags the target to the pixels."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 _ROBOT = "xMatePro7"
-_TURNS, _MOVES = 3, 10  # In turns: the machine's speed drifts, and both should have the same of it.
-_FIRST = 4  # Moves that do not count: the arm that follows is drawn for the first time, with shaders of its own.
-_REST = 3.0  # [s] After them.
-_PAUSE = 0.3  # [s] From what one move has changed to the next move.
-_SCALE = 0.26  # [m] As the target's handles of the page.
+_TURNS, _MOVES = 3, 10  # Both pages alternate, so that drift of the machine's speed affects both.
+_FIRST = 4  # Moves that are not counted: the arm that follows is drawn for the first time, with its own shaders.
+_REST = 3.0  # [s] After these moves.
+_PAUSE = 0.3  # [s] Between the change on the page and the next move.
+_SCALE = 0.26  # [m] Size of the target's handles on the page.
 _RATIO = 1.3
 _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']; x.updateWorldMatrix(true, false);
   const v = m.camera.position.clone().set(0, SCALE, 0).applyMatrix4(x.matrixWorld).project(m.camera);
@@ -35,8 +35,8 @@ _HANDLE = """(() => { const m = __viserMutable, x = m.nodeRefFromName['/target']
 )
 _IS_THERE = "!!window.__viserMutable?.nodeRefFromName?.['NODE']"
 _POSITION = "__viserMutable.nodeRefFromName['/target'].matrixWorld.elements.join()"
-_GRASPS = 5  # A busy page may receive the mouse before the handle is under it: then it is tried again.
-_GRASP_TIMEOUT = 8.0  # [s] For the target to follow; several times what a page drawn in software takes.
+_GRASPS = 5  # Attempts: a busy page may receive the mouse event before the handle is under the mouse.
+_GRASP_TIMEOUT = 8.0  # [s] For the target to follow; several times the delay with software rendering.
 _WATCH = """(() => { const read = () => __viserMutable.nodeRefFromName['NODE'].matrixWorld.elements.join();
   let moved = 0; window.__late = []; let before = read(), frame = 0;
   addEventListener('pointermove', () => { if (!moved) moved = performance.now(); }, true);
@@ -49,7 +49,7 @@ _WATCH = """(() => { const read = () => __viserMutable.nodeRefFromName['NODE'].m
 
 
 def bench_page_drag() -> Measurement | Absent:
-    """From the mouse on the target's handle to the pixels of the arm that follows, next to viser's own bare gizmo."""
+    """From the mouse on the target's handle to the pixels of the arm, compared with a plain gizmo of viser."""
     if (reason := why_no_page()) is not None:
         return Absent(name="page_drag", note=reason)
     bare: list[float] = []
@@ -60,13 +60,13 @@ def bench_page_drag() -> Measurement | Absent:
             wait_for("the control process", lambda bench=bench: bench.session.status().phase == "idle")
             ours += _drag(page, "/candidate/joint1")
     theirs = 1e3 * float(np.median(bare))
-    note = f"{len(ours)} moves; in turns with it viser alone with a gizmo and the same arm, solving nothing: "
-    note += f"{theirs:.0f} ms"
+    note = f"{len(ours)} moves; alternating with it viser alone with a gizmo and the same arm, without inverse "
+    note += f"kinematics: {theirs:.0f} ms"
     return summarise("page_drag", ours, "ms", _RATIO * theirs, note)
 
 
 def _drag_bare() -> list[float]:
-    """Returns the same of a viser server that moves a frame with a gizmo and does nothing else, [s]."""
+    """Returns the latencies of a viser server that only moves a frame with a gizmo, [s]."""
     model = load_model(_ROBOT)
     with bare_page() as (server, url):
         server.scene.configure_environment_map(None)
@@ -87,10 +87,10 @@ def _drag_bare() -> list[float]:
 
 
 def _drag(page: Page, follower: str) -> list[float]:
-    """Returns how long each move of a drag took to show, [s]."""
+    """Returns the latency of each move of a drag, [s]."""
     wait_on_page(page, "the scene", _IS_THERE.replace("NODE", "/target"))
     time.sleep(3.0)  # Shaders are compiled and meshes uploaded while the first frames are drawn.
-    x, y = _take_hold(page)
+    x, y = _grasp(page)
     wait_on_page(page, "the arm that follows", _IS_THERE.replace("NODE", follower))
     page.evaluate(_WATCH.replace("NODE", follower))
     for move in range(-_FIRST, _MOVES):
@@ -105,11 +105,10 @@ def _drag(page: Page, follower: str) -> list[float]:
     return [1e-3 * float(one) for one in page.evaluate("__late")]
 
 
-def _take_hold(page: Page) -> tuple[float, float]:
-    """Presses the mouse on the target's handle and returns where, once the target follows it, [px].
+def _grasp(page: Page) -> tuple[float, float]:
+    """Presses the mouse on the target's handle until the target follows it, and returns the position, [px].
 
-    The target moves by itself once, to where the arm stands when the robot connects: that is not the mouse, so it has
-    to follow two moves.
+    The target also moves to the arm's position when the robot is connected; therefore it has to follow two moves.
 
     Raises:
         DeadlineError: It does not follow.
@@ -122,11 +121,11 @@ def _take_hold(page: Page) -> tuple[float, float]:
         if all(_follows(page, x + step, y + 0.5 * step) for step in (3.0, 6.0)):
             return x, y
         page.mouse.up()
-    raise DeadlineError(f"bench: the target did not follow the mouse in {_GRASPS} tries; look at `rcilab doctor`")
+    raise DeadlineError(f"bench: the target did not follow the mouse in {_GRASPS} tries; check `rcilab doctor`")
 
 
 def _find_handle(page: Page) -> tuple[float, float]:
-    """Returns where the target's handle is, [px], once neither it nor the camera moves."""
+    """Waits until the target's handle and the camera are stationary and returns the position of the handle, [px]."""
     before, now = None, page.evaluate(_HANDLE)
     while now != before:
         time.sleep(0.5)

@@ -1,4 +1,4 @@
-"""How long a page that is open cannot be used yet."""
+"""Time until an opened page can be used."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _WATCH = """(() => {
 
 
 def bench_page_ready() -> Measurement | Absent:
-    """From the browser's load event until the page can be used: arm drawn, controls and status there."""
+    """From the browser's load event until the page can be used: arm, controls and status are shown."""
     if (reason := why_no_page()) is not None:
         return Absent(name="page_ready", note=reason)
     ours: list[float] = []
@@ -35,7 +35,7 @@ def bench_page_ready() -> Measurement | Absent:
             ours.append(_load(bench.url, _USABLE))
             empty.append(_load(url, _DRAWN))
     note = f"{_LOADS} loads in fresh browsers, light graphics, in {find_chromium()}, drawn in software; "
-    note += f"viser's own page without arm and controls, in turns with it: {statistics.median(empty):.2f} s"
+    note += f"viser's page without arm and controls, alternating with it: {statistics.median(empty):.2f} s"
     return summarise("page_ready", ours, "s", 2.0, note)
 
 

@@ -1,4 +1,4 @@
-"""What a path of the tool costs to plan: lines, arcs, and what a person waits for while dragging a target."""
+"""Cost of planning tool paths: lines, arcs, and replanning while a target is dragged."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from rcilab.motion.motion import Motion
 
 _ROBOT = "xMatePro7"
 _ROUNDS = 20
-_FRAME = 1.0 / 30.0  # [s] A drag is smooth from 30 answers a second on.
-_SLOWEST = 0.01  # Speed with which the way of a metre takes about 100 s.
+_FRAME = 1.0 / 30.0  # [s] A drag is smooth from 30 updates per second on.
+_SLOWEST = 0.01  # Speed at which one metre takes about 100 s.
 
 
 def bench_plan_line() -> Measurement:
-    """A line of one metre within the limits of joints, tool and arm angle; by the length of the motion in the note."""
+    """A line of one metre within the limits of joints, tool and arm angle; other durations in the note."""
     return _bench_path("plan_line", _line)
 
 
 def bench_plan_arc() -> Measurement:
-    """An arc over the same ends, through the orientation of its middle pose."""
+    """An arc between the same ends, through the orientation of its middle pose."""
     return _bench_path("plan_arc", _arc)
 
 
 def bench_replan() -> Measurement:
-    """One answer while a target is dragged: the inverse, a motion to it and its check, without collision."""
+    """One update while a target is dragged: inverse kinematics, a motion and its check, without collisions."""
     model = load_model(_ROBOT)
     start = model.home
     T = model.forward(start)
@@ -74,7 +74,7 @@ def _arc(model: RobotModel, speed: float) -> Motion:
 
 
 def _ends(model: RobotModel) -> tuple[JointVector, Pose, Pose]:
-    """Returns where the way of a metre in front of the arm begins, a pose beside its middle, and its end."""
+    """Returns the start of a path of one metre in front of the arm, a via pose near its middle, and its end."""
     T = model.forward(model.home)
     first, via, goal = (
         Pose(T.position + step, T.wxyz) for step in ((-0.1, -0.5, -0.1), (0.1, 0, -0.1), (-0.1, 0.5, -0.1))

@@ -1,6 +1,6 @@
 """The rows of `rcilab bench`, by name, and the process that measures one of them.
 
-Every row has a process of its own, so that what one loads, starts or breaks is no part of what the next one measures.
+Every row has its own process, so that one row does not affect the next one.
 `python -m rcilab.diagnostics.bench.rows NAME SECONDS FILE` is that process; it writes its result to the file.
 """
 
@@ -55,10 +55,10 @@ ROWS = MappingProxyType(
         "spectators": "viewer_load",
     }
 )
-"""Name of each row and the module of its function, in the order they run; the slow ones last."""
+"""Name of each row and the module of its function, in the order of execution; the slow ones are last."""
 
 _STREAMING = frozenset({"control_loop", "spectators"})
-"""They take the time to stream as an argument."""
+"""Rows with the duration of streaming as argument."""
 
 
 def measure(name: str, seconds: float) -> Measurement | Absent:
@@ -66,7 +66,7 @@ def measure(name: str, seconds: float) -> Measurement | Absent:
 
     Args:
         name: One of `ROWS`.
-        seconds: How long a row that streams is to do so, [s].
+        seconds: Duration of streaming, for a row that streams, [s].
     """
     bench: Callable[..., Measurement | Absent] = getattr(
         import_module(f"rcilab.diagnostics.bench.{ROWS[name]}"), f"bench_{name}"
@@ -75,7 +75,7 @@ def measure(name: str, seconds: float) -> Measurement | Absent:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measures a row and writes the result to a file; the last line on stderr is the reason where that fails."""
+    """Measures a row and writes the result to a file; after a failure, the last line on stderr is the reason."""
     name, seconds, file = arguments
     try:
         found = measure(name, float(seconds))

@@ -1,4 +1,4 @@
-"""How quickly a long recording follows its slider: in Python, and in a browser that draws it."""
+"""Latency of seeking in a long recording: in Python, and in a browser."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _RECORDED = 60.0  # [s]
 _SEEKS = 100
 _SCRUB_TIME = 8.0  # [s] From one end of the recording to the other and back.
 _MOVE_TIME = 0.04  # [s] Between two moves of the mouse.
-_STALL = 500.0  # [ms] Longer than this the user sees the picture stop while scrubbing.
-_PAGE = 1  # Client id of the page that asks: only the one with the controls may.
+_STALL = 500.0  # [ms] A longer pause between two frames is visible as a freeze.
+_PAGE = 1  # Client id of the page that seeks; it needs the control lock.
 _READY = """!!window.__viserMutable?.nodeRefFromName?.['/live/joint1']
   && __viserTestpoints.rendererInfo.render.frame > 3 && document.querySelectorAll('.u-over .rl-cursor').length > 3"""
 _SLIDER = """(() => { const strip = document.querySelector('div:has(> div > .rl-strip)');
@@ -46,7 +46,7 @@ _WATCH = """(() => { window.__changes = { arm: [performance.now()], cursor: [per
 
 
 def bench_scrub() -> Measurement:
-    """From a click in a plot of a recording of 60 s to the cursor that every page draws, the arm moved before it."""
+    """From a click in a plot of a 60 s recording to the new cursor on every page, after the arm was moved."""
     run = recorded(load_model(_ROBOT), _RECORDED)
     times: list[float] = []
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
@@ -55,21 +55,21 @@ def bench_scrub() -> Measurement:
             bench.dispatcher.ask(PageOpened(page=_PAGE))
             link.send(json.dumps({"kind": "hello", "page": _PAGE, "key": bench.live.introduce(_PAGE)}))
             wait_for("the controls", lambda: bench.store.state.lease.holder == _PAGE, 30.0)
-            for place in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():
+            for position in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():
                 start = time.perf_counter()
-                link.send(json.dumps({"kind": "seek", "place": place}))
-                while "cursor" not in (said := json.loads(link.recv(timeout=30.0))):
-                    if "beat" in said:
+                link.send(json.dumps({"kind": "seek", "place": position}))
+                while "cursor" not in (message := json.loads(link.recv(timeout=30.0))):
+                    if "beat" in message:
                         link.send('{"kind": "here"}')
                 times.append(time.perf_counter() - start)
     longest = f"{1e3 * max(times):.0f} ms at most"
-    return summarise("scrub", times, "ms", 70.0, f"{_SEEKS} places in {run.duration:.0f} s of 7 joints; {longest}")
+    return summarise("scrub", times, "ms", 70.0, f"{_SEEKS} positions in {run.duration:.0f} s of 7 joints; {longest}")
 
 
 def bench_page_scrub() -> Measurement | Absent:
-    """How long the picture stands still while the slider under a recording of 60 s is dragged to its end and back.
+    """Time between two frames while the slider of a 60 s recording is dragged to its end and back.
 
-    The number is the time from one new picture of the arm to the next; the promise is about the longest.
+    The number is the time from one new frame of the arm to the next; the target is for the longest.
     """
     if (reason := why_no_page()) is not None:
         return Absent(name="page_scrub", note=reason)
@@ -95,8 +95,8 @@ def bench_page_scrub() -> Measurement | Absent:
     longest = 1e3 * max(arm.max(), cursor.max())
     note = (
         f"{run.duration:.0f} s of 7 joints scrubbed in {_SCRUB_TIME:.0f} s, light graphics drawn in software: "
-        f"{len(arm)} pictures of the arm, {1e3 * arm.max():.0f} ms between two at most; {len(cursor)} places of the "
-        f"cursor in the plots, {1e3 * cursor.max():.0f} ms at most; the promise is about the longest"
+        f"{len(arm)} frames of the arm, {1e3 * arm.max():.0f} ms between two at most; {len(cursor)} positions of the "
+        f"cursor in the plots, {1e3 * cursor.max():.0f} ms at most; the target is for the longest"
     )
     return Measurement(
         name="page_scrub",
@@ -110,7 +110,7 @@ def bench_page_scrub() -> Measurement | Absent:
 
 
 def recorded(model: RobotModel, seconds: float) -> Run:
-    """Returns a recording of a motion of about this length, made up: measured is what was planned a cycle before."""
+    """Returns a synthetic recording of a motion of about this duration: measured values lag the plan by one cycle."""
     plan = motion_of(model, seconds)
     cycles = np.zeros(len(plan.times), cycle_dtype(model.n))
     late = np.maximum(np.arange(len(cycles)) - 1, 0)

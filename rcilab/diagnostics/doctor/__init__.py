@@ -1,1 +1,1 @@
-"""Whether a machine is fit to plan, to simulate and to stream at 1 kHz: one question a finding, with the remedy."""
+"""Checks whether a machine can plan, simulate and stream at 1 kHz, with remedies."""

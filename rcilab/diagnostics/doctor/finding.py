@@ -1,4 +1,4 @@
-"""A finding: the answer to one question about this machine."""
+"""A finding: the result of one check of this machine."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ Verdict: TypeAlias = Literal["ok", "note", "bad"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """The answer to one question about this machine."""
+    """Result of one check of this machine."""
 
     name: str
     verdict: Verdict
     """`note`: works, with a drawback, or cannot be determined; `bad`: a part of rcilab does not work."""
     value: str
-    """What was found, in words."""
+    """Observed value or state, as text."""
     advice: str = ""
-    """What to do about it; empty when all is well."""
+    """Remedy; empty if none is needed."""
     figures: Mapping[str, float] = field(default_factory=dict[str, float])
-    """What was measured; the unit is the last part of each name."""
+    """Measured numbers; the unit is the last part of each name."""
 
     def __str__(self) -> str:
         return f"{self.verdict:4}  {self.name:20}  {self.value}" + (f"; {self.advice}" if self.advice else "")
 
     def as_json(self) -> dict[str, Any]:
-        """Returns the entry that `rcilab doctor --json` prints."""
+        """Returns the entry for `rcilab doctor --json`."""
         return asdict(self)
 
 
 def summary(findings: Iterable[Finding]) -> str:
-    """Returns the last line of the report: what is to be mended, or that nothing is in the way."""
+    """Returns the last line of the report: the failed checks, or that there are none."""
     bad = [finding.name for finding in findings if finding.verdict == "bad"]
-    return f"{len(bad)} to mend: {', '.join(bad)}" if bad else "ready: nothing is in the way"
+    return f"{len(bad)} to fix: {', '.join(bad)}" if bad else "ready: no problem found"

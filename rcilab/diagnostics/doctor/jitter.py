@@ -1,9 +1,9 @@
-"""How late a 1 kHz loop is on this machine, measured.
+"""Measurement of the jitter of a 1 kHz loop on this machine.
 
 `python -m rcilab.diagnostics.doctor.jitter SECONDS` is that loop.
 
-It does nothing but wake up, with the priority of the control process and on cores that do not sleep; whatever it is
-late by is the machine's. Once a second it prints the lateness of that second's cycles, [ns], as one JSON list.
+It only wakes up, with the priority of the control process and on cores that do not sleep, so that its lateness is that
+of the machine. Once per second it prints the lateness of that second's cycles, [ns], as one JSON list.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from rcilab.diagnostics.doctor.system import System
 from rcilab.realtime.cpu_latency import awake_cores
 from rcilab.realtime.scheduling import PRIORITY, enter_realtime
 
-_STOPPING_PAUSE = 0.010  # [s] Ten cycles: the shortest run of lost commands that a controller may stop a motion for.
-_CYCLES_A_LINE = 1000
+_STOPPING_PAUSE = 0.010  # [s] Ten cycles: the smallest number of lost commands for which a motion may be stopped.
+_CYCLES_PER_LINE = 1000
 
 
 def check_jitter(
     seconds: float, system: System, progress: Callable[[float, float], None], *, is_for_real: bool = False
 ) -> Finding:
-    """Does a loop that does nothing wake up in time?
+    """Does an empty loop wake up in time?
 
     Args:
-        seconds: How long to measure, [s].
-        system: Says how much of the time the hypervisor took.
-        is_for_real: Whether a real arm is to be driven from here, which does not wait for a machine that pauses.
-        progress: Called about once a second with the time spent so far and the largest lateness so far, [s].
+        seconds: Duration of the measurement, [s].
+        system: Reports the time taken by the hypervisor.
+        is_for_real: Whether this machine is to control a real arm, which does not wait for a stalled machine.
+        progress: Called about once per second with the elapsed time and the largest lateness so far, [s].
     """
     before = read_ticks(system)
     try:
@@ -47,11 +47,11 @@ def check_jitter(
         return Finding("jitter", "bad", str(error), "python -m rcilab.diagnostics.doctor.jitter 2 shows why")
     after = read_ticks(system)
     stolen = (after[0] - before[0]) / 100.0 if before and after else None
-    return judge_jitter(late, stolen, is_for_real=is_for_real)
+    return evaluate_jitter(late, stolen, is_for_real=is_for_real)
 
 
 def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> Array:
-    """Returns how late each cycle of an empty 1 kHz loop in a process of its own woke up, shape (cycles,), [s].
+    """Returns the lateness of each cycle of an empty 1 kHz loop in a separate process, shape (cycles,), [s].
 
     Raises:
         DeadlineError: The loop ended before its time.
@@ -63,7 +63,7 @@ def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> 
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
-        start_new_session=True,  # Ctrl-C is for us; we end the loop.
+        start_new_session=True,  # Ctrl-C does not reach the loop, which is ended below.
     )
     with loop:
         assert loop.stdout is not None
@@ -81,13 +81,13 @@ def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> 
     return readonly_copy(late)
 
 
-def judge_jitter(late: Array, stolen: float | None, *, is_for_real: bool = False) -> Finding:
-    """Returns what the lateness of cycles means for a control loop.
+def evaluate_jitter(late: Array, stolen: float | None, *, is_for_real: bool = False) -> Finding:
+    """Evaluates the lateness of cycles for a control loop.
 
     Args:
-        late: One number a cycle, shape (cycles,), [s].
-        stolen: How long the hypervisor held the cores meanwhile, all together, [s]; None when unknown.
-        is_for_real: Whether a real arm is to be driven from here.
+        late: Lateness per cycle, shape (cycles,), [s].
+        stolen: Time for which the hypervisor took the cores during the measurement, sum over all, [s]; None: unknown.
+        is_for_real: Whether this machine is to control a real arm.
     """
     median, p99, p999, worst = (1e6 * float(np.percentile(late, part)) for part in (50, 99, 99.9, 100))
     missed = int((late > CYCLE_TIME).sum())
@@ -103,9 +103,9 @@ def judge_jitter(late: Array, stolen: float | None, *, is_for_real: bool = False
         found += f"; the hypervisor took {stolen:.2f} s"
     if not missed:
         return Finding("jitter", "ok", found, figures=figures)
-    advice = "close what else runs here, and mend what is noted above"
+    advice = "close other programs, and apply the remedies above"
     if stolen:
-        advice += "; what a hypervisor takes, only its owner can give back: use a machine of its own"
+        advice += "; only the owner of a hypervisor can change its share: use a dedicated machine"
     if worst * 1e-6 >= _STOPPING_PAUSE:
         advice = f"a pause of {1e3 * _STOPPING_PAUSE:g} ms can stop a real arm's motion: {advice}"
         return Finding("jitter", "bad" if is_for_real else "note", found, advice, figures)
@@ -121,7 +121,7 @@ def _run(seconds: float) -> None:
     enter_realtime(PRIORITY)
     deadline = time.monotonic_ns()
     while left:
-        late = [0] * min(left, _CYCLES_A_LINE)
+        late = [0] * min(left, _CYCLES_PER_LINE)
         for cycle in range(len(late)):
             deadline += round(1e9 * CYCLE_TIME)
             remaining = deadline - time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""Does the kernel let a loop of ours go first? Preemption, SCHED_FIFO, locked memory, real-time throttling."""
+"""Checks of the kernel: preemption, SCHED_FIFO, locked memory, real-time throttling."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _USER_LIMITS = (
 _CONTAINER = "docker run --cap-add SYS_NICE --cap-add IPC_LOCK --ulimit rtprio=99 --ulimit memlock=-1"
 _DEBUG_FILE = "/sys/kernel/debug/sched/preempt"
 _VENDOR_FILE = "/sys/kernel/realtime"  # RCI manual 2.2
-_BUILT_MODES = {  # Options of a kernel with PREEMPT_DYNAMIC, and the mode that each makes the default.
+_BUILT_MODES = {  # Options of a kernel with PREEMPT_DYNAMIC, and their default modes.
     "CONFIG_PREEMPT_NONE": "none",
     "CONFIG_PREEMPT_VOLUNTARY": "voluntary",
     "CONFIG_PREEMPT": "full",
@@ -39,7 +39,7 @@ def check_kernel(system: System) -> Finding:
 
 
 def check_preemption(system: System) -> Finding:
-    """Can a real-time loop that becomes ready interrupt the kernel's work for another process?"""
+    """Can a real-time loop preempt the kernel's work for another process?"""
     name, version = "preemption", system.read("/proc/sys/kernel/version")
     if _is_realtime(system):
         return Finding(name, "ok", "full (PREEMPT_RT)")
@@ -58,11 +58,11 @@ def check_preemption(system: System) -> Finding:
 
 
 def check_fifo(granted: bool, system: System) -> Finding:
-    """Does a loop of ours run ahead of everything else on a core?
+    """Can the control loop run with priority over all other processes on a core?
 
     Args:
-        granted: Whether a process of ours got SCHED_FIFO when it asked.
-        system: Says why not.
+        granted: Whether a process of rcilab got SCHED_FIFO.
+        system: Source of the reason if not.
     """
     if granted:
         return Finding("SCHED_FIFO", "ok", "permitted")
@@ -80,11 +80,11 @@ def check_fifo(granted: bool, system: System) -> Finding:
 
 
 def check_memory_lock(granted: bool, system: System) -> Finding:
-    """Is the memory of a loop never paged out?
+    """Can the memory of a loop be locked?
 
     Args:
-        granted: Whether a process of ours could lock its memory.
-        system: Says why not.
+        granted: Whether a process of rcilab could lock its memory.
+        system: Source of the reason if not.
     """
     if granted:
         return Finding("locked memory", "ok", "permitted")
@@ -101,29 +101,31 @@ def check_memory_lock(granted: bool, system: System) -> Finding:
 
 
 def check_vendor_library(fifo: bool, system: System) -> Finding:
-    """Would the vendor's client library start here? It looks for one file, and asks for the highest priority.
+    """Can the vendor's client library start on this machine? It needs a file and the highest priority.
 
     Args:
-        fifo: Whether a process of ours got SCHED_FIFO.
-        system: Has the file, or not.
+        fifo: Whether a process of rcilab got SCHED_FIFO.
+        system: Source of the file.
     """
     name = "vendor's library"
     if system.read(_VENDOR_FILE).text != "1":
         return Finding(
             name,
             "note",
-            f"{_VENDOR_FILE} does not say 1: programs that use it end with an error, unless they are built with "
-            "enforce_realtime = false",
+            f"{_VENDOR_FILE} does not contain 1: programs that use it end with an error, unless they are built "
+            "with enforce_realtime = false",
             "for such a program alone: sudo unshare -m sh -c 'mount -t tmpfs none /sys/kernel; echo 1 > "
             f"{_VENDOR_FILE}; exec ./program'",
         )
     if not fifo:
-        return Finding(name, "note", "needs SCHED_FIFO 99, or it ends with an error", f"run as root, or {_USER_LIMITS}")
-    return Finding(name, "ok", "finds what it asks for")
+        return Finding(
+            name, "note", "needs SCHED_FIFO 99, else it ends with an error", f"run as root, or {_USER_LIMITS}"
+        )
+    return Finding(name, "ok", "its requirements are met")
 
 
 def check_throttling(system: System) -> Finding:
-    """Does the kernel leave real-time loops enough of every period? Ours need less than half."""
+    """Does the kernel give real-time loops enough of every period? Those of rcilab need less than half."""
     name = "real-time share"
     runtime, period = (system.read(f"/proc/sys/kernel/sched_rt_{part}_us") for part in ("runtime", "period"))
     if runtime.text is None or period.text is None:
@@ -131,7 +133,7 @@ def check_throttling(system: System) -> Finding:
     try:
         share = int(runtime.text) / int(period.text)
     except (ValueError, ZeroDivisionError):
-        return Finding(name, "note", f"unknown: sched_rt_runtime_us says {runtime.text!r} of {period.text!r}")
+        return Finding(name, "note", f"unknown: sched_rt_runtime_us is {runtime.text!r} of {period.text!r}")
     if share < 0.0:
         return Finding(name, "ok", "not throttled")
     if share < 0.5:
@@ -142,17 +144,17 @@ def check_throttling(system: System) -> Finding:
 
 def _is_realtime(system: System) -> bool:
     version = system.read("/proc/sys/kernel/version").text or ""
-    # Kernels before 5.3 wrote "PREEMPT RT". The file of the manual, 2.2, is no proof: people make it for the library.
+    # Kernels before 5.3 have "PREEMPT RT". The file of manual 2.2 proves nothing: users create it for the library.
     return bool(re.search(r"PREEMPT[_ ]RT\b", version))
 
 
 def _dynamic_mode(system: System) -> tuple[str | None, str]:
-    """Returns the mode of a PREEMPT_DYNAMIC kernel and where that is known from; without a mode, why it is unknown."""
+    """Returns the mode of a PREEMPT_DYNAMIC kernel and its source; without a mode, the reason."""
     running = system.read(_DEBUG_FILE)
     chosen = re.search(r"\((\w+)\)", running.text or "")  # Such as: none voluntary (full) lazy
     if chosen:
         return chosen[1], "now in force"
-    problem = running.problem or f"{_DEBUG_FILE} says {running.text!r}"
+    problem = running.problem or f"{_DEBUG_FILE} contains {running.text!r}"
     booted = re.search(r"(?:^|\s)preempt=(\w+)", system.read("/proc/cmdline").text or "")
     if booted:
         return booted[1], f"as booted ({problem})"
@@ -166,7 +168,7 @@ def _dynamic_mode(system: System) -> tuple[str | None, str]:
 
 
 def _limit(system: System, name: str) -> tuple[str | None, str]:
-    """Returns the soft limit of that name as proc(5) prints it, or None and why it is not known."""
+    """Returns a soft limit as proc(5) prints it, or None and the reason."""
     limits = system.read("/proc/self/limits")
     for line in (limits.text or "").splitlines():
         if line.startswith(name):

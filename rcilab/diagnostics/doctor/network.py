@@ -1,4 +1,4 @@
-"""Do states reach us in time: socket buffers, the kernel's network threads, the way to the robot."""
+"""Checks of the network: socket buffers, the kernel's network threads, the route to the robot."""
 
 from __future__ import annotations
 
@@ -15,42 +15,42 @@ from rcilab.realtime.scheduling import PRIORITY
 _POLICIES = {"0": "SCHED_OTHER", "1": "SCHED_FIFO", "2": "SCHED_RR", "3": "SCHED_BATCH", "5": "SCHED_IDLE"}
 _REALTIME_POLICIES = ("1", "2")
 _POLICY_FIELD = 38  # proc_pid_stat(5): field 41, counted from 0 after pid and (comm).
-_FASTER = PRIORITY + 1  # Packets for the control process arrive before it continues to compute.
+_FASTER = PRIORITY + 1  # Packets for the control process are delivered before it continues to compute.
 _OWN_ADDRESS = "192.168.0.22/24"  # RCI manual 2.5, its example for a computer wired to the robot directly.
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkRoute:
-    """The interface that leads to an address, and the gateway in between, if any."""
+    """The interface and the gateway, if any, of the route to an address."""
 
     interface: str
     gateway: str | None
 
 
 def check_buffers(system: System) -> Finding:
-    """May a socket hold as many states as our client wants to be able to sleep over?"""
+    """Can a socket buffer hold the states of a pause of the client?"""
     name, most = "socket buffers", system.read("/proc/sys/net/core/rmem_max")
     if most.text is None or not most.text.isdecimal():
-        return Finding(name, "note", f"unknown: {most.problem or f'rmem_max says {most.text!r}'}")
-    found = f"up to {most.text} bytes to receive into"
+        return Finding(name, "note", f"unknown: {most.problem or f'rmem_max is {most.text!r}'}")
+    found = f"up to {most.text} bytes for receiving"
     if int(most.text) >= RECEIVE_BUFFER:
         return Finding(name, "ok", found)
     advice = (
         f"echo net.core.rmem_max={RECEIVE_BUFFER} | sudo tee /etc/sysctl.d/60-rcilab.conf, then sudo sysctl --system"
     )
-    return Finding(name, "note", f"{found}, {RECEIVE_BUFFER} wanted: states are lost in a shorter pause", advice)
+    return Finding(name, "note", f"{found}, {RECEIVE_BUFFER} needed: states are lost after a shorter pause", advice)
 
 
 def check_softirq(system: System) -> Finding:
-    """Do the kernel's network threads run ahead of a control loop, or do packets wait behind it on a busy core?"""
+    """Do the kernel's network threads have a higher priority than a control loop?"""
     name, policies = "ksoftirqd", set[str]()
     for path in system.find("/proc", "[0-9]*/stat"):
-        process, closed, rest = (system.read(path).text or "").rpartition(")")  # None when it has ended meanwhile.
+        process, closed, rest = (system.read(path).text or "").rpartition(")")  # None if the process has ended.
         fields = rest.split()
         if closed and "(ksoftirqd/" in process and len(fields) > _POLICY_FIELD:
             policies.add(fields[_POLICY_FIELD])
     if not policies:
-        return Finding(name, "note", "cannot be seen from here, as in a container", "look at it on the host itself")
+        return Finding(name, "note", "not visible, as in a container", "check it on the host")
     found = " and ".join(sorted(_POLICIES.get(policy, f"policy {policy}") for policy in policies))
     if policies <= set(_REALTIME_POLICIES):
         return Finding(name, "ok", found)
@@ -59,7 +59,7 @@ def check_softirq(system: System) -> Finding:
 
 
 def check_route(address: RobotAddress, system: System) -> tuple[Finding, HostRoute | None]:
-    """Does a cable lead from here to the robot, without anything in between? The route goes with the answer."""
+    """Is this machine connected to the robot directly by cable? Also returns the route."""
     name = "route"
     try:
         route = find_route(address)
@@ -69,20 +69,20 @@ def check_route(address: RobotAddress, system: System) -> tuple[Finding, HostRou
     host, local = route.host, route.local
     if is_here(route):
         return Finding(name, "ok", f"{local} to {host}, on this machine"), route
-    way = find_way(host, system)
-    if way is None:
+    link = find_network_route(host, system)
+    if link is None:
         return Finding(name, "note", f"{local} to {host} by an interface that /proc/net/route does not name"), route
-    found = f"{local} to {host} by {way.interface}"
-    if system.has(f"/sys/class/net/{way.interface}/wireless"):
-        advice = "plug a cable into the robot's direct port (RCI manual 2.5)"
+    found = f"{local} to {host} by {link.interface}"
+    if system.has(f"/sys/class/net/{link.interface}/wireless"):
+        advice = "connect a cable to the robot's direct port (RCI manual 2.5)"
         return Finding(name, "bad", f"{found}, which is wireless: packets are late and lost", advice), route
-    if way.gateway is not None:
+    if link.gateway is not None:
         advice = (
-            f"wire this computer to the robot's direct port, and give it an address in the robot's network, such as "
-            f"sudo ip addr add {_OWN_ADDRESS} dev {way.interface} (RCI manual 2.5)"
+            f"connect this computer to the robot's direct port, and give it an address in the robot's network, such as "
+            f"sudo ip addr add {_OWN_ADDRESS} dev {link.interface} (RCI manual 2.5)"
         )
-        return Finding(name, "note", f"{found} and gateway {way.gateway}", advice), route
-    speed = system.read(f"/sys/class/net/{way.interface}/speed").text or ""
+        return Finding(name, "note", f"{found} and gateway {link.gateway}", advice), route
+    speed = system.read(f"/sys/class/net/{link.interface}/speed").text or ""
     return Finding(name, "ok", found + (f", {speed} Mbit/s" if speed.isdecimal() else "")), route
 
 
@@ -91,11 +91,11 @@ def is_here(route: HostRoute) -> bool:
     return ipaddress.ip_address(route.host).is_loopback or route.host == route.local
 
 
-def find_way(host: str, system: System) -> NetworkRoute | None:
-    """Returns where the kernel's table of routes sends packets for an IPv4 address; None when it does not say."""
+def find_network_route(host: str, system: System) -> NetworkRoute | None:
+    """Returns the route to an IPv4 address from the kernel's routing table; None without an entry."""
     target = int(ipaddress.IPv4Address(host))
     best: tuple[int, int] | None = None
-    way: NetworkRoute | None = None
+    route: NetworkRoute | None = None
     for line in (system.read("/proc/net/route").text or "").splitlines()[1:]:
         words = line.split()
         try:
@@ -105,13 +105,13 @@ def find_way(host: str, system: System) -> NetworkRoute | None:
             continue
         rank = (mask, -metric)  # The longest mask wins, then the lowest metric.
         if target & mask == destination and (best is None or rank > best):
-            best, way = rank, NetworkRoute(interface, str(ipaddress.IPv4Address(gateway)) if gateway else None)
-    return way
+            best, route = rank, NetworkRoute(interface, str(ipaddress.IPv4Address(gateway)) if gateway else None)
+    return route
 
 
 def _address(text: str) -> int:
-    """Returns an IPv4 address as a number. The table prints the bytes of the network's order as the host reads them.
+    """Returns an IPv4 address as a number. The table has the bytes of the network order as read by the host.
 
-    All machines that Python's wheels of ours exist for are little-endian.
+    All supported machines are little-endian.
     """
     return int.from_bytes(bytes.fromhex(text), "little")

@@ -1,4 +1,4 @@
-"""Every check in order, the most basic first."""
+"""All checks in order, the most basic first."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from rcilab.diagnostics.host import BROWSERS, probe_realtime
 from rcilab.makers.driver import RobotAddress
 
 
-def examine(
+def run_checks(
     system: System,
     *,
     robot: RobotAddress | None = None,
     seconds: float = 0.0,
     progress: Callable[[float, float], None] = lambda spent, worst: None,
 ) -> Iterator[Finding]:
-    """Yields the findings about this machine as they are found.
+    """Yields the findings about this machine.
 
     Args:
-        system: Where to read what the kernel reports about itself.
-        robot: Address of the robot to look for; None: no robot.
-        seconds: How long to measure jitter, [s]; 0 does not.
-        progress: Called about once a second with the time spent so far and the largest lateness so far, [s].
+        system: Files of the kernel.
+        robot: Address of the robot; None: no robot.
+        seconds: Duration of the jitter measurement, [s]; 0: no measurement.
+        progress: Called about once per second with the elapsed time and the largest lateness so far, [s].
     """
     cores = len(os.sched_getaffinity(0))
     yield software.check_python(sys.version_info[:3])

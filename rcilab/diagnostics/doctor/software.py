@@ -1,4 +1,4 @@
-"""What rcilab needs on top of the operating system: Python, packages, a browser, an address of its own."""
+"""Checks of the software: Python, packages, browser, loopback address and port."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from rcilab.diagnostics.doctor.finding import Finding
 from rcilab.diagnostics.host import find_browser
 
 OLDEST_PYTHON = (3, 11)
-CONTROLLER_ADDRESS = "127.0.0.2"  # Where `rcilab controller` listens by default.
+CONTROLLER_ADDRESS = "127.0.0.2"  # Default address of `rcilab controller`.
 CONTROLLER_PORT = 1337
 
 
 def check_python(version: tuple[int, ...]) -> Finding:
-    """Is this Python new enough?"""
+    """Is this Python version supported?"""
     found = ".".join(map(str, version))
     if version < OLDEST_PYTHON:
         return Finding("Python", "bad", found, f"needs {'.'.join(map(str, OLDEST_PYTHON))} or newer")
@@ -23,9 +23,9 @@ def check_python(version: tuple[int, ...]) -> Finding:
 
 
 def check_packages(distribution: str) -> list[Finding]:
-    """Is every package that `distribution` asks for here, and in the versions it was made for?
+    """Are the packages that `distribution` requires installed, in supported versions?
 
-    Packages of the extra `lab` are good to have; those of other extras are not looked at.
+    Packages of the extra `lab` are optional; those of other extras are not checked.
     """
     findings: list[Finding] = []
     for requirement in metadata.requires(distribution) or []:
@@ -38,7 +38,7 @@ def check_packages(distribution: str) -> list[Finding]:
 
 
 def check_package(name: str, bounds: str, *, optional: bool = False) -> Finding:
-    """Is one package here, inside its bounds such as `>=1.1,<1.2`?"""
+    """Is a package installed, with a version inside its bounds such as `>=1.1,<1.2`?"""
     missing = Finding(name, "note", "not installed", "the notebooks need it: pip install -e '.[lab]'")
     try:
         version = metadata.version(name)
@@ -51,7 +51,7 @@ def check_package(name: str, bounds: str, *, optional: bool = False) -> Finding:
 
 
 def check_address(address: str) -> Finding:
-    """Can the virtual controller have an address of its own on this machine?"""
+    """Can the virtual controller use its own loopback address?"""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
             probe.bind((address, 0))
@@ -69,17 +69,17 @@ def check_port(address: str, port: int) -> Finding:
     for kind, label in ((socket.SOCK_STREAM, "TCP"), (socket.SOCK_DGRAM, "UDP")):
         try:
             with socket.socket(socket.AF_INET, kind) as probe:
-                if kind == socket.SOCK_STREAM:  # A connection closed a minute ago is no reason to worry anybody.
+                if kind == socket.SOCK_STREAM:  # A connection closed recently does not block the port.
                     probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind((address, port))
         except OSError as error:
-            advice = "another controller runs; use it, or start `rcilab controller --port 0` (any free port)"
-            return Finding(name, "note", f"{label} is taken at {address} ({error.strerror})", advice)
+            advice = "another controller is running; use it, or start `rcilab controller --port 0` (any free port)"
+            return Finding(name, "note", f"{label} is in use at {address} ({error.strerror})", advice)
     return Finding(name, "ok", f"free at {address}, TCP and UDP")
 
 
 def check_browser(names: tuple[str, ...]) -> Finding:
-    """Is there a browser to open the page in?"""
+    """Is a browser installed?"""
     path = find_browser(names)
     if path is not None:
         return Finding("browser", "ok", path)
@@ -87,6 +87,6 @@ def check_browser(names: tuple[str, ...]) -> Finding:
 
 
 def _numbers(version: str) -> tuple[int, ...]:
-    """Returns the first four numbers of a version, which is what a bound compares: 4.6rc1 gives (4, 6, 0, 0)."""
+    """Returns the first four numbers of a version, for comparison with a bound: 4.6rc1 gives (4, 6, 0, 0)."""
     numbers = re.findall(r"\d+", re.split(r"[^0-9.]", version, maxsplit=1)[0])
     return tuple(int(number) for number in [*numbers, 0, 0, 0, 0][:4])

@@ -1,4 +1,4 @@
-"""The files in which Linux reports about itself. A file that cannot be read is a result too, never an exception."""
+"""Files in which Linux reports its state. An unreadable file is a result, not an exception."""
 
 from __future__ import annotations
 
@@ -10,46 +10,46 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The content of a file, or why it could not be read."""
+    """Content of a file, or the reason why it cannot be read."""
 
     text: str | None
-    """Content without white space at the ends; None when it cannot be read."""
+    """Content without white space at the ends; None if it cannot be read."""
     problem: str = ""
-    """Why it cannot be read, such as "/sys/x cannot be read (Permission denied)"."""
+    """Reason if it cannot be read, such as "/sys/x cannot be read (Permission denied)"."""
 
 
 class System:
     """A tree of /proc, /sys and /boot.
 
     Args:
-        root: Where the tree begins; anything but `/` is another machine's tree, or a made-up one.
+        root: Root of the tree; for tests, another directory than `/`.
     """
 
     def __init__(self, root: Path = Path("/")) -> None:
         self._root = root
 
     def read(self, path: str) -> Reading:
-        """Returns the text of a file, given by its absolute path; one whose name ends in `.gz` is unpacked."""
+        """Returns the text of a file by its absolute path; a `.gz` file is decompressed."""
         try:
             content = self._at(path).read_bytes()
             if path.endswith(".gz"):
                 content = gzip.decompress(content)
         except FileNotFoundError:
-            return Reading(None, f"there is no {path}")
+            return Reading(None, f"{path} does not exist")
         except (OSError, EOFError, zlib.error) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
             return Reading(None, f"{path} cannot be read ({reason})")
         return Reading(content.decode("utf-8", errors="replace").strip())
 
     def has(self, path: str) -> bool:
-        """Returns whether there is such a file or directory, as far as we may look."""
+        """Returns whether a file or directory exists; False without permission to check."""
         try:
             return self._at(path).exists()
         except OSError:
             return False
 
     def find(self, directory: str, pattern: str) -> list[str]:
-        """Returns the absolute paths below a directory that fit a pattern such as `cpu*/online`, sorted."""
+        """Returns the absolute paths below a directory that match a pattern such as `cpu*/online`, sorted."""
         try:
             found = sorted(self._at(directory).glob(pattern))
         except OSError:

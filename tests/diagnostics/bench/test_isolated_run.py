@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.cli import main
 from rcilab.diagnostics.bench import isolated_run as apart
-from rcilab.diagnostics.bench.isolated_run import measure_apart
+from rcilab.diagnostics.bench.isolated_run import measure_isolated
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.diagnostics.bench.rows import ROWS
 
@@ -31,19 +31,19 @@ def scripted(monkeypatch):
 
 def test_what_was_found_comes_back_whole():
     found = Measurement(name="inverse", median=1.0, p99=2.0, unit="ms", target=0.1, ok=True, note="as it is")
-    assert measure_apart("inverse", 0.1) == found
-    assert measure_apart("drag", 0.1) == Absent(name="drag", note="as it is")
+    assert measure_isolated("inverse", 0.1) == found
+    assert measure_isolated("drag", 0.1) == Absent(name="drag", note="as it is")
 
 
 @pytest.mark.parametrize(
     ("name", "reason"), [("check", "DeadlineError: the browser did not start"), ("jog", "exit code 247")]
 )
 def test_a_row_that_fails_gives_its_last_word(name, reason):
-    assert measure_apart(name, 0.1) == Absent(name=name, ok=False, note=f"NO NUMBER: {reason}")
+    assert measure_isolated(name, 0.1) == Absent(name=name, ok=False, note=f"NO NUMBER: {reason}")
 
 
 def test_a_row_that_hangs_is_ended_and_the_next_one_measured(monkeypatch, capsys):
-    monkeypatch.setattr(apart, "_PATIENCE", 0.5)
+    monkeypatch.setattr(apart, "_TIMEOUT", 0.5)
     assert main(["bench", "forward", "inverse", "--json", "--seconds", "0.5"]) == 1
     _, hung, found = json.loads(capsys.readouterr().out)
     assert (hung["name"], hung["median"], hung["ok"]) == ("forward", None, False)

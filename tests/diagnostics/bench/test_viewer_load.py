@@ -24,7 +24,7 @@ def streamed(late: int, explained: int, pages: int = 4) -> Streamed:
     watch.pauses = np.stack([ends - 1e-3, ends], axis=1)
     return Streamed(
         duration=1.0, before=SupervisorStatus(), after=replace(SupervisorStatus(), late_cycles=late), success=1.0,
-        pages=pages, rows=rows, watch=watch,
+        pages=pages, rows=rows, stalls=watch,
     )  # fmt: skip
 
 
@@ -42,4 +42,4 @@ def test_late_cycles_are_compared_without_those_of_the_machine(alone, watched, k
     found = _compare(alone, watched)
     assert found.ok is kept
     assert "3 spectators" in found.note
-    assert "The holder alone" in found.note
+    assert "The operator page alone" in found.note

@@ -32,7 +32,7 @@ def test_every_cycle_is_measured_and_progress_is_told_each_second() -> None:
     [(9e-4, True, "ok"), (2e-3, True, "note"), (12e-3, False, "note"), (12e-3, True, "bad")],
 )
 def test_a_pause_is_judged_by_what_it_does_to_an_arm(longest: float, is_for_real: bool, verdict: str) -> None:
-    finding = jitter.judge_jitter(late_once(longest), 0.0, is_for_real=is_for_real)
+    finding = jitter.evaluate_jitter(late_once(longest), 0.0, is_for_real=is_for_real)
     assert finding.verdict == verdict
     assert finding.figures["max_us"] == pytest.approx(1e6 * longest)
     assert finding.figures["late_cycles"] == (verdict != "ok")
@@ -40,14 +40,14 @@ def test_a_pause_is_judged_by_what_it_does_to_an_arm(longest: float, is_for_real
 
 
 def test_what_the_hypervisor_took_is_not_laid_at_our_door() -> None:
-    finding = jitter.judge_jitter(late_once(2e-3), 0.31)
+    finding = jitter.evaluate_jitter(late_once(2e-3), 0.31)
     assert "the hypervisor took 0.31 s" in finding.value
     assert "hypervisor" in finding.advice
     assert finding.figures["stolen_s"] == 0.31
 
 
 def test_the_figures_are_those_of_the_cycles() -> None:
-    finding = jitter.judge_jitter(np.arange(1.0, 1001.0) * 1e-6, None)
+    finding = jitter.evaluate_jitter(np.arange(1.0, 1001.0) * 1e-6, None)
     assert finding.figures["median_us"] == pytest.approx(500.5)
     assert finding.figures["p99_us"] == pytest.approx(990.01)
     assert finding.figures["late_cycles"] == 0

@@ -58,7 +58,7 @@ def test_the_mode_in_force_is_the_one_in_parentheses(tree, modes: str, mode: str
 
 def test_without_the_debug_file_the_command_line_tells_the_mode(tree) -> None:
     finding = kernel.check_preemption(tree({**DYNAMIC, "/proc/cmdline": "quiet preempt=full nopreempt=none"}))
-    assert is_judged(finding, "ok", "preempt=full, as booted", f"there is no {DEBUG_FILE}")
+    assert is_judged(finding, "ok", "preempt=full, as booted", f"{DEBUG_FILE} does not exist")
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_every_question_has_an_answer_here_and_where_nothing_can_be_read(root: P
 @pytest.mark.parametrize(
     ("files", "fifo", "verdict", "said"),
     [
-        ({"/sys/kernel/realtime": "1\n"}, True, "ok", "finds"),
+        ({"/sys/kernel/realtime": "1\n"}, True, "ok", "requirements are met"),
         ({"/sys/kernel/realtime": "1\n"}, False, "note", "rtprio 99"),
         ({"/sys/kernel/realtime": "0\n"}, True, "note", "unshare"),
         ({}, True, "note", "enforce_realtime = false"),

@@ -62,7 +62,7 @@ def test_this_machine_tells_the_policy_of_a_process_where_we_look_for_it() -> No
     ],
 )
 def test_the_longest_mask_leads_then_the_lowest_metric(tree, host: str, way: NetworkRoute) -> None:
-    assert network.find_way(host, tree({"/proc/net/route": ROUTES})) == way
+    assert network.find_network_route(host, tree({"/proc/net/route": ROUTES})) == way
 
 
 def test_a_virtual_robot_needs_no_cable() -> None:

@@ -22,7 +22,7 @@ def test_one_core_is_noted() -> None:
     [
         ("3\n", 3, "ok", "taskset -c 3 "),
         ("2-3,5\n", 4, "ok", "taskset -c 2 "),
-        ("\n", 2, "ok", "none to spare"),
+        ("\n", 2, "ok", "too few for one"),
         ("\n", 8, "note", "isolcpus=7"),
     ],
 )

@@ -15,7 +15,7 @@ def test_this_machine_answers_itself_or_says_why_not() -> None:
         assert finding.figures["count"] == round_trip.ECHOES
         assert 0.0 < finding.figures["median_ms"] <= finding.figures["p99_ms"] <= finding.figures["max_ms"]
     else:
-        assert "may not send echoes" in finding.value
+        assert "no permission to send echoes" in finding.value
 
 
 def test_an_echo_is_a_state_long_and_sums_to_zero() -> None:

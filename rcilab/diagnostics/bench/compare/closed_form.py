@@ -1,4 +1,4 @@
-"""Solvers that know every branch of an arm in closed form: ours, and the ones that ssik writes for a URDF."""
+"""Closed-form solvers: the inverse kinematics of rcilab, and the solvers that ssik generates from a URDF."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.robots.urdf import build_urdf
 
 ARM_ANGLES = 16
-"""Arm angles all round at which branches are asked for: as many as ssik samples of its own accord."""
+"""Number of equally spaced arm angles, the same as ssik samples by default."""
 _PSI = np.arange(ARM_ANGLES) * (tau / ARM_ANGLES)
 
 
-def ours(model: RobotModel) -> Solver:
-    """Returns our own inverse, asked for the branch next to where the arm is."""
+def rcilab_nearest(model: RobotModel) -> Solver:
+    """Returns the solver of rcilab for the branch nearest to the arm's position."""
 
     def solve(T: Array, near: JointVector) -> list[JointVector]:
         return [model.inverse(Pose.from_matrix(T), near=near).nearest(near)]
@@ -34,8 +34,8 @@ def ours(model: RobotModel) -> Solver:
     return Solver(solve=solve, about="rcilab, inverse(T, near=q).nearest(q)")
 
 
-def ours_all_round(model: RobotModel) -> Solver:
-    """Returns our own inverse, asked for every branch inside the limits at `ARM_ANGLES` arm angles."""
+def rcilab_branches(model: RobotModel) -> Solver:
+    """Returns the solver of rcilab for all branches inside the limits at `ARM_ANGLES` arm angles."""
 
     def solve(T: Array, near: JointVector) -> Array:
         found = model.inverse_batch(np.broadcast_to(T, (ARM_ANGLES, 4, 4)), _PSI)
@@ -44,11 +44,11 @@ def ours_all_round(model: RobotModel) -> Solver:
     return Solver(solve=solve, about=f"rcilab, inverse_batch of one pose at {ARM_ANGLES} arm angles")
 
 
-def ssik(model: RobotModel) -> Solver:
-    """Returns ssik's inverse, asked for the branch next to where the arm is.
+def ssik_nearest(model: RobotModel) -> Solver:
+    """Returns the solver of ssik for the branch nearest to the arm's position.
 
     Raises:
-        ModuleNotFoundError: ssik is not installed, or not what it reads URDFs with.
+        ModuleNotFoundError: ssik, or its library for URDFs, is not installed.
     """
     module = _ssik_module(build_urdf(model.description))
 
@@ -58,11 +58,11 @@ def ssik(model: RobotModel) -> Solver:
     return Solver(solve=solve, about=f"{_ssik_version()}, solve(T, max_solutions=1, q_seed=q)")
 
 
-def ssik_all_round(model: RobotModel) -> Solver:
-    """Returns ssik's inverse, asked for all that it finds inside the limits, full turns counted once.
+def ssik_branches(model: RobotModel) -> Solver:
+    """Returns the solver of ssik for all solutions inside the limits, without additional full turns.
 
     Raises:
-        ModuleNotFoundError: ssik is not installed, or not what it reads URDFs with.
+        ModuleNotFoundError: ssik, or its library for URDFs, is not installed.
     """
     module = _ssik_module(build_urdf(model.description))
 
@@ -73,23 +73,23 @@ def ssik_all_round(model: RobotModel) -> Solver:
 
 
 def _ssik_version() -> str:
-    return f"ssik {version('ssik')} (C++), built from our URDF"
+    return f"ssik {version('ssik')} (C++), built from the URDF of rcilab"
 
 
 @lru_cache(maxsize=1)
 def _ssik_module(urdf: str) -> ModuleType:
-    """Returns the module that `ssik build` writes for an arm: the way its authors recommend for use."""
-    import urchin  # noqa: F401  # pyright: ignore[reportMissingImports]  # ssik reads URDFs with it.
+    """Returns the module that `ssik build` generates for an arm, as its authors recommend."""
+    import urchin  # noqa: F401  # pyright: ignore[reportMissingImports]  # ssik needs it to read URDFs.
     from ssik.cli import main  # pyright: ignore[reportMissingImports]
 
     with TemporaryDirectory() as directory:
         path, written = Path(directory) / "arm.urdf", Path(directory) / "arm_ik.py"
         path.write_text(urdf, encoding="utf-8")
         arguments = ["build", str(path), "--base", "base", "--ee", "flange", "--out", str(written), "--no-validate"]
-        with redirect_stderr(StringIO()) as output:  # It reports every step.
+        with redirect_stderr(StringIO()) as output:  # It prints every step.
             failed = main(arguments)
         if failed:
-            raise RuntimeError(f"ssik built no solver from our URDF: {output.getvalue()}")
+            raise RuntimeError(f"ssik built no solver from the URDF of rcilab: {output.getvalue()}")
         spec = spec_from_file_location("arm_ik", written)
         assert spec is not None
         assert spec.loader is not None

@@ -1,4 +1,4 @@
-"""Every comparison in turn."""
+"""All comparisons with other packages."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ _ROBOT = "xMatePro7"
 
 
 def compare() -> Iterator[Measurement | Absent]:
-    """Yields a row for every package that can do a task, named TASK/PACKAGE; those not installed say what to install.
+    """Yields one row per task and package, named TASK/PACKAGE; that of a missing package says what to install.
 
-    home: one answer to a random reachable pose, asked from the home pose. near: the same with the arm 0.1 rad away in
-    every joint. branches: all answers at 16 arm angles. line: the timing of a straight line. All times are processor
-    time of this process, so that whatever else runs on the machine burdens the figures least.
+    home: one solution for a random reachable pose, starting at the home pose. near: the same, starting 0.1 rad away in
+    every joint. branches: all solutions at 16 arm angles. line: the timing of a straight line. All times are processor
+    time of this process, which other load on the machine affects least.
     """
     model = load_model(_ROBOT)
     yield from compare_inverse(model)

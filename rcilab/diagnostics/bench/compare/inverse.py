@@ -1,4 +1,4 @@
-"""The inverse of the same random poses by every installed package, in turns, and how accurate the answers are."""
+"""Inverse kinematics of the same random poses by every installed package, with the accuracy of the solutions."""
 
 from __future__ import annotations
 
@@ -16,45 +16,45 @@ from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.model.robot_model import RobotModel
 
 CLOSE_ENOUGH = 1e-3
-"""[m] and [rad]. An answer this close to the pose, inside the joint limits, counts as solved."""
-_NEARBY = 0.1  # [rad] How far every joint is at most from the answer, where the arm follows a target.
+"""[m] and [rad]. A solution this close to the pose, inside the joint limits, counts as solved."""
+_NEARBY = 0.1  # [rad] Largest distance of every joint from the solution, for an arm that follows a target.
 _TURN = 50
-"""Poses that one solver does before it is the next one's turn: enough to find its code and its data in the cache."""
+"""Poses per turn of a solver: enough for its code and data to be in the cache."""
 _SEED = 20
 _ONE = {
-    "rcilab": closed_form.ours,
-    "ssik": closed_form.ssik,
+    "rcilab": closed_form.rcilab_nearest,
+    "ssik": closed_form.ssik_nearest,
     "pinocchio": iterative.clik,
     "pink": iterative.pink,
 }
-"""The solvers that give one answer next to where the arm is."""
-_ALL = {"rcilab": closed_form.ours_all_round, "ssik": closed_form.ssik_all_round}
-"""The solvers that give all answers at as many arm angles."""
+"""Solvers for one solution near the arm's position."""
+_ALL = {"rcilab": closed_form.rcilab_branches, "ssik": closed_form.ssik_branches}
+"""Solvers for all solutions at the same number of arm angles."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What one solver did, pose by pose."""
+    """Results of one solver over all poses."""
 
     seconds: list[float] = field(default_factory=list)
-    """Of processor time, which a busy machine distorts least."""
+    """Processor times, which other load on the machine affects least."""
     answers: int = 0
-    """How many it gave in all, right or wrong."""
+    """Number of solutions, correct or not."""
     solved: int = 0
-    """Poses with an answer inside the limits that is close enough."""
+    """Poses with a solution inside the limits that is close enough."""
     outside: int = 0
-    """Poses whose answers reach the pose, but all beyond a joint limit."""
+    """Poses whose solutions reach the pose, but all beyond a joint limit."""
     position_error: float = 0.0
-    """Largest one of the answers that count, [m]."""
+    """Largest position error of the counted solutions, [m]."""
     rotation_error: float = 0.0
-    """Likewise, [rad]."""
+    """Largest rotation error of the counted solutions, [rad]."""
 
     def score(self, model: RobotModel, T: Array, answers: Sequence[JointVector] | Array) -> None:
-        """Adds the answers to one pose.
+        """Adds the solutions of one pose.
 
         Args:
             model: The arm.
-            T: Pose that was asked for, shape (4, 4).
+            T: The pose, shape (4, 4).
             answers: Joint angles, [rad], m of them.
         """
         self.answers += len(answers)
@@ -74,11 +74,11 @@ class Tally:
 
 
 def compare_inverse(model: RobotModel, count: int = 1000) -> Iterator[Measurement | Absent]:
-    """Yields how every package solves random reachable poses: from home, from nearby, and all branches all round.
+    """Yields the results of every package for random reachable poses: from home, from nearby, and all branches.
 
     Args:
         model: A 7-axis arm without a tool.
-        count: How many poses.
+        count: Number of poses.
     """
     joint = model.limits.joint
     random = np.random.default_rng(_SEED)
@@ -107,7 +107,7 @@ def pose_errors(T: Array, wanted: Array) -> tuple[Array, Array]:
 def _rows(
     task: str, makers: Mapping[str, Callable[[RobotModel], Solver]], model: RobotModel, q: JointPath, start: JointPath
 ) -> Iterator[Measurement | Absent]:
-    """Yields one row a solver; they take turns, so that a busy machine is a burden to all."""
+    """Yields one row per solver; they alternate, so that other load on the machine affects all of them."""
     solvers: dict[str, Solver | Absent] = {}
     for who, maker in makers.items():
         try:
@@ -116,7 +116,7 @@ def _rows(
             solvers[who] = absent(f"{task}/{who}", error)
     present = [(solver, Tally()) for solver in solvers.values() if isinstance(solver, Solver)]
     poses = model.forward_path(q)
-    for solver, _ in present:  # What happens only at a first call is no part of it.
+    for solver, _ in present:  # Excludes the cost of the first call.
         _answers(solver, poses[0], start[0])
     for first in range(0, len(q), _TURN):
         turn = slice(first, first + _TURN)
@@ -141,7 +141,7 @@ def _answers(solver: Solver, T: Array, near: JointVector) -> Sequence[JointVecto
 def _summary(name: str, solver: Solver, tally: Tally) -> Measurement:
     count = len(tally.seconds)
     outside = f" ({tally.outside} beyond a joint limit)" if tally.outside else ""
-    several = f", {tally.answers / count:.0f} answers a pose" if tally.answers > count else ""
+    several = f", {tally.answers / count:.0f} solutions per pose" if tally.answers > count else ""
     note = (
         f"{solver.about}: {tally.solved} of {count} solved{outside}{several}; largest error "
         f"{tally.position_error:.1e} m, {tally.rotation_error:.1e} rad; fastest tenth "
@@ -151,7 +151,7 @@ def _summary(name: str, solver: Solver, tally: Tally) -> Measurement:
 
 
 def _batch(model: RobotModel, q: JointPath) -> Measurement:
-    """Returns the time a pose of our own inverse, asked for the same branches of all poses in one call."""
+    """Returns the time per pose of rcilab for the same branches of all poses in one call."""
     count, angles = len(q), closed_form.ARM_ANGLES
     poses = np.repeat(model.forward_path(q), angles, axis=0)
     psi = np.tile(np.arange(angles) * (2.0 * np.pi / angles), count)
@@ -161,7 +161,5 @@ def _batch(model: RobotModel, q: JointPath) -> Measurement:
         begin = time.process_time()
         model.inverse_batch(poses, psi)
         times.append(time.process_time() - begin)
-    note = (
-        f"the same of {count} poses at {angles} arm angles in one call, time a pose; none of the others takes batches"
-    )
+    note = f"the same for {count} poses at {angles} arm angles in one call, time per pose; the others have no batches"
     return summarise("branches/batch", np.array(times) / count, "us", None, note)

@@ -1,7 +1,7 @@
-"""Solvers that iterate from where the arm is: pinocchio's example and pink, both on our URDF, limits included."""
+"""Iterative solvers that start at the arm's position: pinocchio's example and pink, on the URDF of rcilab."""
 
 # pyright: reportAttributeAccessIssue=false
-# pinocchio's names are put into its module by compiled code when it is loaded, where pyright cannot see them.
+# Compiled code adds pinocchio's names to its module at run time, so that pyright does not find them.
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.robots.urdf import build_urdf
 
 _CONVERGED = 1e-4
-"""Norm of the error, metres and radians together, at which the example stops; pink gets the same."""
+"""Norm of the error, metres and radians together, at which the example stops; the same for pink."""
 _CLIK_ITERATIONS, _CLIK_STEP, _CLIK_DAMPING = 1000, 1e-1, 1e-12
-"""As in pinocchio's example."""
+"""Values of pinocchio's example."""
 _PINK_ITERATIONS = 200
-"""Seen: those who arrive do so within 50 of them."""
+"""Measured: the iterations that converge do so within 50 steps."""
 _PINK_STEP = 1.0
-"""[s] of each of its velocities. Of 0.01, 0.1 and 1 the one that solves most, and fastest."""
+"""[s] Duration of each step. Of 0.01, 0.1 and 1, this value solves most poses, and fastest."""
 
 
 def clik(model: RobotModel) -> Solver:
-    """Returns pinocchio's example of inverse kinematics (`inverse-kinematics.py`: CLIK), joint limits not looked at."""
+    """Returns pinocchio's example of inverse kinematics (`inverse-kinematics.py`: CLIK), without joint limits."""
     import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
     arm, data, frame = _pinocchio(model)
@@ -46,16 +46,16 @@ def clik(model: RobotModel) -> Solver:
             q = pin.integrate(arm, q, v * _CLIK_STEP)
         return []
 
-    return Solver(solve=solve, about=f"pinocchio {version('pin')}, its CLIK example from q; it knows no joint limits")
+    return Solver(solve=solve, about=f"pinocchio {version('pin')}, its CLIK example from q, without joint limits")
 
 
 def pink(model: RobotModel) -> Solver:
-    """Returns pink's differential inverse, iterated until it arrives; it keeps the joint limits.
+    """Returns pink's differential inverse kinematics, iterated to convergence, with joint limits.
 
     Raises:
-        ModuleNotFoundError: pink or daqp, its solver, is not installed.
+        ModuleNotFoundError: pink or its solver daqp is not installed.
     """
-    import daqp  # noqa: F401  # pyright: ignore[reportMissingImports]  # Its solver, which it loads by name.
+    import daqp  # noqa: F401  # pyright: ignore[reportMissingImports]  # pink loads this solver by name.
     import pinocchio as pin  # pyright: ignore[reportMissingImports]
     from pink import Configuration, solve_ik  # pyright: ignore[reportMissingImports]
     from pink.tasks import FrameTask  # pyright: ignore[reportMissingImports]
@@ -79,7 +79,7 @@ def pink(model: RobotModel) -> Solver:
 
 
 def _pinocchio(model: RobotModel) -> tuple[Any, Any, int]:
-    """Returns pinocchio's model of our URDF, data for it, and the number of the flange's frame."""
+    """Returns pinocchio's model of the URDF, its data, and the id of the flange frame."""
     import pinocchio as pin  # pyright: ignore[reportMissingImports]
 
     arm = pin.buildModelFromXML(build_urdf(model.description))

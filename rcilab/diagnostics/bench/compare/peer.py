@@ -1,4 +1,4 @@
-"""Whom we compare with: solvers of the inverse, each behind the same two arguments, and packages that are missing."""
+"""Other packages in the comparison: a common interface of their solvers, and rows for missing packages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.diagnostics.bench.measure import Absent
 
 Solve: TypeAlias = Callable[[Array, JointVector], Sequence[JointVector] | Array]
-"""From a pose of the flange in base, (4, 4), and joint angles to start from, (n,), [rad], to the answers."""
+"""`(T_base_flange, q_start) -> solutions`, shapes (4, 4) and (n,), [rad]."""
 
 _REQUIREMENTS = {
     "ssik": "'ssik[urdf]'",
@@ -19,7 +19,7 @@ _REQUIREMENTS = {
     "daqp": "pin-pink daqp",
     "toppra": "toppra",
 }
-"""What to ask pip for, by the packages that are imported here and that rcilab does not need for itself."""
+"""Requirement for pip, by the imported package; rcilab itself does not need these packages."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,18 +28,18 @@ class Solver:
 
     solve: Solve
     about: str
-    """Its package, the version, and how it was called."""
+    """Package, version and call."""
 
 
 def absent(name: str, error: ModuleNotFoundError) -> Absent:
-    """Returns the row of a peer that could not be imported.
+    """Returns the row of a package that could not be imported.
 
     Args:
-        name: Of the row.
-        error: What the import raised; raised again when it is about no package of a peer.
+        name: Name of the row.
+        error: Error of the import; raised again if it concerns another package.
     """
     requirement = _REQUIREMENTS.get((error.name or "").partition(".")[0])
     if requirement is None:
         raise error
-    note = f"not installed: pip install {requirement}; or everything that is compared: pip install -e '.[compare]'"
+    note = f"not installed: pip install {requirement}; or all compared packages: pip install -e '.[compare]'"
     return Absent(name=name, note=note)

@@ -1,4 +1,4 @@
-"""Straight lines timed by our planner and by TOPP-RA, within the same limits on velocity and acceleration."""
+"""Timing of straight lines by rcilab and by TOPP-RA, within the same limits on velocity and acceleration."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ from rcilab.motion.path_timing import require_path
 
 _SEED = 21
 _SHORTEST, _LONGEST = 0.2, 0.8  # [m]
-_TRIES = 50  # For each line that is wanted; most random ones leave the workspace.
+_TRIES = 50  # Per line; most random lines leave the workspace.
 
 
 @dataclass(slots=True)
 class _Timed:
-    """What was found on all lines."""
+    """Results for all lines."""
 
     ours: list[float] = field(default_factory=list)
     """Processor times, [s]."""
     theirs: list[float] = field(default_factory=list)
     ratios: list[float] = field(default_factory=list)
-    """Our duration over theirs."""
+    """Duration of rcilab's motion relative to TOPP-RA's."""
     jerks: list[float] = field(default_factory=list)
-    """Largest jerk of their motion on the 1 ms grid, over the limit."""
+    """Largest jerk of TOPP-RA's motion on the 1 ms grid, relative to the limit."""
 
 
 def compare_timing(model: RobotModel, count: int = 20) -> Iterator[Measurement | Absent]:
-    """Yields what planning random lines costs, and how long the motions last.
+    """Yields the planning times of random lines and the durations of the motions.
 
     Args:
         model: The arm.
-        count: How many lines.
+        count: Number of lines.
     """
     try:
         theirs = _toppra()
@@ -65,14 +65,14 @@ def compare_timing(model: RobotModel, count: int = 20) -> Iterator[Measurement |
     longer = ""
     if found.ratios:
         longer = f"; lasts {np.median(found.ratios):.3f} times as long as TOPP-RA's, {max(found.ratios):.3f} at most"
-    what = f"plan_line on {count} random lines of {_SHORTEST:g} to {_LONGEST:g} m, jerk limited, every 1 ms sampled"
+    what = f"plan_line on {count} random lines of {_SHORTEST:g} to {_LONGEST:g} m, jerk limited, sampled every 1 ms"
     yield summarise("line/rcilab", found.ours, "ms", None, what + longer)
     if isinstance(theirs, Absent):
         yield theirs
         return
     note = (
         f"toppra {version('toppra')}, the same lines within the same velocities and accelerations of joints and tool, "
-        "without the inverse and the samples; "
+        "without inverse kinematics and sampling; "
         f"jerk on the 1 ms grid {np.median(found.jerks):.0f} times the limit, {max(found.jerks):.0f} at most: "
         "the controller refuses such a motion"
     )
@@ -80,16 +80,16 @@ def compare_timing(model: RobotModel, count: int = 20) -> Iterator[Measurement |
 
 
 def _lines(model: RobotModel, count: int) -> Iterator[tuple[JointVector, Path]]:
-    """Yields random lines, with the joint angles at their starts, that can be followed at all."""
+    """Yields random feasible lines, with the joint angles at their starts."""
     random, joint = np.random.default_rng(_SEED), model.limits.joint
     found = 0
     for _ in range(count * _TRIES):
         q = random.uniform(0.6 * joint.lower, 0.6 * joint.upper)
-        way = random.normal(size=3)
-        way *= random.uniform(_SHORTEST, _LONGEST) / np.linalg.norm(way)
+        displacement = random.normal(size=3)
+        displacement *= random.uniform(_SHORTEST, _LONGEST) / np.linalg.norm(displacement)
         start = model.forward(q)
         try:
-            path = build_line(start, Pose(start.position + way, start.wxyz), *arm_angles(model, q, None))
+            path = build_line(start, Pose(start.position + displacement, start.wxyz), *arm_angles(model, q, None))
             plan_line(model, q, path.goal, speed=1.0)
         except PlanningError:
             continue
@@ -100,22 +100,22 @@ def _lines(model: RobotModel, count: int) -> Iterator[tuple[JointVector, Path]]:
 
 
 def _columns(model: RobotModel, q: JointVector, path: Path) -> tuple[Array, Array]:
-    """Returns what is bounded along a line, one a column: every joint, [rad], and the way, [m]; and the bounds.
+    """Returns the bounded quantities along a line, one per column (joints, [rad], distance, [m]), and their bounds.
 
     Returns:
         Shape (M, n + 1), and velocities and accelerations, shape (2, n + 1). The tool does not turn on these lines, and
-        the arm angle is held, so that no other bound of ours acts.
+        the arm angle is constant, so that no other bound is active.
     """
     rows = require_path(model, q, path)
     joint, tool = model.limits.joint, model.limits.cartesian
-    way = path.distance * np.linspace(0.0, 1.0, len(rows))
+    distance = path.distance * np.linspace(0.0, 1.0, len(rows))
     velocity = np.append(joint.velocity, tool.translation_velocity)
     acceleration = np.append(joint.acceleration, tool.translation_acceleration)
-    return np.column_stack((rows, way)), np.stack((velocity, acceleration))
+    return np.column_stack((rows, distance)), np.stack((velocity, acceleration))
 
 
 def _toppra() -> Callable[[Array, Array], Any]:
-    """Returns TOPP-RA as its first example uses it, with our knots for its grid.
+    """Returns TOPP-RA as in its first example, with the knots of rcilab as grid.
 
     Raises:
         ModuleNotFoundError: toppra is not installed.
@@ -133,14 +133,14 @@ def _toppra() -> Callable[[Array, Array], Any]:
         bounds = [JointVelocityConstraint(velocity), JointAccelerationConstraint(acceleration)]
         trajectory = TOPPRA(bounds, SplineInterpolator(grid, columns), gridpoints=grid).compute_trajectory()
         if trajectory is None:
-            raise RuntimeError("TOPP-RA found no timing for a line that can be followed")
+            raise RuntimeError("TOPP-RA found no timing for a feasible line")
         return trajectory
 
     return plan
 
 
 def _largest_jerk(model: RobotModel, trajectory: Any) -> float:
-    """Returns the largest jerk of a joint over its limit, by backward differences at 1 ms, rest before and after."""
+    """Returns the largest joint jerk relative to its limit, by backward differences at 1 ms, from rest to rest."""
     times = np.arange(0.0, trajectory.duration, CYCLE_TIME)
     q = np.asarray(trajectory(np.append(times, trajectory.duration)))[:, : model.n]
     q = np.concatenate((np.repeat(q[:1], 3, axis=0), q, np.repeat(q[-1:], 3, axis=0)))

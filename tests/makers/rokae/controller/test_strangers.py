@@ -272,5 +272,5 @@ def test_a_controller_with_too_few_descriptors_says_so_in_one_sentence(files: in
     )  # fmt: skip
     assert done.returncode == 2
     assert done.stderr == (
-        "rcilab: fewer files may be open than this needs; close other programs or raise the limit: ulimit -n 256\n"
+        "rcilab: the limit of open files is too low; close other programs or raise it: ulimit -n 256\n"
     )
