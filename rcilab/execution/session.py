@@ -30,6 +30,7 @@ from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.speed_override import SpeedOverride, StreamRows
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
+from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, ExpectedArm, StreamingDriver, open_driver, require_timeout
 from rcilab.makers.maker import require_driver, require_feature, require_parts
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion.path import Path
 
+ON_REQUEST = Remark("on request", "on_request")
+"""Why a motion was stopped, when nothing else is given."""
 _sessions: weakref.WeakSet[RobotSession] = weakref.WeakSet()
 _sessions_lock = threading.Lock()
 
@@ -569,7 +572,7 @@ class RobotSession(Closeable):
             path = build_arc(self.model.forward(state.q_c), via, goal, *angles)
             return self._move_along(path, state, speed, psi is not None, progress)
 
-    def stop(self, reason: str = "on request") -> None:
+    def stop(self, reason: str = ON_REQUEST) -> None:
         """Stops a running motion within the limits; `execute` or `control` then returns its run.
 
         May be called from another thread or from a callback. Does nothing if no motion runs or is about to.

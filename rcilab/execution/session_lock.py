@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rcilab.core.errors import UsageError
+from rcilab.i18n.translator import Remark
 
-_CLOSED = "the session was closed while a motion ran"
+_CLOSED = Remark("the session was closed while a motion ran", "session_closed")
 _CLOSE_TIMEOUT = 10.0  # [s] for another thread to stop its motion; the slowest joint needs 0.4 s.
 _LOOK = 0.02  # [s] Longest wait for another thread's request before what that thread does is checked again.
 

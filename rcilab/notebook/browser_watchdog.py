@@ -12,14 +12,15 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from rcilab.i18n.translator import Remark
 from rcilab.notebook.browser_heartbeat import kernel_heart
 
 if TYPE_CHECKING:
     from rcilab.execution.session import RobotSession
 
-LEFT_ALONE = "the notebook's page is gone"
+LEFT_ALONE = Remark("the notebook's page is gone", "page_gone")
 """What a run says that was stopped for it."""
-_INTERRUPTED = "the kernel was interrupted"
+_INTERRUPTED = Remark("the kernel was interrupted", "kernel_interrupted")
 _LOOK = 0.1  # [s] Between two looks for a motion.
 
 

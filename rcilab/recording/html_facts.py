@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rcilab.core.fault import name_faults
+from rcilab.i18n.error_messages import describe_note
 
 if TYPE_CHECKING:
     from rcilab.i18n.translator import Text
@@ -39,8 +40,7 @@ def describe_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
         faults: Faults that the controller reported.
         text: Language of the user.
     """
-    key, names = f"stop.{stopped}", name_faults(faults)
-    why = text(key) if text.has(key) else stopped
+    why, names = text.render(describe_note(stopped)), name_faults(faults)
     return text("stop.reported", why=why, faults=names) if names else why
 
 

@@ -18,6 +18,7 @@ from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.i18n.notebook_language import language
+from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
 from rcilab.recording.export import save_run
@@ -42,8 +43,9 @@ _SAFETY_STOPS = {"estop": "an emergency stop was pressed", "gstop": "the safety 
 
 def describe_end(error: BaseException) -> str:
     """Returns `Run.stopped` for a motion that ended with an error; a safety stop is named without its error bits."""
-    if isinstance(error, ControlError) and error.code == SAFETY_STOP:
-        return _SAFETY_STOPS.get(str(error.facts["status"]), str(error))
+    if isinstance(error, ControlError) and error.code == SAFETY_STOP and error.facts["status"] in _SAFETY_STOPS:
+        code = str(error.facts["status"])
+        return Remark(_SAFETY_STOPS[code], code)
     return str(error) or type(error).__name__
 
 
@@ -83,7 +85,8 @@ class Run:
     """Every recorded cycle, see `cycle_dtype`. In a session with `record_all=True` a cycle also has the rest of the
     state, by the names of `RobotState`: `run.cycles["tau_filtered"]`."""
     stopped: str | None = None
-    """Why the motion was stopped before its end; None if it ran to its end."""
+    """Why the motion was stopped before its end, a `Remark` where user interfaces have a text; None if it ran to its
+    end."""
     truncated: bool = False
     """Whether the beginning is missing because the run was longer than the recorder."""
     realtime: bool = True
@@ -102,7 +105,7 @@ class Run:
     @property
     def is_safety_stop(self) -> bool:
         """Whether an emergency stop or the safety gate ended it, independent of the error bits."""
-        return self.stopped in _SAFETY_STOPS.values()
+        return isinstance(self.stopped, Remark) and self.stopped.code in _SAFETY_STOPS
 
     @property
     def t(self) -> Array:

@@ -12,9 +12,10 @@ The file is a sequence of blocks (`chunks.py`), in this order:
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (adjacent bytes are then similar and compress to a quarter). Any number of
             these blocks
-    TAIL    JSON: {"stopped": why the motion ended early or null, "truncated": whether the beginning is missing,
-            "paced": whether the speed override was changed during the motion}. A file without it is incomplete: after
-            a crash, with a full disk, or because it is still being written
+    TAIL    JSON: {"stopped": why the motion ended early or null, "stop_code": its code for other languages or "",
+            "truncated": whether the beginning is missing, "paced": whether the speed override was changed during the
+            motion}. A file without it is incomplete: after a crash, with a full disk, or because it is still being
+            written
 
 All units are SI. A reader ignores blocks of other kinds.
 """
@@ -41,6 +42,7 @@ from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.file_bounds import require_max_rows, require_rows
 from rcilab.core.spatial import Pose
+from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
@@ -58,6 +60,15 @@ ENDING = ".rcirun"
 BLOCK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
 
 _OPTIONAL_FIELDS = {"braking", *STATE_FIELDS}  # Not recorded by the first versions.
+_STOP_CODES = {
+    "on request": "on_request",
+    "the session was closed while a motion ran": "session_closed",
+    "the notebook's page is gone": "page_gone",
+    "the kernel was interrupted": "kernel_interrupted",
+    "an emergency stop was pressed": "estop",
+    "the safety gate was opened": "gstop",
+}
+"""Codes of the reasons of a stop, by the sentence that stands alone in files of earlier versions."""
 _ROWS = struct.Struct("<I")
 _LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with the complete state takes a third of it.
 
@@ -134,7 +145,12 @@ class RunWriter:
             self._pending = self._pending[:0]
         if plan is not None:
             self._write_plan(plan)
-        tail = {"stopped": stopped, "truncated": truncated, "paced": has_speed_override or plan is not None}
+        tail = {
+            "stopped": stopped,
+            "stop_code": stopped.code if isinstance(stopped, Remark) else "",
+            "truncated": truncated,
+            "paced": has_speed_override or plan is not None,
+        }
         self._stream.write(encode_block("TAIL", json.dumps(tail).encode()))
         self._stream.flush()
 
@@ -297,6 +313,9 @@ def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
     stopped = tail.get("stopped")
     if not isinstance(stopped, str | None):
         raise TypeError("the reason of the stop is not text")
+    if stopped is not None:
+        code = tail.get("stop_code", _STOP_CODES.get(stopped))
+        stopped = Remark(stopped, code if code in _STOP_CODES.values() else "")
     return build(
         plan=Motion.load(BytesIO(plans[-1]), max_rows=max_rows) if plans else None,
         cycles=cycles,

@@ -8,8 +8,10 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from rcilab.core.fault import name_faults
-from rcilab.i18n.catalogue import SHARED, load_catalogue
+from rcilab.i18n.catalogue import load_catalogue
+from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.locale import require_language
+from rcilab.i18n.translator import Text
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -30,7 +32,7 @@ def run_html(run: Run, language: str = "en") -> str:
     words, timing = load_catalogue("rcilab.recording", require_language(language)), run.timing
     ended = words["card.fault" if run.faults else "card.goal"]
     if run.stopped:
-        ended = load_catalogue(SHARED, require_language(language)).get(f"stop.{run.stopped}", run.stopped)
+        ended = Text(language, "rcilab.recording").render(describe_note(run.stopped))
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zlib
 from dataclasses import replace
@@ -14,11 +15,13 @@ import pytest
 import rcilab
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
+from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
-from rcilab.recording.chunks import MAGIC, encode_block, encode_header
+from rcilab.recording.chunks import MAGIC, decode_blocks, encode_block, encode_header
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run
 from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, write_run
+from rcilab.recording.run_html import run_html
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, export_run, some_cycles, some_run
 
 
@@ -40,6 +43,26 @@ def test_a_run_comes_back_as_it_was(tmp_path):
     assert back.report is not None
     assert back.report.ok
     assert repr(back) == repr(run)
+
+
+@pytest.mark.parametrize("is_earlier", [False, True])
+def test_the_reason_of_a_stop_comes_back_with_its_code_from_earlier_files_too(is_earlier):
+    stop = Remark("an emergency stop was pressed", "estop")
+    content = export_run(some_run(stopped=stop), ".rcirun")
+    if is_earlier:
+        content = without_stop_code(content)
+    back = decode_run(content)
+    assert (back.stopped, back.is_safety_stop) == (stop, True)
+    assert "急停" in run_html(back, "zh")
+
+
+def without_stop_code(content: bytes) -> bytes:
+    """A file as earlier versions wrote it."""
+    *head, tail = decode_blocks(content, "earlier")
+    facts = json.loads(tail.payload)
+    del facts["stop_code"]
+    blocks = b"".join(encode_block(block.kind, bytes(block.payload)) for block in head)
+    return encode_header() + blocks + encode_block("TAIL", json.dumps(facts).encode())
 
 
 def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(tmp_path):

@@ -80,7 +80,8 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
     said = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
     assert f"{name} (reported as kInstabilityDetection)" in said
-    chinese = describe_stop(name, FAULTS, Text("zh"))
+    assert run.stopped is not None
+    chinese = describe_stop(run.stopped, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese
     told = notebook_outcome(
         Outcome(what="execute", error=error), load_model("xMatePro7"), None, translator.Text("en", "rcilab.notebook")

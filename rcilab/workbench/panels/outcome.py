@@ -9,7 +9,6 @@ from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
-from rcilab.i18n.translator import LiteralText
 from rcilab.recording.html_facts import describe_stop
 from rcilab.workbench.widgets import esc
 
@@ -68,7 +67,7 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
     is_said = run.stopped is None or run.faults or run.is_safety_stop
-    reason = "" if is_said else text.render(LiteralText(_tell_stop(run, text)))
+    reason = "" if is_said else _tell_stop(run, text)
     why = reason and f"<br><small>{esc(reason)}</small>"
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
 
