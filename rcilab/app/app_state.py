@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import Tone
-from rcilab.app.planning import PathKind, Plan, PlannableLaw
-from rcilab.app.run.drive_state import DriveState, Plant
+from rcilab.app.planning import PathKind, Plan
+from rcilab.app.run.drive_state import DriveState
 from rcilab.app.run.world_state import WorldState
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel
+from rcilab.motion.joint import JointLaw
+from rcilab.sim.controller_config import PlantKind
 
 if TYPE_CHECKING:
     from rcilab.app.run.recording import Recording
@@ -43,7 +45,7 @@ class AppState:
     model: RobotModel
     target: str = "virtual"
     """"virtual" or an address, rci://HOST:PORT."""
-    plant: Plant = "ideal"
+    plant: PlantKind = "ideal"
     """What the virtual controller moves."""
     world: WorldState = field(default_factory=WorldState)
     """The virtual controller itself: its network, wiring and buttons."""
@@ -62,7 +64,7 @@ class AppState:
     runs: Path | None = None
     """Folder of these files; None: no file is written."""
     speed: float = 0.5
-    law: PlannableLaw = "torque_rate_limited"
+    law: JointLaw = "torque_rate_limited"
     way: PathKind = "joint"
     """How the tool goes to the goal."""
     via: Pose | None = None

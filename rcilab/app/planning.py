@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,14 @@ from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion import plan_arc, plan_joint, plan_line, plan_recovery
+from rcilab.motion.joint import JointLaw
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.motion import Motion, Program
 
 PathKind = Literal["joint", "line", "arc"]
-PATH_KINDS: tuple[PathKind, ...] = ("joint", "line", "arc")
-PlannableLaw = Literal["torque_rate_limited", "jerk_limited", "s_profile"]
-LAWS: tuple[PlannableLaw, ...] = ("torque_rate_limited", "jerk_limited", "s_profile")
+PATH_KINDS: tuple[PathKind, ...] = get_args(PathKind)
 
 SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm is where the arm is.
 SAME_WAY = 1e-3  # [rad] Beyond it a line ends in another way of standing than the one that was wanted.
@@ -105,7 +104,7 @@ def make_plan(
     start: JointVector,
     goal: JointVector,
     speed: float,
-    law: PlannableLaw,
+    law: JointLaw,
     box: SafetyBox | None = None,
     kind: PathKind = "joint",
     via: Pose | None = None,
@@ -165,7 +164,7 @@ def _go(
     start: JointVector,
     goal: JointVector,
     speed: float,
-    law: PlannableLaw,
+    law: JointLaw,
     kind: PathKind,
     via: Pose | None,
 ) -> Motion:

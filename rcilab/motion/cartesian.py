@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TypeAlias, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,7 +34,6 @@ from rcilab.motion.s_curve import plan_s_curve
 from rcilab.motion.time_parametrization import TimeParametrization
 from rcilab.motion.torque_rate import plan_within_torque_rate
 
-PathLaw: TypeAlias = JointLaw
 """Time law of a path: the same as for a joint motion; the S profile is that of MOVEL (manual 3.5)."""
 
 
@@ -59,7 +58,7 @@ def plan_line(
     *,
     speed: float = 0.2,
     psi: float | None = None,
-    law: PathLaw = "jerk_limited",
+    law: JointLaw = "jerk_limited",
 ) -> Motion:
     """Returns the motion on which the tool moves in a straight line from its pose at `start` to `goal`.
 
@@ -97,7 +96,7 @@ def plan_arc(
     *,
     speed: float = 0.2,
     psi: float | None = None,
-    law: PathLaw = "jerk_limited",
+    law: JointLaw = "jerk_limited",
     orientation: ArcOrientation = "through_via",
 ) -> Motion:
     """Returns the motion on which the tool moves on the arc from its pose at `start` through `via` to `goal`.
@@ -139,7 +138,7 @@ def plan_circle(
     angle: float = math.tau,
     speed: float = 0.2,
     psi: float | None = None,
-    law: PathLaw = "jerk_limited",
+    law: JointLaw = "jerk_limited",
     orientation: CircleOrientation = "held",
 ) -> Motion:
     """Returns the motion on which the tool moves on a circle.
@@ -187,7 +186,7 @@ def plan_nullspace(
     psi: float,
     *,
     speed: float = 0.2,
-    law: PathLaw = "jerk_limited",
+    law: JointLaw = "jerk_limited",
     way: ElbowDirection = "shorter",
 ) -> Motion:
     """Returns the motion on which the tool keeps its pose at `start` and only the elbow moves, to arm angle `psi`.
@@ -320,7 +319,7 @@ def _s_profile_timing(path: Path, speed: float) -> TimeParametrization:
     return TimeParametrization(np.clip(shares, 0.0, 1.0), du, ddu)
 
 
-def plan_path(model: RobotModel, q: JointVector, path: Path, speed: float, law: PathLaw) -> Motion:
+def plan_path(model: RobotModel, q: JointVector, path: Path, speed: float, law: JointLaw) -> Motion:
     """Returns the motion along a path with a time law.
 
     Args:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, BinaryIO, Literal, TypeAlias
+from typing import IO, BinaryIO, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,7 @@ TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile",
 """Time law of a motion: as fast as all limits allow, the same within the recommended torque rate, the manual's S
 profile (3.5), the fastest stop, or given samples."""
 
-LAWS: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples")
+_LAWS: tuple[TimeLaw, ...] = get_args(TimeLaw)
 
 _HTML_TEXTS: dict[Language, tuple[str, str, str]] = {
     "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
@@ -82,8 +82,8 @@ class Motion:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "goal", as_vector(self.goal, self.polynomial.n, "goal", "rad"))
-        if self.law not in LAWS:
-            raise InvalidValueError("law", self.law, f"is unknown; known: {', '.join(LAWS)}")
+        if self.law not in _LAWS:
+            raise InvalidValueError("law", self.law, f"is unknown; known: {', '.join(_LAWS)}")
         if not 0.0 < self.speed <= 1.0:
             raise InvalidValueError("speed", self.speed, "must be in (0, 1]")
         starts = readonly_copy(self.segment_starts)

@@ -9,12 +9,13 @@ from typing import Any
 import ipywidgets
 
 from rcilab.app.goal.goal_actions import SetLaw, SetPathType, SetSpeed
-from rcilab.app.planning import LAWS, Plan, build_plan_view
+from rcilab.app.planning import Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
+from rcilab.motion.joint import JOINT_LAWS
 from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
@@ -45,8 +46,8 @@ class PlanPanel(Part):
             layout=wide,
         )  # fmt: skip
         self.law = lean(
-            ipywidgets.Dropdown, description=text("target.law"), options=[(text(f"law.{law}"), law) for law in LAWS],
-            value=state.now.law,
+            ipywidgets.Dropdown, description=text("target.law"), value=state.now.law,
+            options=[(text(f"law.{law}"), law) for law in JOINT_LAWS],
             tooltip=text("target.law_hint"), layout=wide,
         )  # fmt: skip
         self.speed = lean(

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import rcilab
-from rcilab.app.planning import LAWS
 from rcilab.app.status_text import tell_remedy
 from rcilab.app.text import Text
 from rcilab.app.view_actions import QUALITIES
@@ -21,6 +20,7 @@ from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import message
 from rcilab.makers.maker import all_makers
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.motion.joint import JOINT_LAWS
 from tests.catalogues import require_equal
 
 _ROOT = Path(rcilab.__file__).parent
@@ -54,7 +54,7 @@ def test_every_name_that_becomes_a_key_has_one():
     wanted += [f"phase.{phase}" for phase in PHASES]
     wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]
     wanted += [f"controller_mode.{mode.name}" for mode in ControllerMode]
-    wanted += [f"law.{law}" for law in LAWS] + [f"quality.{quality}" for quality in QUALITIES]
+    wanted += [f"law.{law}" for law in JOINT_LAWS] + [f"quality.{quality}" for quality in QUALITIES]
     wanted += [f"scheduling.{kind}" for kind in ("SCHED_FIFO", "normal")]
     wanted += [f"reach.tone.{tone}" for tone in ("good", "warn", "bad")]
     assert sorted(set(wanted) - known) == []

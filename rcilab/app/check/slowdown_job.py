@@ -14,8 +14,8 @@ from rcilab.core.background_job import ProgressCallback
 from rcilab.motion import plan_program
 
 if TYPE_CHECKING:
-    from rcilab.app.planning import PlannableLaw
     from rcilab.conformance.time_scaling import SlowDown
+    from rcilab.motion.joint import JointLaw
 
 _TRIES = 2
 _FURTHER = 0.9
@@ -39,7 +39,7 @@ class SlowdownJob:
     """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
 
 
-def slow_to_goal(plan: Plan, speed: float, law: PlannableLaw, tell: ProgressCallback) -> SlowdownJob:
+def slow_to_goal(plan: Plan, speed: float, law: JointLaw, tell: ProgressCallback) -> SlowdownJob:
     """Returns the plan to the same goal at the largest speed that passes, planned anew."""
 
     def make(scale: float) -> Plan | None:

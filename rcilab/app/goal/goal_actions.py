@@ -14,7 +14,7 @@ from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.elbow import in_branch, nearest_free
 from rcilab.app.goal.goal import Goal, goal_at, goal_toward
-from rcilab.app.planning import LAWS, PATH_KINDS, Plan, make_plan, make_recovery
+from rcilab.app.planning import PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
 from rcilab.app.state_store import StateStore
@@ -22,6 +22,7 @@ from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Message, message
+from rcilab.motion.joint import JOINT_LAWS
 
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
@@ -308,7 +309,7 @@ class GoalActions:
 
     def set_law(self, request: SetLaw) -> None:
         """Plans with another law."""
-        if request.law in LAWS:
+        if request.law in JOINT_LAWS:
             self._store.update(law=request.law)
             self.plan()
 

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-Plant = Literal["ideal", "mujoco"]
-PLANTS: tuple[Plant, ...] = ("ideal", "mujoco")
-
 Destination = Literal["preview", "ideal", "mujoco", "address"]
 
 DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address")

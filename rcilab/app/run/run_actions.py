@@ -14,7 +14,6 @@ from rcilab.app.goal.target_status import Tone
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import TOOL, is_guided
-from rcilab.app.run.drive_state import PLANTS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
@@ -35,6 +34,7 @@ from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import load_model
+from rcilab.sim.controller_config import PLANT_KINDS
 
 if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
@@ -165,7 +165,7 @@ class RunActions:
     def _choose_plant(self, plant: str) -> None:
         """Has the virtual controller started again with another plant; goal and plan stay."""
         state = self._store.state
-        if plant not in PLANTS or plant == state.plant:
+        if plant not in PLANT_KINDS or plant == state.plant:
             return
         if state.target != "virtual":
             self._store.say("warn", message("plant.address", address=state.target))

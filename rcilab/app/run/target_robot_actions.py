@@ -7,7 +7,7 @@ from typing import Literal, cast
 
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.drive_state import DESTINATIONS, Plant
+from rcilab.app.run.drive_state import DESTINATIONS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
 from rcilab.app.status_text import tell_error
@@ -15,6 +15,7 @@ from rcilab.app.store import Store
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import message
 from rcilab.makers.driver import parse_address
+from rcilab.sim.controller_config import PlantKind
 
 _ADDRESS = "address"
 """Names the trouble that what stands in the field is no address."""
@@ -61,7 +62,7 @@ class TargetRobotActions:
             self._choose_address(request)
         else:
             self._ask("")
-            self._store.update(plant=cast("Plant", request.where))
+            self._store.update(plant=cast("PlantKind", request.where))
             self._robot.open(state.model.name, "virtual")
 
     def _choose_address(self, request: ChooseDestination) -> None:

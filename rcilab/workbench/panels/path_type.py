@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.goal.goal_actions import PlanGoal, SetLaw, SetPathType, SetSpeed
-from rcilab.app.planning import LAWS, PATH_KINDS
+from rcilab.app.planning import PATH_KINDS
 from rcilab.app.text import Text
+from rcilab.motion.joint import JOINT_LAWS
 from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
@@ -38,7 +39,7 @@ class PathTypePanel:
                 speed = gui.add_slider("%", 1, 100, 1, 50, hint=text("target.speed_hint"))
                 self._speed = BoundControl(speed, ask, lambda v, p: SetSpeed(page=p, speed=v / 100.0))
                 self._field = NumberField(gui.add_text("", "", hint=text("target.speed_hint")), ask, "speed")
-            laws = {text(f"law.{law}"): law for law in LAWS}
+            laws = {text(f"law.{law}"): law for law in JOINT_LAWS}
             self._laws = {law: label for label, law in laws.items()}
             law = gui.add_dropdown(text("target.law"), tuple(laws))
             gui.add_html(f'<p class="rl-note">{esc(text("target.law_hint"))}</p>')  # A tooltip would cover the list.

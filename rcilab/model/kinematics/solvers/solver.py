@@ -13,6 +13,8 @@ from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 
 Angles: TypeAlias = tuple[float, ...]
 
+REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as at its end.
+
 
 @dataclass(frozen=True, slots=True)
 class Redundancy:

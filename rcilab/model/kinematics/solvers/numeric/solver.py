@@ -20,6 +20,7 @@ from rcilab.model.kinematics.solvers.numeric.arcs import numeric_arcs
 from rcilab.model.kinematics.solvers.numeric.search import NumericArm, search
 from rcilab.model.kinematics.solvers.solver import (
     NO_REDUNDANCY,
+    REACH_TOLERANCE,
     Angles,
     BranchEnd,
     Envelope,
@@ -35,7 +36,6 @@ Tuning value: typical poses have 0.1 to 0.3."""
 _HELD = 2  # Which joint, from 0, of a 7-axis arm is the redundancy angle: the roll of the upper arm, as Franka has it.
 _SEEDS, _ROUNDS = 48, 3  # Starts of the search, and how often others are tried while no solution is inside the limits.
 _BATCH_SEEDS, _BLOCK = 16, 128  # For many poses: starts for each, and poses at once, so that arrays stay in the cache.
-_REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as on its end.
 
 
 class NumericSolver:
@@ -172,7 +172,7 @@ def _check_reach(envelope: Envelope, pose: Pose) -> None:
     r, (x, y, z) = pose.parts
     hand, longest = envelope.hand, envelope.upper + envelope.fore
     length = hypot(x - hand * r[2], y - hand * r[5], z - hand * r[8] - envelope.shoulder)
-    if length > longest + _REACH_TOLERANCE:
+    if length > longest + REACH_TOLERANCE:
         raise UnreachableError(
             f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
             f"shoulder, the arm reaches {longest:.3f} m at most; move the target closer",

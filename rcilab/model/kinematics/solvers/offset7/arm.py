@@ -21,6 +21,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import ModelError, UnreachableError
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, build_chain
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
 from rcilab.robots.description import RobotDescription
 
 ELBOW = 2
@@ -33,7 +34,6 @@ _TRACE = 360
 """Angles of joint 7 at which the self-motion is looked at. Tuning value: a degree; smaller loops may be overlooked."""
 _PARTS, _HUNTS = 16, 4  # An end of a branch is looked for in 16 parts of a piece, four times over.
 _DENSE = 6  # Angles put next to it; tuning value.
-_REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as on its end.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,7 +190,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     along = arm.elbow * s4 - arm.upper * c4 - arm.fore
     vx, vy, vz = ((to_shoulder * axis).sum(axis=1) for axis in (x6, y6, z6))
     rest = vx * vx + vy * vy - along * along
-    exists = (rest >= -_REACH_TOLERANCE) & (beyond <= _REACH_TOLERANCE)
+    exists = (rest >= -REACH_TOLERANCE) & (beyond <= REACH_TOLERANCE)
     side = np.sqrt(np.maximum(rest, 0.0)) * np.array((1.0, -1.0))[None, :, None]  # (2, 2, K)
     sign = np.where(off < 0.0, -1.0, 1.0)
     side = side * sign

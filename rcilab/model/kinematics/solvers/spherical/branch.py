@@ -15,14 +15,13 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.errors import KinematicsError, SingularError
-from rcilab.model.kinematics.solvers.solver import BranchEnd
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, BranchEnd
 from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, reach_error
 
 Column: TypeAlias = Array
 """Shape (N,): one number for every row of the path."""
 Vec: TypeAlias = tuple[Column, Column, Column]
 
-_REACH_TOLERANCE = 1e-9  # [m] As in `inverse.py`.
 _AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is rounding, and the one before is kept.
 _VERTICAL = 1e-6  # sin of the angle to the vertical below which the arm angle's reference turns too fast to follow.
 _BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through it: ten times the error of `_miss`.
@@ -52,7 +51,7 @@ def follow_branch(
     z -= arm.shoulder
     length = np.sqrt(x * x + y * y + z * z)
     upper, fore = arm.upper, arm.fore
-    unreachable = (length > upper + fore + _REACH_TOLERANCE) | (length < abs(upper - fore) - _REACH_TOLERANCE)
+    unreachable = (length > upper + fore + REACH_TOLERANCE) | (length < abs(upper - fore) - REACH_TOLERANCE)
     if unreachable.any():
         row = int(unreachable.argmax())
         tracker.lose(row, reach_error(arm, float(length[row])))
@@ -83,7 +82,7 @@ def _seven(
 ) -> tuple[tuple[Column, ...], tuple[Vec, Vec, Vec]]:  # fmt: skip
     """Returns joints 1 to 4, and the axes x, y and z of the forearm in base."""
     x, y, z = wrist
-    safe = np.maximum(length, _REACH_TOLERANCE)
+    safe = np.maximum(length, REACH_TOLERANCE)
     ux, uy, uz = x / safe, y / safe, z / safe
     along = arm.upper * (arm.upper + arm.fore * np.cos(elbow)) / safe
     aside = arm.upper * arm.fore * np.sin(elbow) / safe

@@ -19,10 +19,9 @@ from math import atan2, cos, hypot, pi, sin, sqrt, tau
 from rcilab.core.errors import ModelError, SingularError, UnreachableError
 from rcilab.core.spatial import Pose, Rotation9
 from rcilab.model.kinematics.arm_angle import reference_frame
-from rcilab.model.kinematics.solvers.solver import Angles
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles
 from rcilab.robots.description import DhRow, RobotDescription
 
-_REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far outside the reachable shell counts as on it.
 _AXIS_LOST = 1e-12  # sin of an angle below which the axes beside it are parallel within rounding.
 _STRETCHED = 1e-15  # 1 - cos of the elbow angle that rounding alone can cause; it moves the wrist by less than 1e-15 m.
 _QUARTER = pi / 2
@@ -90,7 +89,7 @@ def inverse_seven(
     """
     r, x, y, z, length, c4 = wrist_centre(arm, T_base_flange)
     guess = near or (0.0,) * 7
-    if length < _REACH_TOLERANCE:  # Upper and fore arm of one length, folded up: any elbow will do.
+    if length < REACH_TOLERANCE:  # Upper and fore arm of one length, folded up: any elbow will do.
         ux, uy, uz, along, aside = 0.0, 0.0, 1.0, 0.0, arm.upper
     else:
         ux, uy, uz = x / length, y / length, z / length
@@ -175,7 +174,7 @@ def wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, fl
     upper, fore = arm.upper, arm.fore
     beyond = length - (upper + fore)
     inside = abs(upper - fore) - length
-    if beyond > _REACH_TOLERANCE or inside > _REACH_TOLERANCE:
+    if beyond > REACH_TOLERANCE or inside > REACH_TOLERANCE:
         raise reach_error(arm, length)
     c = (length * length - upper * upper - fore * fore) / (2.0 * upper * fore)
     if c > 1.0 - _STRETCHED:

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.solution_batch import Columns, cross, dot
+from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
 from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, inverse_seven, inverse_six
 
 _BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache.
 _OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form decides what a singularity leaves open.
-_REACH_TOLERANCE = 1e-9  # [m] As in the scalar form.
 
 
 def inverse_batch(arm: ArmGeometry, T_base_flange: Array, psi: ArrayLike = 0.0) -> Array:
@@ -136,7 +136,7 @@ def _wrist_centre(arm: ArmGeometry, T: Array) -> tuple[Columns, Columns, Array, 
     square = x * x + y * y + z * z
     length = np.sqrt(square)
     longest, shortest = arm.upper + arm.fore, abs(arm.upper - arm.fore)
-    beyond = (length > longest + _REACH_TOLERANCE) | (length < shortest - _REACH_TOLERANCE)
+    beyond = (length > longest + REACH_TOLERANCE) | (length < shortest - REACH_TOLERANCE)
     cosine = (square - arm.upper**2 - arm.fore**2) / (2.0 * arm.upper * arm.fore)
     return ahead, (x, y, z), length, np.clip(cosine, -1.0, 1.0), beyond
 
