@@ -41,7 +41,7 @@ def require_rows(rows: int, max_rows: int, what: str, name: str) -> None:
         raise InvalidValueError(
             f"{what} {name!r}",
             rows,
-            f"rows of 1 ms are more than {max_rows}; if that is meant, pass max_rows={rows} (in a shell --max-rows "
+            f"rows of 1 ms are more than {max_rows}; to allow them, pass max_rows={rows} (in a shell: --max-rows "
             f"{rows})",
         ).coded("file_rows", file=name, count=rows, most=max_rows)
 
@@ -58,6 +58,6 @@ def require_bytes(size: int, max_rows: int, what: str, name: str) -> None:
         raise InvalidValueError(
             f"{what} {name!r}",
             round(size / 1e6, 1),
-            f"MB, unpacked, are more than {most / 1e6:.1f}; if that is meant, pass max_rows={rows} (in a shell "
+            f"MB, unpacked, are more than {most / 1e6:.1f}; to allow them, pass max_rows={rows} (in a shell: "
             f"--max-rows {rows})",
         ).coded("file_large", file=name, size=f"{size / 1e6:.1f}", most=f"{most / 1e6:.1f}")

@@ -18,7 +18,7 @@ _UNITS: dict[str, dict[str, float]] = {
     "mm": {"mm": 1.0, "m": 1000.0},
 }
 """Units accepted after a number, by the field's unit, each in the field's unit; longer names first."""
-_MAX_LENGTH = 40  # Characters; longer than any number that is meant as one.
+_MAX_LENGTH = 40  # Characters; longer than any number in normal use.
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ def write_html(run: Run, stream: IO[bytes], text: Text) -> None:
     tracking = run.tracking
     packed, scales = _Packed(), {name: plot_scale(name, text.units) for name in _PLOTS}
     content = {
-        "words": _words(run, text),
+        "words": _texts(run, text),
         "run": _pack_run(run, tracking, scales, packed),
         "charts": [_chart(name, scale, text, run) for name, scale in scales.items()],
         "arm": None if run.model is None else _pack_arm(run.model, packed),
@@ -104,12 +104,12 @@ class _Packed:
         return base64.b64encode(gzip.compress(b"".join(self._parts), 6, mtime=0)).decode("ascii")
 
 
-def _words(run: Run, text: Text) -> dict[str, str]:
+def _texts(run: Run, text: Text) -> dict[str, str]:
     """Returns the texts of the page; those for a run without a plan name the commands as reference."""
-    words = dict(load_catalogue("rcilab.recording", text.language))
+    texts = dict(load_catalogue("rcilab.recording", text.language))
     if run.plan is None:
-        words |= {name: words[f"{name}_commanded"] for name in ("path", "table.title")}
-    return words
+        texts |= {name: texts[f"{name}_commanded"] for name in ("path", "table.title")}
+    return texts
 
 
 def _chart(name: str, scale: PlotScale, text: Text, run: Run) -> dict[str, Any]:

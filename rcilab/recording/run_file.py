@@ -68,7 +68,7 @@ _STOP_CODES = {
     "an emergency stop was pressed": "estop",
     "the safety gate was opened": "gstop",
 }
-"""Codes of the reasons of a stop, by the sentence that stands alone in files of earlier versions."""
+"""Codes of the reasons of a stop, by their sentences: files of earlier versions have only the sentence."""
 _ROWS = struct.Struct("<I")
 _LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with the complete state takes a third of it.
 

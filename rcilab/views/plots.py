@@ -122,8 +122,8 @@ def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = N
     """
     if quantity == "q":
         return Curves(t=motion.times, values=motion.q)
-    held = np.repeat(motion.q[-1:], HOLD_SAMPLES, axis=0)
-    t, path = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES)), np.concatenate((motion.q, held))
+    hold = np.repeat(motion.q[-1:], HOLD_SAMPLES, axis=0)
+    t, path = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES)), np.concatenate((motion.q, hold))
     if quantity == "tau":
         assert model is not None
         return Curves(t=t, values=model.torque(path, _differences(path, 1), _differences(path, 2)).full)

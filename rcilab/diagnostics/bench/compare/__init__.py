@@ -1,1 +1,1 @@
-"""What others offer for the same arm, measured beside our own in the same process: `rcilab bench compare`."""
+"""Comparison with other packages on the same arm, in the same process: `rcilab bench compare`."""

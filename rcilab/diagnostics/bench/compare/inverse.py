@@ -91,17 +91,17 @@ def compare_inverse(model: RobotModel, count: int = 1000) -> Iterator[Measuremen
     yield _batch(model, q)
 
 
-def pose_errors(T: Array, wanted: Array) -> tuple[Array, Array]:
-    """Returns how far poses are from a wanted one, [m], and by which angle they are turned against it, [rad].
+def pose_errors(T: Array, target: Array) -> tuple[Array, Array]:
+    """Returns the distances, [m], and the rotation angles, [rad], of poses from a target pose.
 
     Args:
         T: Poses, shape (m, 4, 4).
-        wanted: The pose, shape (4, 4).
+        target: The target, shape (4, 4).
     """
-    between = np.swapaxes(T[:, :3, :3], 1, 2) @ wanted[:3, :3]
+    between = np.swapaxes(T[:, :3, :3], 1, 2) @ target[:3, :3]
     axis = (between - np.swapaxes(between, 1, 2))[:, (2, 0, 1), (1, 2, 0)]
     angle = np.arctan2(np.linalg.norm(axis, axis=1), np.trace(between, axis1=1, axis2=2) - 1.0)
-    return np.linalg.norm(T[:, :3, 3] - wanted[:3, 3], axis=1), angle
+    return np.linalg.norm(T[:, :3, 3] - target[:3, 3], axis=1), angle
 
 
 def _rows(
