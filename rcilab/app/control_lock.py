@@ -7,7 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-SILENCE = 2.0  # [s] A page that has not answered for so long is gone: the same time that stops a motion.
+from rcilab.control_process.layout import OPERATOR_TIMEOUT
+
 PATIENCE = 10.0  # [s] For so long the holder may think about handing over, while the arm stands.
 _LOADING = 20.0  # [s] A page that has just opened may take so long until its first word.
 
@@ -89,7 +90,7 @@ class ClientHeartbeat:
 
     def came(self, page: int) -> None:
         """Notes a page that is still loading."""
-        self._heard.setdefault(page, self._clock() + _LOADING - SILENCE)
+        self._heard.setdefault(page, self._clock() + _LOADING - OPERATOR_TIMEOUT)
 
     def heard(self, page: int) -> None:
         """Notes that a page has answered."""
@@ -100,5 +101,5 @@ class ClientHeartbeat:
         self._heard.pop(page, None)
 
     def is_silent(self, page: int) -> bool:
-        """Returns whether a page that ought to answer has not done so for `SILENCE`."""
-        return self._clock() - self._heard.get(page, math.inf) > SILENCE
+        """Returns whether a page that ought to answer has not done so for `OPERATOR_TIMEOUT`."""
+        return self._clock() - self._heard.get(page, math.inf) > OPERATOR_TIMEOUT

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from rcilab.app.control_lock import SILENCE, ClientHeartbeat
+from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
+from rcilab.control_process.layout import OPERATOR_TIMEOUT
 from rcilab.i18n.translator import message
 
 
@@ -129,7 +130,7 @@ class ControlLockActions:
         lease = self._store.state.lease
         if lease.former is not None and not self._presence.is_silent(lease.former):
             self._store.update(lease=lease.take(lease.former))
-        elif len(lease.pages) == 1 and now - lease.since > SILENCE and not is_moving(self._session.status()):
+        elif len(lease.pages) == 1 and now - lease.since > OPERATOR_TIMEOUT and not is_moving(self._session.status()):
             only = lease.pages[0]
             if not self._presence.is_silent(only):
                 self._store.update(lease=lease.take(only))

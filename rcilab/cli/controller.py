@@ -19,8 +19,6 @@ program that uses the vendor's client library. It prints one line when it is rea
 world port, and ends on Ctrl-C.
 """
 
-MODE_DELAY = 1.05  # [s] The vendor's client sleeps for 1 s after StartMove, then answers the states in its buffer.
-
 _OPTIONS = {"limit table": "--limits", "client_host": "--client", "client_port": "--client"}
 """Options whose names differ from those of their settings."""
 
@@ -152,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _config(args: argparse.Namespace) -> ControllerConfig:
-    from rcilab.sim.controller_config import ControllerConfig
+    from rcilab.sim.controller_config import VENDOR_MODE_DELAY, ControllerConfig
 
     client_host, client_port = _client(args.client)
     network, states_network = _networks(args)
@@ -165,7 +163,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         client_port=client_port,
         plant=args.plant,
         lockstep=args.lockstep,
-        mode_delay=MODE_DELAY if args.mode_delay is None and not args.lockstep else args.mode_delay,
+        mode_delay=VENDOR_MODE_DELAY if args.mode_delay is None and not args.lockstep else args.mode_delay,
         prefill=args.prefill,
         patience=args.patience,
         lost_limit=args.lost_limit or None,  # 0 switches it off.

@@ -14,13 +14,12 @@ from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError
+from rcilab.sim.controller_config import MODE_DELAY, SUPERVISED_PREFILL
 
 ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every response of the controller.
 LOAD_TIMEOUT = START_TIMEOUT  # [s] For the control process to load; the same as for the virtual controller.
 FROZEN_AFTER = 1.0  # [s] Without a heartbeat of the control process; longer than any of its waits.
 END_TIMEOUT = 3.0  # [s] For the control process to stop the arm and exit; the longest stop takes 0.4 s.
-MODE_DELAY = 0.2  # [s] Of the virtual controller: our client needs no longer delay after a change of mode.
-PREFILL = 40  # [cycles] Of the virtual controller's jitter buffer: an open browser causes pauses of tens of ms.
 _RESTARTS, _RESTART_WINDOW = 3, 60.0  # Largest number of automatic restarts, and within which time, [s].
 
 
@@ -116,7 +115,9 @@ class ProcessSupervisor:
 
     def _start_controller(self) -> None:
         self._controller = VirtualController(
-            self._model_name, self._plant, options=["--prefill", str(PREFILL), "--mode-delay", str(MODE_DELAY)]
+            self._model_name,
+            self._plant,
+            options=["--prefill", str(SUPERVISED_PREFILL), "--mode-delay", str(MODE_DELAY)],
         )
 
     def _start_worker(self) -> None:

@@ -15,7 +15,7 @@ from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
 
 ANSWER_TIMEOUT = 10.0  # [s] The controller is on this machine: if it is slow, the machine is busy.
-SILENCE_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller without deadlines for seconds.
+STATE_TIMEOUT_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller without deadlines for seconds.
 
 
 def simulate(
@@ -46,7 +46,7 @@ def simulate(
             ANSWER_TIMEOUT,
             record_all=record_all,
             realtime=not lockstep,
-            silence=SILENCE_IN_LOCKSTEP if lockstep else None,
+            state_timeout=STATE_TIMEOUT_IN_LOCKSTEP if lockstep else None,
             on_close=controller.end,
             world=_world(controller.world_address),
             partner=controller.pid if lockstep else None,

@@ -54,7 +54,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.scheduling import PRIORITY, enter_realtime
 
-SILENCE = 0.3  # [s] Without a state while idle until the connection counts as lost; a page waits 0.5 s.
+IDLE_STATE_TIMEOUT = 0.3  # [s] Without a state while idle until the connection counts as lost; a page waits 0.5 s.
 _POLL_PERIOD = 0.02  # [s] Longest wait in the idle loop, and time between two checks for the supervisor.
 _IDLE_PERIOD = 0.004  # [s] Between two polls for states while nothing moves; saves CPU time.
 
@@ -138,7 +138,7 @@ class ControlProcess:
         self._record(states)
         if states:
             self._update_phase(states[-1])
-        elif time.monotonic_ns() - self._driver.received_ns > SILENCE * 1e9:
+        elif time.monotonic_ns() - self._driver.received_ns > IDLE_STATE_TIMEOUT * 1e9:
             self._status.set_phase("lost", "lost.silent", address=self._address)
 
     def _record(self, states: list[RobotState], *, is_awaited: bool = True) -> None:

@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
 
-SILENCE = 0.1  # [s] without a state while moving means a lost connection: five times the loss a controller bridges.
-SILENCE_HERE = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
+STATE_TIMEOUT = (
+    0.1  # [s] without a state while moving means a lost connection: five times the loss a controller bridges.
+)
+LOCAL_STATE_TIMEOUT = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
 CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
 MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
 STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
@@ -77,7 +79,7 @@ class ControlLoop:
         filters: Filters of a callback's commands, in this order.
         box: The controller's safety box, if known, for fault messages.
         collision_thresholds: Those of the controller, shape (n,), [N m], if known, for fault messages.
-        silence: Time without a state that counts as a lost connection, [s].
+        state_timeout: Time without a state that counts as a lost connection, [s].
     """
 
     def __init__(
@@ -92,7 +94,7 @@ class ControlLoop:
         filters: Sequence[CommandFilter],
         box: SafetyBox | None = None,
         collision_thresholds: JointVector | None = None,
-        silence: float = SILENCE,
+        state_timeout: float = STATE_TIMEOUT,
     ) -> None:
         if mode not in _COMMANDS:
             raise InvalidValueError("mode", mode, f"must be one of {[m.name for m in _COMMANDS]}")
@@ -104,7 +106,7 @@ class ControlLoop:
         self._kind = _COMMANDS[mode]
         self._log = log
         self._watch = watch
-        self._silence = silence
+        self._state_timeout = state_timeout
         self._filters = tuple(filters)
         self._box = box
         self._thresholds = collision_thresholds
@@ -150,7 +152,7 @@ class ControlLoop:
         """Returns the newest state that shows the requested modes, or the reason of `watch` to stop before."""
         deadline = time.monotonic() + MODE_TIMEOUT
         while time.monotonic() < deadline:
-            states = self._driver.poll(self._silence)
+            states = self._driver.poll(self._state_timeout)
             if not states:
                 raise self._lost()
             for state in states[:-1]:
@@ -241,7 +243,7 @@ class ControlLoop:
         After a delay of this process several are waiting. Each is answered in turn, because the controller's jitter
         buffer still uses slightly late commands; states older than `CATCH_UP` cycles are skipped.
         """
-        deadline = time.monotonic() + self._silence
+        deadline = time.monotonic() + self._state_timeout
         while True:
             while self._pending:
                 state = self._pending.popleft()
@@ -341,7 +343,7 @@ class ControlLoop:
             self._driver.end()
             deadline = time.monotonic() + REST_TIMEOUT
             while self._is_running(states) and time.monotonic() < deadline:
-                take(self._driver.poll(min(self._silence, REST_TIMEOUT)))
+                take(self._driver.poll(min(self._state_timeout, REST_TIMEOUT)))
         finally:
             self._driver.on_states, self._log.braking = others, False
         faulty = next((state for state in states if state.faults), None)
@@ -367,7 +369,7 @@ class ControlLoop:
         deadline = time.monotonic() + REST_TIMEOUT
         before: RobotState | None = None
         while time.monotonic() < deadline:
-            states = self._driver.poll(self._silence)
+            states = self._driver.poll(self._state_timeout)
             self._record(states)
             if not states or (before is not None and _stands(before, states[-1])):
                 return
@@ -463,8 +465,8 @@ class ControlLoop:
     def _lost(self) -> ConnectionLostError:
         when = "before the first command" if math.isnan(self._t) else f"after t = {self._t:.3f} s"
         return ConnectionLostError(
-            f"{self._driver.name}: no state for {self._silence:g} s, {when}; look whether the controller runs and the "
-            "cable is in, then connect again. The controller stops an arm that gets no commands by itself"
+            f"{self._driver.name}: no state for {self._state_timeout:g} s, {when}; look whether the controller runs "
+            "and the cable is in, then connect again. The controller stops an arm that gets no commands by itself"
         )
 
 

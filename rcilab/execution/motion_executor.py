@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rcilab.core.arrays import JointVector
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, Mode
-from rcilab.execution.control_loop import SILENCE, Callback, ControlLoop, StopCheck
+from rcilab.execution.control_loop import STATE_TIMEOUT, Callback, ControlLoop, StopCheck
 from rcilab.execution.filters import CommandFilter, RateLimiter
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.streaming import MotionStream
@@ -31,7 +31,7 @@ class MotionExecutor:
         log: Takes every cycle.
         stop_check: Called in every cycle with the motion time; returns why the motion is to stop, or None.
         limits: Bounds that every command keeps.
-        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        state_timeout: Time without a state, while moving, that counts as a lost connection, [s].
         on_stopping: Called with the reason when a motion begins to stop before its end.
     """
 
@@ -42,14 +42,14 @@ class MotionExecutor:
         stop_check: StopCheck,
         limits: Limits,
         *,
-        silence: float = SILENCE,
+        state_timeout: float = STATE_TIMEOUT,
         on_stopping: Callable[[str], object] | None = None,
     ) -> None:
         self._driver = driver
         self._log = log
         self._stop_check = stop_check
         self._limits = limits
-        self._silence = silence
+        self._state_timeout = state_timeout
         self._on_stopping = on_stopping
         self._stream: MotionStream | None = None
         self._is_torque = False
@@ -96,7 +96,7 @@ class MotionExecutor:
             ControllerMode[mode.upper()],
             self._log,
             watch=self._check,
-            silence=self._silence,
+            state_timeout=self._state_timeout,
             model=model,
             filters=filters,
             box=box,

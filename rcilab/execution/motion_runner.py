@@ -42,7 +42,7 @@ class MotionRunner:
         lock: Who may use it.
         arm: What is configured on the robot.
         realtime: False for a controller in lock-step, where timing means nothing.
-        silence: Time without a state, while moving, that counts as a lost connection, [s].
+        state_timeout: Time without a state, while moving, that counts as a lost connection, [s].
         partner: See above.
         record_all: Whether everything that the state has is recorded.
     """
@@ -54,7 +54,7 @@ class MotionRunner:
         arm: ConfiguredArm,
         *,
         realtime: bool,
-        silence: float,
+        state_timeout: float,
         partner: int | None,
         record_all: bool,
     ) -> None:
@@ -63,7 +63,7 @@ class MotionRunner:
         self._lock = lock
         self._arm = arm
         self._realtime = realtime
-        self._silence = silence
+        self._state_timeout = state_timeout
         self._record_all = record_all
         self._listeners: tuple[RunListener, ...] = ()
 
@@ -107,7 +107,7 @@ class MotionRunner:
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
         executor = MotionExecutor(
-            self._driver, CycleLog(recorder), self._lock.reason_to_stop, model.limits, silence=self._silence
+            self._driver, CycleLog(recorder), self._lock.reason_to_stop, model.limits, state_timeout=self._state_timeout
         )
         setup = Setup(target=self._driver.name, mode=mode, started_ns=time.time_ns())
 

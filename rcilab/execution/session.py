@@ -20,7 +20,7 @@ from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageErro
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
-from rcilab.execution.control_loop import SILENCE, SILENCE_HERE, Callback
+from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.execution.motion_callback import Progress, follow_poses, report_progress
 from rcilab.execution.motion_progress import MotionProgress
@@ -86,7 +86,7 @@ def open_session(
     *,
     record_all: bool = False,
     realtime: bool = True,
-    silence: float | None = None,
+    state_timeout: float | None = None,
     on_close: Callable[[], None] = lambda: None,
     world: SimulationControl | None = None,
     partner: int | None = None,
@@ -99,8 +99,9 @@ def open_session(
         timeout: [s].
         record_all: As for `connect`.
         realtime: False for a controller in lock-step, where timing means nothing.
-        silence: Time without a state, while moving, that counts as a lost connection, [s]; None is `SILENCE`, or
-            `SILENCE_HERE` for a controller on this machine: there is no cable to lose, and a busy machine pauses it.
+        state_timeout: Time without a state, while moving, that counts as a lost connection, [s]; None is
+            `STATE_TIMEOUT`, or `LOCAL_STATE_TIMEOUT` for a controller on this machine: there is no cable to lose, and a
+            busy machine pauses it.
         on_close: Called once when the session is closed, such as to end a private controller.
         world: The simulation control of a virtual robot; None without one.
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
@@ -121,11 +122,11 @@ def open_session(
             closing.callback(world.close)
         closing.callback(driver.close)
         lock = SessionLock(closing.close)
-        if silence is None:
-            silence = SILENCE_HERE if driver.is_local else SILENCE
+        if state_timeout is None:
+            state_timeout = LOCAL_STATE_TIMEOUT if driver.is_local else STATE_TIMEOUT
         arm = ConfiguredArm(model=model)
         runner = MotionRunner(
-            driver, lock, arm, realtime=realtime, silence=silence, partner=partner, record_all=record_all
+            driver, lock, arm, realtime=realtime, state_timeout=state_timeout, partner=partner, record_all=record_all
         )
         return RobotSession(driver, arm, lock, runner, world)
     except BaseException:

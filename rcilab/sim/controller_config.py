@@ -17,6 +17,16 @@ DEFAULT_HOST = "127.0.0.2"
 """Loopback, but not the client's own address: a vendor's client may bind the UDP port of every address of its machine,
 as that of the RCI does, and would otherwise receive its own commands as states."""
 
+SUPERVISED_PREFILL = 40
+"""`prefill` of the page's own controller, [cycles]: an open browser causes pauses of tens of ms. Beside `PREFILL` and
+`TORQUE_PREFILL`, which are for a client alone."""
+MODE_DELAY = 0.2
+"""From StartMove to the requested modes, [s]; by then a vendor client's buffer is full of idle states, which it
+skips."""
+LOCKSTEP_MODE_DELAY = 0.02  # [s]
+VENDOR_MODE_DELAY = 1.05
+"""For a vendor's client with any buffer, [s]: it sleeps for 1 s after StartMove, then answers the states in it."""
+
 FEWEST_LOST, MOST_LOST = 10, 20  # Manual 4.6: the packet-loss threshold is usually 10 to 20.
 
 
@@ -45,8 +55,7 @@ class ControllerConfig:
     lockstep: bool = False
     """Whether a motion advances only when the command for the current state has come, instead of at 1 kHz."""
     mode_delay: float | None = None
-    """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step. The vendor's client sleeps for 1 s
-    after StartMove and then reads what its socket has kept: 0.2 is enough for a usual buffer, 1.05 for any."""
+    """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step."""
     prefill: int | None = None
     """Cycles by which commands are played late, to absorb jitter; None: 10, and 2 for torques, or 0 in lock-step."""
     patience: float | None = None
@@ -101,7 +110,7 @@ class ControllerConfig:
     @property
     def mode_delay_cycles(self) -> int:
         """Cycles from StartMove to the requested modes."""
-        delay = self.mode_delay if self.mode_delay is not None else 0.02 if self.lockstep else 0.2
+        delay = self.mode_delay if self.mode_delay is not None else LOCKSTEP_MODE_DELAY if self.lockstep else MODE_DELAY
         return round(delay / CYCLE_TIME)
 
     @property

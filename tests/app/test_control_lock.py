@@ -6,13 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcilab.app.control_lock import PATIENCE, SILENCE, ClientHeartbeat, ControlLock
+from rcilab.app.control_lock import PATIENCE, ClientHeartbeat, ControlLock
 from rcilab.app.control_lock_actions import AnswerControls, ControlLockActions, PageClosed, PageOpened, TakeControls
 from rcilab.app.dispatcher import Dispatcher
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.store import Store, UiState
 from rcilab.app.view_actions import Seek
 from rcilab.control_process import SupervisorStatus
+from rcilab.control_process.layout import OPERATOR_TIMEOUT
 from rcilab.i18n.translator import message
 from rcilab.model.robot_model import load_model
 
@@ -107,12 +108,12 @@ def desk() -> Desk:
 
 
 def test_a_frozen_tab_loses_the_controls_and_gets_them_back_unless_somebody_took_them(desk):
-    desk.wait(SILENCE + 0.2, 2)
+    desk.wait(OPERATOR_TIMEOUT + 0.2, 2)
     assert desk.lease.holder is None
     assert desk.told == "lease.silent"
     desk.wait(0.3, 1, 2)
     assert desk.lease.holder == 1
-    desk.wait(SILENCE + 0.2, 2)
+    desk.wait(OPERATOR_TIMEOUT + 0.2, 2)
     desk.actions.take_controls(TakeControls(page=2))
     desk.wait(0.3, 1, 2)
     assert desk.lease.holder == 2
@@ -145,7 +146,7 @@ def test_who_is_told_no_may_ask_again(desk):
 def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
     desk.robot.phase = "moving"
     desk.actions.page_went(PageClosed(page=1))
-    desk.wait(SILENCE + 1.0, 2)
+    desk.wait(OPERATOR_TIMEOUT + 1.0, 2)
     assert desk.lease.holder is None
     desk.robot.phase = "idle"
     desk.wait(0.2, 2)

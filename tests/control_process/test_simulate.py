@@ -244,7 +244,7 @@ def test_a_controller_that_is_killed_in_mid_motion_is_noticed_although_it_keeps_
     controller = start_controller(MODEL.name, lockstep=True)
     try:
         assert controller.address is not None
-        with open_session(controller.address, MODEL, 10.0, realtime=False, silence=60.0) as robot:
+        with open_session(controller.address, MODEL, 10.0, realtime=False, state_timeout=60.0) as robot:
             robot.power_on()
             with pytest.raises(ConnectionLostError) as lost:
                 robot.control(callback)

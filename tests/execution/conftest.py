@@ -12,11 +12,11 @@ from tests.execution.peer import MODEL, Peer, Script
 def make_robot():
     opened = []
 
-    def make(script: Script | None = None, silence: float = 5.0):
+    def make(script: Script | None = None, state_timeout: float = 5.0):
         peer = Peer(script)
         opened.append(peer)
         # As `simulate` does: the peer waits for us, and a busy machine may pause either side.
-        robot = open_session(peer.url, MODEL, 1.0, realtime=False, silence=silence)
+        robot = open_session(peer.url, MODEL, 1.0, realtime=False, state_timeout=state_timeout)
         opened.append(robot)
         return peer, robot
 

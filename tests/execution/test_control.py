@@ -164,7 +164,7 @@ def test_a_motion_that_the_controller_ends_by_itself_is_an_error(make_robot):
 
 
 def test_silence_in_mid_motion_is_a_lost_connection(make_robot):
-    peer, robot = make_robot(Script(silent_at=30), silence=0.3)
+    peer, robot = make_robot(Script(silent_at=30), state_timeout=0.3)
     start = time.monotonic()
     with pytest.raises(ConnectionLostError, match=r"no state for 0\.3 s") as caught:
         robot.control(wave(400))

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from rcilab.core.arrays import JointVector
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
@@ -38,12 +39,12 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.controller_config import MODE_DELAY
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
-MODE_DELAY = 200  # [cycles] After StartMove; by then the vendor client's buffer is full of idle states, which it skips.
 RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least, so that a client sees it.
 _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
@@ -94,7 +95,7 @@ class RciController:
         self,
         arm: VirtualArm,
         *,
-        mode_delay: int = MODE_DELAY,
+        mode_delay: int = round(MODE_DELAY / CYCLE_TIME),
         recovery_time: int = RECOVERY_TIME,
     ) -> None:
         model = arm.model
