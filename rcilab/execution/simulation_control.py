@@ -82,6 +82,7 @@ class SimulationControl(Closeable):
         link: int | None = None,
         point: ArrayLike | None = None,
         duration: float | None = None,
+        rise_time: float = 0.05,
     ) -> None:
         """Applies an external force to the arm; it replaces an earlier one.
 
@@ -90,9 +91,10 @@ class SimulationControl(Closeable):
             link: Number of the link, from 1; None: the tool.
             point: Where the force acts, in the frame of the link (or the tool), shape (3,), [m]; None: at its origin.
             duration: For how long, in the robot's own time, [s]; None: until `release`.
+            rise_time: Time in which the force rises, and falls at its end, [s]; 0: a step.
         """
         place = None if point is None else _numbers(point, 3, "point", "m")
-        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration))
+        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration, rise_time))
 
     def release(self) -> None:
         """Removes the external force."""

@@ -6,13 +6,12 @@ in lock-step every run with the same requests at the same cycles comes out the s
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from rcilab.core.clock import CYCLE_TIME, Clock
+from rcilab.core.clock import Clock
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
@@ -41,9 +40,8 @@ from rcilab.sim.api import (
 )
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
+from rcilab.sim.force_profile import ForceProfile
 from rcilab.sim.maker_server import SimulatedController
-
-_NOTHING = Push((0.0,) * 6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +78,9 @@ class Environment:
         self._stalls = stalls
         self._clock = clock
         self._counters = counters
-        self._is_pushed = False
+        self._push = ForceProfile()
         self._has_walls = False
         self._walls: SafetyBox | None = None
-        self._end_of_push = math.inf  # Number of the cycle that ends it.
 
     def handle(self, request: WorldRequest) -> WorldAnswer:
         """Carries a request out, or returns why not."""
@@ -97,9 +94,9 @@ class Environment:
         return Done()
 
     def step(self) -> None:
-        """Ends a push whose time is over, and moves walls; called after every cycle."""
-        if self._controller.cycle_number >= self._end_of_push:
-            self._push(_NOTHING)
+        """Updates the external force and moves walls; called after every cycle."""
+        if self._push.step():
+            self._apply_push()
         if self._has_walls and self._active_box() is not self._walls:
             self._walls = self._active_box()
             self._plant.set_walls(self._walls)
@@ -110,11 +107,14 @@ class Environment:
     def _change(self, request: WorldRequest) -> None:
         match request:
             case Push():
-                self._push(request)
+                self._plant.push(request.wrench, request.link, request.point)  # Refuses a link that is not there.
+                self._push.begin(request)
+                self._apply_push()
             case Release():
-                if self._controller.button != "none" and not self._is_pushed:
+                if self._controller.button != "none" and not self._push.is_on:
                     raise UsageError("nothing pushes the arm; press button=none ends an emergency stop")
-                self._push(_NOTHING)
+                self._push.release()
+                self._apply_push()
             case Press(button):
                 self._controller.press_button(button)
             case SetInput(signal, level):
@@ -143,12 +143,8 @@ class Environment:
             case GetStatus():
                 pass  # Answered before; it changes nothing.
 
-    def _push(self, push: Push) -> None:
-        self._plant.push(push.wrench, push.link, push.point)
-        self._is_pushed = any(push.wrench)
-        self._end_of_push = math.inf
-        if push.duration is not None and self._is_pushed:
-            self._end_of_push = self._controller.cycle_number + round(push.duration / CYCLE_TIME)
+    def _apply_push(self) -> None:
+        self._plant.push(self._push.wrench, self._push.push.link, self._push.push.point)
 
     def _status(self) -> WorldStatus:
         controller, counters = self._controller, self._counters()
@@ -169,7 +165,7 @@ class Environment:
             misfits=counters.bad_datagrams,
             strangers=counters.strangers,
             ignored=controller.ignored,
-            pushed=self._is_pushed,
+            pushed=self._push.is_on,
             stalls=self._stalls.count,
             auto_limit=controller.auto_limit,
             commands=commands,

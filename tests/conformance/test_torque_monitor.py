@@ -38,7 +38,7 @@ def test_the_limit_itself_is_outside_and_both_faults_come_in_wire_order():
     assert faults_of(monitor.step([85.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])) == (RATE, RANGE)
     assert [violation.text for violation in monitor.broken()] == [
         "joint 1: commanded torque rate 85000 N m/s passes 1500 N m/s",
-        "joint 1: commanded torque 85 N m passes 85 N m",
+        "joint 1: commanded torque 85 N m reaches 85 N m",
     ]
 
 

@@ -66,7 +66,7 @@ def test_a_push_on_the_tool_shows_in_the_torques_as_its_jacobian_says_until_it_i
 
     def happen(k):
         if k == 5:
-            robot.world.push(wrench)
+            robot.world.push(wrench, rise_time=0.0)
         if k == 50:
             robot.world.release()
 

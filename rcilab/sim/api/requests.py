@@ -31,6 +31,9 @@ class Push:
     """Where the force acts, in the frame of the link, shape (3,), [m]; None: at its origin."""
     duration: float | None = None
     """In the controller's own time, [s]; None: until `Release`."""
+    rise_time: float = 0.05
+    """Time in which the force rises, and falls at its end, [s]; 0: a step. A hand needs at least the default; a step
+    accelerates the light wrist of a stiff arm beyond the bound on measured accelerations."""
 
     def __post_init__(self) -> None:
         """Checks every value."""
@@ -44,6 +47,7 @@ class Push:
             _put(self, "point", as_floats(self.point, 3, "point", "m"))
         if self.duration is not None:
             _put(self, "duration", as_float(self.duration, "duration", "s", 0.001, LONGEST_TIME))
+        _put(self, "rise_time", as_float(self.rise_time, "rise_time", "s", 0.0, LONGEST_TIME))
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,6 +45,7 @@ REQUESTS = st.one_of(
         st.none() | st.integers(1, 7),
         st.none() | row(length, 3),
         st.none() | st.floats(0.001, 100),
+        st.floats(0.0, 1.0),
     ),
     st.just(world.Release()),
     st.builds(world.Press, st.sampled_from(["none", "estop", "gstop"])),

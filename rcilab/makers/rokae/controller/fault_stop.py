@@ -63,10 +63,10 @@ FAULT_STOP: Final = {
     Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _ANYTIME),
     Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
     Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: FaultStop(
-        _MEASUREMENT, "all; eight times the bound in impedance and torque modes", _ANYTIME
+        _MEASUREMENT, "all; four times the bound in impedance and torque modes", _ANYTIME
     ),
     Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: FaultStop(
-        _MEASUREMENT, "both Cartesian modes; eight times the bound in Cartesian impedance", _ANYTIME
+        _MEASUREMENT, "both Cartesian modes; four times the bound in Cartesian impedance", _ANYTIME
     ),
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(
         _COMMAND, "all but torque; with auto_limit joints are led to rest inside instead", _BACK

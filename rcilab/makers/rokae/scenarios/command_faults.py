@@ -177,7 +177,7 @@ def _torque_range(scene: Scene) -> Callback:
     def callback(state: RobotState, t: float) -> Command:
         cycle = round(t / CYCLE_TIME)
         if cycle % _SENT_EVERY == 0 and tau[cycle] <= strongest:
-            robot.simulation.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK)
+            robot.simulation.push((0.0, 0.0, 0.0, *(-tau[cycle] * axis).tolist()), link=_HELD_LINK, rise_time=0.0)
         return stream(state, t)
 
     return callback

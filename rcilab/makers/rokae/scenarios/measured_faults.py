@@ -44,7 +44,7 @@ def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> 
     def act(cycle: int) -> None:
         since = cycle - _PAUSE
         if since >= 0 and since % _STEP == 0:
-            scene.robot.simulation.push(push(since), link=link)
+            scene.robot.simulation.push(push(since), link=link, rise_time=0.0)
 
     return held(scene, act, tool=tool)
 
