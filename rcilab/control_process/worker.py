@@ -49,7 +49,7 @@ from rcilab.execution.guiding import HandGuide
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import StreamingDriver, open_driver
-from rcilab.makers.maker import capabilities_of
+from rcilab.makers.maker import capabilities_of, timing_of
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_stop
 from rcilab.realtime.scheduling import PRIORITY, enter_realtime
@@ -73,8 +73,11 @@ class ControlProcess:
         self._settings = settings
         self._requests = RequestChannel(block)
         self._stop_conditions = StopConditions(block.counters, parent)
+        self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
         self._status = StatusWriter(block)
-        self._log = CycleLog(self._status.recorder, self._status.on_row)
+        self._log = CycleLog(
+            self._status.recorder, self._status.on_row, state_cycles=timing_of(self._model).state_cycles
+        )
         self._motions = MotionService(
             block, self._settings.limits, self._status, self._log, self._requests, self._stop_conditions
         )
@@ -82,7 +85,6 @@ class ControlProcess:
         self._address = ""
         self._is_ending = False
         self._next_check = 0.0
-        self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
         self._guide: HandGuide | None = None
         self._tool_source: tuple[JointVector, Pose] | None = None  # Joint angles and pose that gave the last tool.
 

@@ -48,7 +48,7 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     q, q_c, dq              measured and commanded joint angles [rad], measured velocities [rad/s], shape (n,)
     command                 joint angles sent, [rad], shape (n,); NaN when none were sent
     faults                  the error bits as one number of 64 bits, bit k = fault k of the maker
-    lost                    controller cycles between the previous row and this one that were not received
+    lost                    states between the previous row and this one that were not received
     robot_mode, controller_mode, motion_generator_mode    as on the wire
     braking                 1: the answer is part of a stop, not of the plan
     tau                     measured joint torques, [N m], shape (n,)

@@ -30,7 +30,7 @@ from rcilab.execution.filters import CommandFilter, is_near
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner
 from rcilab.makers.driver import StreamingDriver
-from rcilab.makers.maker import maker_of
+from rcilab.makers.maker import timing_of
 
 if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
@@ -479,8 +479,7 @@ def _stands(before: RobotState, after: RobotState) -> bool:
 
 
 def _build_stop_planner(kind: type[Command], limits: Limits, model: RobotModel) -> StopPlanner:
-    maker = maker_of(model)
-    period = 1 if maker is None else maker.timing.command_cycles
+    period = timing_of(model).command_cycles
     if kind is JointPosition:
         return JointStopPlanner(limits.joint, period)
     return CartesianStopPlanner(limits, model, period) if kind is CartesianPosition else TorqueStopPlanner(limits.joint)

@@ -17,6 +17,7 @@ from rcilab.execution.recorder import RECORD_TIME, CycleLog, Recorder
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.driver import ConfiguredArm, StreamingDriver
+from rcilab.makers.maker import timing_of
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.scheduling import realtime_section
 from rcilab.recording.run import Run, build_run, describe_end
@@ -107,7 +108,11 @@ class MotionRunner:
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
         executor = MotionExecutor(
-            self._driver, CycleLog(recorder), self._lock.reason_to_stop, model.limits, state_timeout=self._state_timeout
+            self._driver,
+            CycleLog(recorder, state_cycles=timing_of(model).state_cycles),
+            self._lock.reason_to_stop,
+            model.limits,
+            state_timeout=self._state_timeout,
         )
         setup = Setup(target=self._driver.name, mode=mode, started_ns=time.time_ns())
 

@@ -136,15 +136,19 @@ class CycleLog:
     Args:
         recorder: Where rows go.
         on_row: Called after every row; must be quick.
+        state_cycles: Cycles from one state to the next.
     """
 
-    def __init__(self, recorder: Recorder, on_row: Callable[[CycleLog], None] | None = None) -> None:
+    def __init__(
+        self, recorder: Recorder, on_row: Callable[[CycleLog], None] | None = None, *, state_cycles: int = 1
+    ) -> None:
         self.recorder = recorder
+        self._state_cycles = state_cycles
         self._on_row = on_row
         self.lateness = 0.0
         """Lateness of the newest row, [s]; NaN when the loop did not wait for it."""
         self.lost_total = 0
-        """Controller cycles whose state was not received."""
+        """States that were not received."""
         self.state: RobotState | None = None
         """The state of the newest row."""
         self.braking = False
@@ -187,7 +191,7 @@ class CycleLog:
         if self._last_id is None or number < self._last_id:
             self._origins.clear()
         elif number > self._last_id:
-            lost = number - self._last_id - 1
+            lost = max((number - self._last_id) // self._state_cycles - 1, 0)
             self.lost_total += lost
         self._last_id = number
         if is_awaited:

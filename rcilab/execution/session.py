@@ -32,11 +32,19 @@ from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.execution.streaming import MotionStream
 from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.driver import ConfiguredArm, ExpectedArm, StreamingDriver, open_driver, require_timeout
-from rcilab.makers.maker import require_driver, require_feature, require_parts
+from rcilab.makers.driver import (
+    ConfiguredArm,
+    ExpectedArm,
+    StreamingDriver,
+    open_driver,
+    require_signal,
+    require_timeout,
+)
+from rcilab.makers.maker import capabilities_of, find_lack, require_driver, require_feature, require_parts
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
+from rcilab.motion.joint import S_PROFILE_VELOCITY, JointLaw
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.speed_scaling import require_speed_override
 from rcilab.recording.run import Run
@@ -332,12 +340,12 @@ class RobotSession(Closeable):
     def set_output(self, signal: int, level: bool) -> None:
         """Sets a digital output by its number, from 0."""
         require_feature(self.model, "signals")
-        self._commands.set_output(signal, level)
+        self._commands.set_output(require_signal(signal, capabilities_of(self.model).outputs), level)
 
     def read_input(self, signal: int) -> bool:
         """Returns the level of a digital input, by its number, from 0."""
         require_feature(self.model, "signals")
-        return self._commands.read_input(signal)
+        return self._commands.read_input(require_signal(signal, capabilities_of(self.model).inputs))
 
     def reboot(self) -> None:
         """Restarts the controller. The session is closed then: connect again once the controller is up."""
@@ -502,8 +510,9 @@ class RobotSession(Closeable):
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
 
-        Unlike the vendor's, it starts at the commanded angles; a move to the present angles ends at once; the speed has
-        a range; the motion is checked before it starts.
+        An arm whose maker has no such profile moves by "jerk_limited", see `plan_joint`. Unlike the vendor's, it starts
+        at the commanded angles; a move to the present angles ends at once; the speed has a range; the motion is checked
+        before it starts.
 
         Args:
             goal: Joint angles, shape (n,), [rad].
@@ -517,7 +526,8 @@ class RobotSession(Closeable):
         """
         with self._lock.begin_motion("move_j"):
             state = self.receive_state()
-            motion = plan_joint(self.model, state.q_c, goal, speed=speed, law="s_profile")
+            law: JointLaw = "s_profile" if self.model.n in S_PROFILE_VELOCITY else "jerk_limited"
+            motion = plan_joint(self.model, state.q_c, goal, speed=speed, law=law)
             self._require_allowed(motion, state)
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)
@@ -525,10 +535,11 @@ class RobotSession(Closeable):
     def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
         """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.
 
-        The wire carries poses, the controller computes the joints (Cartesian position mode). Position, orientation and
-        arm angle run in proportion, so a large turn on a short way is fast. Where the tool only turns, the way is the
-        angle about any axis; the vendor's agrees for base z only. Identical start and goal, on which the vendor's never
-        returns, end at once. What the joints would do is planned and checked first.
+        The wire carries poses, the controller computes the joints (Cartesian position mode); an arm without that mode
+        is sent the joint angles. Position, orientation and arm angle run in proportion, so a large turn on a short way
+        is fast. Where the tool only turns, the way is the angle about any axis; the vendor's agrees for base z only.
+        Identical start and goal, on which the vendor's never returns, end at once. What the joints would do is planned
+        and checked first.
 
         Args:
             goal: Pose of the tool in base.
@@ -616,8 +627,12 @@ class RobotSession(Closeable):
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
     ) -> Run:
-        """Streams a path in Cartesian position mode after checking its joint motion."""
+        """Streams a path after checking its joint motion: its poses, to an arm that cannot take them its angles."""
         motion = follow_path(self.model, state.q_c, path, speed)
+        if find_lack(self.model, "cartesian_position") is not None:
+            self._require_allowed(motion, state)
+            stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
+            return self._runner.run(stream, "joint_position", motion)
         self._require_allowed(motion, state, "cartesian_position")
         callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
         return self._runner.run(callback, "cartesian_position", motion)

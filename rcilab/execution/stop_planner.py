@@ -64,34 +64,35 @@ class StreamStopPlanner:
 
     def __init__(self, limits: JointLimits) -> None:
         self._limits = limits
-        self._past: list[tuple[int, Array]] = []
+        self.past: list[tuple[int, Array]] = []
+        """The last three samples, each with the number of its cycle, oldest first."""
 
     def begin(self, *past: tuple[int, Array]) -> None:
         """Starts from three samples, each with the number of its cycle, oldest first."""
-        self._past = list(past)
+        self.past = list(past)
 
     def remember(self, x: Array, cycle: int) -> None:
         """Appends a sample."""
-        if cycle > self._past[-1][0]:
-            self._past = [*self._past[-2:], (cycle, x)]
+        if cycle > self.past[-1][0]:
+            self.past = [*self.past[-2:], (cycle, x)]
 
     def rows(self) -> Array:
         """Returns the samples after the last until standstill, shape (N, n)."""
         near, ddq = self.differences()
-        dq = near + ddq * ((self._past[-1][0] - self._past[-2][0]) * CYCLE_TIME / 2.0)
+        dq = near + ddq * ((self.past[-1][0] - self.past[-2][0]) * CYCLE_TIME / 2.0)
         rows = plan_stop(self._limits, self.last, dq, ddq).q
         return rows[1:] if len(rows) > 1 else rows
 
     def differences(self) -> tuple[Array, Array]:
         """Returns the first and second divided difference of the last samples, shape (n,) each, per s and s^2."""
-        (t0, x0), (t1, x1), (t2, x2) = self._past
+        (t0, x0), (t1, x1), (t2, x2) = self.past
         near, far = (x2 - x1) / ((t2 - t1) * CYCLE_TIME), (x1 - x0) / ((t1 - t0) * CYCLE_TIME)
         return near, 2.0 * (near - far) / ((t2 - t0) * CYCLE_TIME)
 
     @property
     def last(self) -> Array:
         """The last sample."""
-        return self._past[-1][1]
+        return self.past[-1][1]
 
 
 class JointStopPlanner:
@@ -121,9 +122,13 @@ class JointStopPlanner:
 
     def find_motion(self) -> LimitViolation | None:
         """Returns the violation when the last command is repeated, or None."""
-        q = self._stream.last.tolist()
         monitor = JointMonitor(self._limits)
-        monitor.reset(q, *(difference.tolist() for difference in self._stream.differences()))
+        (before, first), *later = self._stream.past
+        monitor.reset(first.tolist())
+        for cycle, row in later:
+            monitor.step(row.tolist(), cycle - before)
+            before = cycle
+        q = self._stream.last.tolist()
         return _first_violation(monitor, lambda: monitor.step(q, self._period))
 
 

@@ -65,8 +65,11 @@ class Timing:
     """From one state to the next, [s]."""
     command_period: float = CYCLE_TIME
     """From one command of a motion to the next, [s]."""
-    is_state_clock: bool = True
-    """Whether each command answers a state, so that time counts in states; else commands go by the client's clock."""
+
+    @property
+    def state_cycles(self) -> int:
+        """`state_period` in cycles of the grid that motions are planned on."""
+        return max(1, round(self.state_period / CYCLE_TIME))
 
     @property
     def command_cycles(self) -> int:
@@ -201,6 +204,12 @@ def capabilities_of(model: RobotModel) -> Capabilities:
     """Returns what can be done with an arm; with one without a maker, nothing but computing."""
     maker = maker_of(model)
     return Capabilities() if maker is None else maker.capabilities
+
+
+def timing_of(model: RobotModel) -> Timing:
+    """Returns when states and commands of an arm go over the wire; without a maker, in every cycle."""
+    maker = maker_of(model)
+    return Timing() if maker is None else maker.timing
 
 
 def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:

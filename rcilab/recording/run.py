@@ -301,12 +301,13 @@ class Run:
                 lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
             )  # fmt: skip
         steps = np.diff(sent["message_id"].astype(np.int64))
+        every = max(int(steps.min()), 1)  # Cycles from one state to the next.
         period = np.diff(sent["received_ns"]) * 1e-9
         response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
         lateness = sent["lateness"]
         return Timing(
             cycles=len(sent),
-            lost=int((steps - 1).sum()),
+            lost=int((steps // every - 1).sum()),
             period_median=float(np.median(period)),
             period_max=float(period.max()),
             response_median=float(np.median(response)),

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -37,6 +38,7 @@ from rcilab.core.errors import (
     VersionMismatchError,
 )
 from rcilab.core.spatial import Pose
+from rcilab.core.state import unknown_state
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.faults import Fault
@@ -334,6 +336,14 @@ def test_lateness_is_against_the_robot_s_grid_and_forgets_a_slip():
     assert late([0, 1, 2.3, 3, 4]) == [0, 0, 0.3, 0, 0]
     assert late([0, 1, 5, 5, 5, 5, 6]) == [0, 0, 3, 2, 1, 0, 0]
     assert late([0, *range(2, 22)])[-1] == 0  # The controller left a cycle out: its grid has moved.
+
+
+def test_states_that_come_every_tenth_cycle_are_lost_only_where_one_is_missing():
+    log = CycleLog(Recorder(7, 100), state_cycles=10)
+    for number in (510, 520, 530, 560, 565, 580):
+        log.write(replace(unknown_state(7), message_id=number), 0)
+    assert log.recorder.rows()["lost"].tolist() == [0, 0, 0, 2, 0, 0]
+    assert log.lost_total == 2
 
 
 def test_a_state_that_nobody_waited_for_is_recorded_and_tells_nothing_of_lateness():

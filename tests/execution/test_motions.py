@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import CertificateError, ConformanceError, ControlError, InvalidValueError, PlanningError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.execution import session
+from rcilab.makers.maker import maker_of
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
@@ -176,6 +180,24 @@ def test_the_blocking_moves_go_there_by_the_s_profile(robot):
     assert run.command_psi[-1] == 0.0
     assert robot.state.psi_c == pytest.approx(0.0, abs=1e-9)
     assert told[-1] == 1.0
+
+
+def test_an_arm_without_poses_and_profile_makes_the_blocking_moves_by_joint_angles(robot, monkeypatch):
+    maker = maker_of(MODEL)
+    monkeypatch.setattr(type(maker), "capabilities", replace(maker.capabilities, modes=("joint_position",)))
+    monkeypatch.setattr(session, "S_PROFILE_VELOCITY", {})
+    assert robot.move_j(HOME + 0.05, speed=0.8).plan.law == "jerk_limited"
+    robot.move_j(HOME, speed=0.8)
+    goal = Pose(T_HOME.position + [0.0, 0.05, 0.0], T_HOME.wxyz)
+    run = robot.move_l(goal, speed=0.3)
+    assert run.setup.mode == "joint_position"
+    assert robot.state.T_base_tool_c.is_close(goal, 1e-6)
+
+
+def test_signals_that_do_not_exist_are_refused_before_the_maker_sees_them(robot):
+    for call in (lambda: robot.set_output(6, True), lambda: robot.read_input(-1)):
+        with pytest.raises(InvalidValueError, match="there are 0 to 5"):
+            call()
 
 
 def test_a_move_to_where_the_arm_is_ends_at_once(robot):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,7 +13,7 @@ from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.core.command import JointPosition, JointTorque
 from rcilab.core.state import unknown_state
 from rcilab.execution.stop_planner import JointStopPlanner, StreamStopPlanner, TorqueStopPlanner
-from rcilab.model.robot_model import load_model
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
 
 MODEL = load_model("xMatePro7")
@@ -65,13 +66,15 @@ def test_torques_go_to_zero_at_the_allowed_rate():
     assert (np.abs(np.diff(way, axis=0)) < LIMITS.torque_rate * 1e-3).all()
 
 
-def test_a_motion_that_is_sent_every_tenth_cycle_may_stand_at_its_end_when_repeated_as_seldom():
-    motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.3)
-    state = replace(unknown_state(MODEL.n), q_c=MODEL.home)
-    last = 10 * -(-(len(motion.q) - 1) // 10)
-    for period, may_stand in ((10, True), (1, False)):
-        planner = JointStopPlanner(LIMITS, period)
+@pytest.mark.parametrize("distance", [0.1, 0.2, 0.3, 0.4])
+def test_a_motion_that_is_sent_every_tenth_cycle_may_stand_at_its_end_and_not_before(distance):
+    limits = replace(LIMITS, jerk=np.full(MODEL.n, 500.0))
+    model = RobotModel(replace(MODEL.description, limits=replace(MODEL.limits, joint=limits)))
+    rows = plan_joint(model, model.home, model.home + distance, speed=0.5).q
+    last = 10 * -(-(len(rows) - 1) // 10)
+    for stop, may_stand in ((last, True), (last // 20 * 10, False)):
+        planner, state = JointStopPlanner(limits, 10), replace(unknown_state(MODEL.n), q_c=MODEL.home)
         planner.begin(state)
-        for cycle in range(0, last + 1, 10):
-            planner.remember(JointPosition(motion.q[min(cycle, len(motion.q) - 1)]), cycle, state)
+        for cycle in range(0, stop + 1, 10):
+            planner.remember(JointPosition(rows[min(cycle, len(rows) - 1)]), cycle, state)
         assert (planner.find_motion() is None) is may_stand

@@ -16,9 +16,9 @@ from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.lab import FaultLab
 from rcilab.app.fault_lab.table import FaultTable
 from rcilab.core.fault import FaultCode
-from rcilab.makers.scenario import GROUPS, FaultScenario, Group
+from rcilab.makers.scenario import FaultScenario, Group
 
-__all__ = ["GROUPS", "FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
+__all__ = ["FaultDemo", "FaultLab", "FaultScenario", "FaultTable", "Group", "provoke"]
 
 
 def provoke(fault: FaultCode | str, model: str) -> FaultDemo:

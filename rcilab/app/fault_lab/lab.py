@@ -26,7 +26,7 @@ from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
 from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
-from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator
+from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator, timing_of
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
@@ -36,7 +36,7 @@ _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
 _CALM = 1.0  # [N, N m] Far below any threshold that a scenario sets.
 _CALM_STATES = 500
-_GAP = 5  # [cycles] So many states may be missing between two that are shown, as on any network.
+_GAP = 5  # [states] So many states may be missing between two that are shown, as on any network.
 _AFTER = 200  # [cycles] How long the controlled stop is watched: the arm stands still by then.
 _NUDGE = 0.02  # [rad] How far the arm moves to show that it does again.
 _THERE = 1e-6  # [rad] What counts as standing where a scenario begins.
@@ -215,7 +215,9 @@ def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> N
             seen = max(seen, since)
     rows = np.concatenate((stop, log.recorder.rows()))
     steps = np.diff(rows["message_id"].astype(np.int64), prepend=begun)
-    missed = np.flatnonzero(steps > _GAP)  # What was missed is not made up: there the record ends.
+    missed = np.flatnonzero(
+        steps > _GAP * timing_of(robot.model).state_cycles
+    )  # What was missed is not made up: there the record ends.
     rows = rows[: missed[0]] if missed.size else rows
     return rows[rows["message_id"] <= begun + _AFTER]
 

@@ -41,6 +41,11 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
             return message("learn.no_elbow", model=self._model.name)
         return None
 
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The groups that have scenarios, in the order to show them."""
+        return tuple(group for group in GROUPS if self.group(group))
+
     def group(self, group: Group) -> tuple[FaultScenario, ...]:
         """Returns the scenarios of a group, in the order to show them."""
         return tuple(scenario for scenario in self.values() if scenario.group == group)
@@ -49,7 +54,7 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
         return "\n".join(
             f"{group}\n"
             + "\n".join(f"  {found.fault.value:2} {found.fault.manual_name}" for found in self.group(group))
-            for group in GROUPS
+            for group in self.groups
         )
 
     def __repr__(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.fault_lab import GROUPS, FaultTable
+from rcilab.app.fault_lab import FaultTable
 from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
@@ -31,7 +31,7 @@ class LearnPanel:
         self._folders: list[Any] = []
         self._faults = FaultTable(state.model)
         self._buttons: dict[FaultCode, Any] = {}
-        for group in GROUPS if self._faults else ():
+        for group in self._faults.groups:
             folder = gui.add_folder(text(f"learn.group.{group}"))
             self._folders.append(folder)
             with folder:

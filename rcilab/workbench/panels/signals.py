@@ -50,12 +50,13 @@ class SignalsPanel:
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
             self._wired = BoundControl(wired, ask, lambda v, p: SetWiring(page=p, name="loop_back", on=bool(v)))
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
+            self._reboot_lack = Html(gui)
             gui.add_html('<i class="rl-buttons"></i>')
             self._reboot = gui.add_button(
                 text("reboot.press"), icon="rotate-clockwise", color="orange", hint=text("reboot.hint")
             )
             on_press(self._reboot, ask, _press("reboot"))
-            self._reboot_lack, self._question = Html(gui), Html(gui)
+            self._question = Html(gui)
             self._agree = gui.add_button(text("reboot.confirm"), icon="rotate-clockwise", color="red", visible=False)
             on_press(self._agree, ask, _press("confirm"))
             self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)

@@ -52,7 +52,7 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.Fau
 
 def test_every_fault_is_in_the_table_once() -> None:
     assert sorted(FAULTS) == list(Fault)
-    assert sum(len(FAULTS.group(group)) for group in fault_lab.GROUPS) == len(Fault)
+    assert sum(len(FAULTS.group(group)) for group in FAULTS.groups) == len(Fault)
     assert str(FAULTS).count(" k") == len(Fault)
     sent, measured = FAULTS.group("position")[:2]
     assert sent.fault.name.removeprefix("COMMAND_") == measured.fault.name.removeprefix("ACTUAL_")
@@ -69,6 +69,14 @@ def test_an_arm_without_a_virtual_controller_has_no_scenarios() -> None:
     assert len(fault_lab.FaultTable(load_model("Panda"))) == 0
     with pytest.raises(ModelError, match="simulate"):
         fault_lab.FaultLab("Panda")
+
+
+def test_groups_without_a_scenario_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    maker = maker_of(MODEL)
+    scenarios = tuple(scenario for scenario in maker.scenarios() if scenario.group == "velocity")
+    monkeypatch.setattr(type(maker), "scenarios", lambda self: scenarios)
+    assert fault_lab.FaultTable(MODEL).groups == ("velocity",)
+    assert fault_lab.FaultTable(load_model("Panda")).groups == ()
 
 
 def test_an_arm_without_an_elbow_has_no_fault_of_it() -> None:
