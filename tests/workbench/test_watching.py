@@ -125,12 +125,10 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
         bench.dispatcher.ask(EditProgram(page=operator.page, what="add"))
         wait(lambda: bool(bench.store.state.program.draft.steps), "a waypoint")
-        asked = []
-        take = bench.dispatcher.ask
+        acted: list[Request] = []
 
-        def ask(request: Request) -> None:
-            asked.append(request)
-            take(request)
+        def recorded(act: Any) -> Any:
+            return lambda request: (acted.append(request), act(request))
 
         before = bench.store.state
         key = before.program.draft.steps[0].key
@@ -139,15 +137,16 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
             *(("edit", {"what": what, "key": key, "place": 0}) for what in ("delete", "duplicate", "undo", "select")),
         ]  # fmt: skip
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(bench.dispatcher, "ask", ask)
+            handlers = {kind: recorded(act) for kind, act in bench.dispatcher._handlers.items()}
+            patch.setattr(bench.dispatcher, "_handlers", handlers)
             for kind, values in rows:
                 watcher.say(kind, **values)
             watcher.settle()
-        assert {type(request) for request in asked if request.page == watcher.page} <= {Refuse, CommitField}
-        after = bench.store.state
-        assert (after.program, after.goal, after.check) == (before.program, before.goal, before.check)
-        operator.say("edit", what="delete", key=key, place=0)
-        wait(lambda: not bench.store.state.program.draft.steps, "the operator's message to be acted on")
+            after = bench.store.state
+            assert (after.program, after.goal, after.check) == (before.program, before.goal, before.check)
+            operator.say("edit", what="delete", key=key, place=0)
+            wait(lambda: not bench.store.state.program.draft.steps, "the operator's message to be acted on")
+        assert {type(request) for request in acted if request.page == watcher.page} <= {Refuse, CommitField}
 
 
 def test_what_a_page_typed_goes_with_its_controls(bench):

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -32,8 +31,6 @@ _MAX_PARTS = 256
 _MAX_DEPTH = 8
 
 
-_REFUSAL_INTERVAL = 1.0  # [s] Tuning value: a spectator that keeps pressing is informed at most this often.
-
 _spectator_controls: set[str] = set()  # Identifiers of controls.
 
 
@@ -48,7 +45,7 @@ class MessageGuard:
     Args:
         server: A viser server without connections.
         may_act: Whether a page, by its client id, may use the controls; by default any page may.
-        refuse: Called with the client id of a page that used a control without permission, at most once per second.
+        refuse: Called with the client id of a page that used a control without permission, every time.
 
     Attributes:
         malformed: Number of malformed messages. The first is reported on stderr.
@@ -66,7 +63,6 @@ class MessageGuard:
         self._kinds = _messages
         self._gui: Any = server.gui
         self._may_act, self._refuse = may_act, refuse
-        self._refused: dict[int, float] = {}  # Client -> time of the last refusal, [s].
         self._uploads: dict[str, list[int]] = {}  # Transfer -> client, declared and received bytes.
         self.malformed = 0
         sockets: Any = server._websock_server  # viser 1.1 has no public names for the server and its methods.
@@ -145,14 +141,7 @@ class MessageGuard:
             handle = self._gui._gui_input_handle_from_uuid.get(message.uuid)
             if handle is not None and not handle._impl.is_button:
                 state.message_buffer.push(self._kinds.GuiUpdateMessage(message.uuid, {"value": handle.value}))
-        self.refuse(client)
-
-    def refuse(self, client: int) -> None:
-        """Reports that a page used a control without permission, at most once per second for each page."""
-        now = time.monotonic()
-        if now - self._refused.get(client, float("-inf")) >= _REFUSAL_INTERVAL:
-            self._refused[client] = now
-            self._refuse(client)
+        self._refuse(client)
 
     def _admits_update(self, message: Any) -> bool:
         """Returns whether an update changes only the value of a control, to a valid value."""
@@ -190,7 +179,6 @@ class MessageGuard:
 
     def _forget(self, connection: Any) -> None:
         gone = connection.client_id
-        self._refused.pop(gone, None)
         self._uploads = {name: upload for name, upload in self._uploads.items() if upload[0] != gone}
         self._gui._drop_uploads_from_client(gone)  # viser does not do so for a client that never sent its camera.
 
