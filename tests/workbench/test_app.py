@@ -229,6 +229,11 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     assert bench.store.state.goal is before
     assert told(bench) == "notice.watching"
     assert bench.store.state.notice.page == 2, "the page that holds the controls need not be told"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rcilab.app.dispatcher._AGAIN", 1e9)
+        before = bench.store.state.notices
+        ask(MoveJoint(page=2, joint=0, angle=0.1))
+        assert bench.store.state.notices == before, "it is informed once in that time"
     ask(PageClosed(page=1))
     wait(lambda: not is_refused(bench), "what is no longer so to be withdrawn")
     ask(MoveJoint(page=2, joint=0, angle=0.2))
