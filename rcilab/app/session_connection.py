@@ -88,7 +88,7 @@ class SessionConnection:
     @property
     def planned(self) -> float:
         """Where the plan of the running or last motion ends, [s]; 0 where that is unknown."""
-        return 0.0 if self._progress is None else self._progress.planned
+        return 0.0 if self._progress is None else self._progress.plan_duration
 
     def _look(self) -> SupervisorStatus:
         if self._session.is_closed:
@@ -293,7 +293,7 @@ def _settled(what: str) -> PendingRequest:
 def _describe_progress(way: MotionProgress | None) -> dict[str, Any]:
     if way is None:
         return {}
-    names = {"motion_time": way.time, "motion_duration": way.duration, "motion_plan_time": way.place}
+    names = {"motion_time": way.time, "motion_duration": way.duration, "motion_plan_time": way.plan_time}
     return {**names, "speed_override": way.speed_override, "mode": way.mode}
 
 

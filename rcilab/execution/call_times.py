@@ -1,16 +1,20 @@
-"""Durations of the calls of a callback, and the message about one that is too slow for the 1 ms cycle."""
+"""Durations of a callback's calls, and the message about a callback that is too slow for the 1 ms cycle."""
 
 from __future__ import annotations
 
 from rcilab.core.clock import CYCLE_TIME
 
-_LATE_CYCLES = 5  # A delay that the play-out of a controller does not always absorb; shorter ones are not worth words.
-_OFTEN = 10  # Slow calls from which on slowness is a habit.
-_FASTER = "return within 1 ms: compute beforehand or in another thread, and do not sleep, print or read files in it"
+_LATE_CYCLES = (
+    5  # The jitter buffer of a controller does not always absorb such a delay; shorter ones are not reported.
+)
+_OFTEN = 10  # Number of slow calls from which the callback counts as slow in general.
+_FASTER = (
+    "it must return within 1 ms: compute in advance or in another thread, and do not sleep, print or read files in it"
+)
 
 
 class CallTimes:
-    """The times that the calls of one motion took."""
+    """Durations of the calls in one motion."""
 
     def __init__(self) -> None:
         self._slowest, self._slowest_t = 0.0, 0.0
@@ -30,13 +34,13 @@ class CallTimes:
             self._slowest, self._slowest_t = duration, t
 
     def describe(self) -> str:
-        """Returns a message about a callback that delayed the loop, with advice; "" for one that was in time."""
+        """Returns a message about a callback that delayed the loop, with advice; "" if it was fast enough."""
         missed = int(self._slowest / CYCLE_TIME)
         if self._slow >= _OFTEN and 2 * self._slow > self._calls:
             mean = self._sum / self._calls
             return (
                 f"{self._slow} of {self._calls} calls of the callback took more than 1 ms, {1e3 * mean:.1f} ms on "
-                f"average, so that its commands came ever later; {_FASTER}"
+                f"average, so that its commands were increasingly late; {_FASTER}"
             )
         if missed < _LATE_CYCLES:
             return ""

@@ -40,7 +40,7 @@ def build_commander(mode: Mode, model: RobotModel) -> Commander:
 
     Args:
         mode: Command mode.
-        model: The arm, with its tool and load as the controller knows them.
+        model: The arm, with the tool and load of the controller.
     """
     if mode == "torque":
         return _torques(model)
@@ -58,7 +58,7 @@ def _poses(model: RobotModel) -> Commander:
         q = rows[k]
         try:
             psi = model.arm_angle(q) if has_psi else None
-        except KinematicsError:  # At a singularity; the controller keeps its own.
+        except KinematicsError:  # At a singularity; the controller holds its own.
             psi = None
         return CartesianPosition(model.forward(q).matrix, psi)
 
@@ -83,5 +83,5 @@ def _reference(rows: JointPath, k: int) -> tuple[Array, Array, Array]:
 
     The first torque is then zero, as the torque rate requires.
     """
-    now, before, far = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
-    return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + far) / CYCLE_TIME**2
+    now, before, earlier = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+    return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + earlier) / CYCLE_TIME**2

@@ -16,9 +16,9 @@ from rcilab.core.rotation import as_rotation9
 from rcilab.core.spatial import find_rotation_error
 from rcilab.core.state import RobotState
 
-START_TOLERANCE = 1e-6  # [rad] or [m] A first command this far off makes a jerk of 1000 rad/s^3, below every limit.
-_ARRIVED = 1e-12  # [rad] The commanded angles come back over the wire bit by bit; this is for a sign of zero.
-_POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise what it was sent.
+START_TOLERANCE = 1e-6  # [rad] or [m] Such an offset makes a jerk of 1000 rad/s^3, below every limit.
+_ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, except for the sign of zero.
+_POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
 
 
 def check_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
@@ -28,7 +28,7 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
         command: The return value of a callback.
         kind: The type of command of the mode.
         n: Number of joints.
-        t: Motion time it is for, [s], to name in an error.
+        t: Its motion time, [s], for errors.
 
     Raises:
         InvalidValueError: It is of another kind, of the wrong shape, or not finite.
@@ -54,9 +54,9 @@ def require_first(command: Command, state: RobotState, limits: Limits, *, has_ps
 
     Args:
         command: The first command of a motion.
-        state: The state that it answers.
-        limits: Bounds of the arm: torques begin at zero, so the first ones are at most one cycle's rate away from it.
-        has_psi: Whether the arm has a redundancy, whose angle counts.
+        state: The state for which it was computed.
+        limits: Bounds of the arm: the first torques may differ from zero by one cycle's rate.
+        has_psi: Whether the arm has a redundancy; its angle is then checked.
 
     Raises:
         InvalidValueError: It differs; the message names the joint, both values and the tolerance.
@@ -68,8 +68,8 @@ def require_first(command: Command, state: RobotState, limits: Limits, *, has_ps
             raise InvalidValueError(
                 "first command",
                 np.degrees(command.q).round(3).tolist(),
-                f"deg must be where the arm is: joint {joint + 1} is commanded to "
-                f"{math.degrees(command.q[joint]):.4f} deg and stands at {math.degrees(state.q_c[joint]):.4f} deg, "
+                f"deg must be the present position: joint {joint + 1} is commanded to "
+                f"{math.degrees(command.q[joint]):.4f} deg and is at {math.degrees(state.q_c[joint]):.4f} deg, "
                 f"{math.degrees(off[joint]):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); "
                 "begin with state.q_c",
             )
@@ -79,7 +79,7 @@ def require_first(command: Command, state: RobotState, limits: Limits, *, has_ps
             raise InvalidValueError(
                 "first command",
                 command.T_base_tool[:3, 3].tolist(),
-                f"must be the pose the arm is at: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
+                f"must be the present pose: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
                 "begin with state.T_base_tool_c",
             )
         if command.psi is not None and has_psi:
@@ -88,9 +88,9 @@ def require_first(command: Command, state: RobotState, limits: Limits, *, has_ps
                 raise InvalidValueError(
                     "psi of the first command",
                     round(math.degrees(command.psi), 4),
-                    f"deg must be where the arm is: its arm angle is {math.degrees(state.psi_c):.4f} deg, "
+                    f"deg must be the present one: the arm angle is {math.degrees(state.psi_c):.4f} deg, "
                     f"{math.degrees(off):.4f} deg apart (tolerance {math.degrees(START_TOLERANCE):.1g} deg); begin "
-                    "with state.psi_c, or with None to keep it",
+                    "with state.psi_c, or with None to hold it",
                 )
     else:
         off = np.abs(command.tau) - limits.joint.torque_rate * CYCLE_TIME
@@ -101,7 +101,7 @@ def require_first(command: Command, state: RobotState, limits: Limits, *, has_ps
                 "first command",
                 command.tau.tolist(),
                 f"N m must be near zero: joint {joint + 1} begins with {command.tau[joint]:.4g} N m, and the torque "
-                f"rate allows less than {bound:g} N m at first; begin with zeros, or give rate_limit='manual'",
+                f"rate allows less than {bound:g} N m in the first cycle; begin with zeros, or set rate_limit='manual'",
             )
 
 
@@ -110,21 +110,22 @@ def distance_to(state: RobotState, command: Command, *, has_psi: bool) -> float:
 
     Returns:
         The largest difference of a joint angle or a commanded arm angle, [rad], or of an element of the pose, [m]; 0
-        where none counts.
+        within rounding.
     """
     if isinstance(command, JointPosition):
         off = float(np.abs(state.q_c - command.q).max())
         return 0.0 if off <= _ARRIVED else off
     if isinstance(command, CartesianPosition):
         off = max(
-            float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max()), _turned(state, command, has_psi)
+            float(np.abs(state.T_base_tool_c.matrix - command.T_base_tool).max()),
+            _arm_angle_offset(state, command, has_psi),
         )
         return 0.0 if off <= _POSE_ARRIVED else off
     return 0.0
 
 
-def _turned(state: RobotState, command: CartesianPosition, has_psi: bool) -> float:
-    """Returns how far the commanded arm angle is from a command, [rad]; 0 where it was left to the controller."""
+def _arm_angle_offset(state: RobotState, command: CartesianPosition, has_psi: bool) -> float:
+    """Returns the difference of the commanded arm angle from a command, [rad]; 0 if the controller chooses it."""
     if command.psi is None or not has_psi:
         return 0.0
     return abs(math.remainder(command.psi - state.psi_c, math.tau))
@@ -136,11 +137,11 @@ def describe_distance(state: RobotState, command: Command, *, has_psi: bool) -> 
         off = np.abs(state.q_c - command.q)
         joint = int(off.argmax())
         return f"joint {joint + 1} is {math.degrees(off[joint]):.4g} deg"
-    assert isinstance(command, CartesianPosition)  # Torques are always there.
+    assert isinstance(command, CartesianPosition)  # Torques have no distance.
     length = float(np.linalg.norm(state.T_base_tool_c.position - command.T_base_tool[:3, 3]))
-    turned = _turned(state, command, has_psi)
-    if turned > length:
-        return f"the arm angle is {math.degrees(turned):.4g} deg"
+    turn = _arm_angle_offset(state, command, has_psi)
+    if turn > length:
+        return f"the arm angle is {math.degrees(turn):.4g} deg"
     return f"the tool is {1e3 * length:.4g} mm"
 
 
@@ -148,11 +149,11 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...], unit: str) -> Array
     try:
         numbers = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidValueError(name, values, f"is not {shape} numbers [{unit}]") from error
+        raise InvalidValueError(name, values, f"must be an array of {shape} numbers [{unit}]") from error
     if numbers.shape != shape:
-        raise InvalidValueError(name, values, f"has shape {numbers.shape}, needs {shape} [{unit}]")
+        raise InvalidValueError(name, values, f"must have shape {shape} [{unit}], not {numbers.shape}")
     if not np.isfinite(numbers).all():
-        place = np.argwhere(~np.isfinite(numbers))[0].tolist()
-        where = f"joint {place[0] + 1}" if len(shape) == 1 else f"element {place}"
-        raise InvalidValueError(name, numbers[tuple(place)], f"in {where}: must be finite [{unit}]")
+        index = np.argwhere(~np.isfinite(numbers))[0].tolist()
+        where = f"joint {index[0] + 1}" if len(shape) == 1 else f"element {index}"
+        raise InvalidValueError(name, numbers[tuple(index)], f"in {where}: must be finite [{unit}]")
     return numbers

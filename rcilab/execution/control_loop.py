@@ -1,4 +1,4 @@
-"""The 1 kHz loop: the robot's state is the clock, every state gets one answer, and there is one stop path."""
+"""The 1 kHz loop: the robot's states are its clock, each state gets one answer, and there is one stop path."""
 
 from __future__ import annotations
 
@@ -36,26 +36,24 @@ if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
 
-STATE_TIMEOUT = (
-    0.1  # [s] without a state while moving means a lost connection: five times the loss a controller bridges.
-)
-LOCAL_STATE_TIMEOUT = 1.0  # [s] The same of a controller on this machine, which pauses both ends when it is busy.
-CATCH_UP = 20  # Cycles: as many lost commands as a controller bridges at most (manual 4.6: 10 to 20).
-MODE_TIMEOUT = 3.0  # [s] for the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
-STOP_TIMEOUT = 1.0  # [s] for the answer to StopMove when something has gone wrong already.
-FILTER_CYCLES = 5000  # Cycles that filters get at most to arrive at the last command.
-SETTLE_CYCLES = 200  # Cycles that the last command is repeated for at most while the controller comes no nearer to it.
-ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] What a motion may end off its last command: far below what an arm resolves.
-_NEARER = 0.95  # What is left of a distance after SETTLE_CYCLES where a low pass approaches, at 0.1 Hz 0.88.
-REST_TIMEOUT = 1.0  # [s] for the controller's own stop after a fault; the slowest joint needs 0.3 s from full speed.
-_FELT = 1e-3  # [N m] Smaller torques have no effect on the arm.
-_NEAR_CYCLES = 2  # Cycles in a row that a filter is at its command until it counts as standing there.
-RECORD_CYCLES = 50  # Cycles that a ControlError carries, as many as the vendor's client writes.
+STATE_TIMEOUT = 0.1  # [s] Without a state while moving: a lost connection; five times the loss a controller bridges.
+LOCAL_STATE_TIMEOUT = 1.0  # [s] The same for a controller on this machine, which pauses both ends when it is busy.
+CATCH_UP = 20  # Cycles: the largest number of lost commands that a controller bridges (manual 4.6: 10 to 20).
+MODE_TIMEOUT = 3.0  # [s] For the controller to show the requested modes; virtual ones take 0.2 to 1.05 s.
+STOP_TIMEOUT = 1.0  # [s] For the response to StopMove after an error.
+FILTER_CYCLES = 5000  # Cycles for the filters to reach the last command.
+SETTLE_CYCLES = 200  # Cycles between two checks that the controller still approaches the last command.
+ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] From the last command; far below the resolution of an arm.
+_APPROACH = 0.95  # Share of a distance left after SETTLE_CYCLES with a low pass filter; 0.88 at 0.1 Hz.
+STANDSTILL_TIMEOUT = 1.0  # [s] For the controller's own stop; the slowest joint needs 0.3 s from full speed.
+_MIN_TORQUE = 1e-3  # [N m] Smaller torques have no effect on the arm.
+_NEAR_CYCLES = 2  # Consecutive cycles of a filter at its command until it counts as settled.
+RECORD_CYCLES = 50  # Cycles in a ControlError, as in the vendor's client.
 
 Callback: TypeAlias = Callable[[RobotState, float], Command]
 """`(state, t) -> command`; t counts controller cycles since the first call, [s]."""
 StopCheck: TypeAlias = Callable[[float], str | None]
-"""Called in every cycle with t; returns the reason to stop the motion, or None."""
+"""`(t) -> reason`; called in every cycle, returns the reason to stop the motion, or None."""
 
 _COMMANDS: dict[ControllerMode, type[Command]] = {
     ControllerMode.JOINT_POSITION: JointPosition,
@@ -72,10 +70,10 @@ class ControlLoop:
     Args:
         driver: The connection.
         limits: Bounds of the arm, for stopping.
-        mode: How the controller shall follow.
-        log: Where every cycle is written.
-        watch: Returns in every cycle whether to stop.
-        model: The arm, for stopping a tool within what its joints allow.
+        mode: Control mode of the controller.
+        log: Records every cycle.
+        stop_check: Returns the reason to stop, or None; called in every cycle.
+        model: The arm, for stopping a tool within the limits of its joints.
         filters: Filters of a callback's commands, in this order.
         box: The controller's safety box, if known, for fault messages.
         collision_thresholds: Those of the controller, shape (n,), [N m], if known, for fault messages.
@@ -89,7 +87,7 @@ class ControlLoop:
         mode: ControllerMode,
         log: CycleLog,
         *,
-        watch: StopCheck,
+        stop_check: StopCheck,
         model: RobotModel,
         filters: Sequence[CommandFilter],
         box: SafetyBox | None = None,
@@ -105,7 +103,7 @@ class ControlLoop:
         self._mode = mode
         self._kind = _COMMANDS[mode]
         self._log = log
-        self._watch = watch
+        self._stop_check = stop_check
         self._state_timeout = state_timeout
         self._filters = tuple(filters)
         self._box = box
@@ -117,7 +115,7 @@ class ControlLoop:
         self._calls = CallTimes()
         self._command: Command | None = None
         self._pending: deque[RobotState] = deque()
-        self._brake = _build_stop_planner(self._kind, limits, model)
+        self._stop_planner = _build_stop_planner(self._kind, limits, model)
 
     def run(self, callback: Callback) -> str | None:
         """Runs a motion to its end.
@@ -126,13 +124,13 @@ class ControlLoop:
             callback: Returns the command for each state; the one with `finished=True` is the last.
 
         Returns:
-            None when the motion ran to its end, or the reason from `watch` when it was stopped before.
+            None if the motion ran to its end, or the reason from `stop_check` if it was stopped.
 
         Raises:
             ControlError: The controller set error bits or ended the motion by itself.
-            ConnectionLostError: States stopped coming, or the TCP connection broke.
+            ConnectionLostError: No states arrived, or the TCP connection was closed.
             CommandRejectedError: The controller refused to begin.
-            DeadlineError: It agreed to begin and then did not.
+            DeadlineError: It accepted the motion but did not begin.
             InvalidValueError: The callback returned an invalid command; the motion was stopped.
             Exception: An exception of the callback, after the motion was stopped.
         """
@@ -149,118 +147,118 @@ class ControlLoop:
         return reason
 
     def _await_modes(self) -> RobotState | str:
-        """Returns the newest state that shows the requested modes, or the reason of `watch` to stop before."""
+        """Returns the newest state that shows the requested modes, or the reason of `stop_check` to stop before."""
         deadline = time.monotonic() + MODE_TIMEOUT
         while time.monotonic() < deadline:
             states = self._driver.poll(self._state_timeout)
             if not states:
-                raise self._lost()
+                raise self._lost_error()
             for state in states[:-1]:
                 self._log.write(state, self._driver.received_ns)
             state = states[-1]
             if state.faults:
-                raise self._fault(state)
+                raise self._fault_error(state)
             if self._driver.has_begun(state):
                 self._first_id, self._first_q_c, self._first_tau_c = state.message_id, state.q_c, state.tau_c
-                self._brake.begin(state)
+                self._stop_planner.begin(state)
                 return state
             self._log.write(state, self._driver.received_ns)
             if state.robot_mode is RobotMode.USER_STOPPED:
                 raise ControlError(
                     f"{self._driver.name}: an emergency stop or the safety gate has stopped the arm before the motion "
-                    "began; release it and switch the power on",
+                    "began; release it and switch motor power on",
                     (),
                     self._log.recorder.last(RECORD_CYCLES),
                 ).coded("user_stopped_start")
-            reason = self._watch(0.0)
+            reason = self._stop_check(0.0)
             if reason is not None:
                 return reason
         if not self._has_power():
-            raise self._cut_off()
+            raise self._power_off_error()
         raise DeadlineError(
             f"{self._driver.name} accepted the start of a motion and then did not show {self._mode.name} within "
-            f"{MODE_TIMEOUT:g} s; try again, and look at the controller's own display if it goes on"
+            f"{MODE_TIMEOUT:g} s; try again; if it persists, check the controller's own display"
         ).coded("not_started", seconds=f"{MODE_TIMEOUT:g}")
 
     def _stream(self, state: RobotState, callback: Callback) -> str | None:
         while True:
             t = (state.message_id - self._first_id) * CYCLE_TIME
-            reason = self._watch(t)
+            reason = self._stop_check(t)
             if reason is not None:
-                self._pending.appendleft(state)  # Still without an answer: the stop begins with it.
+                self._pending.appendleft(state)  # It has no answer yet: the stop begins with it.
                 return reason
             try:
-                begun_ns = time.monotonic_ns()
+                start_ns = time.monotonic_ns()
                 answer = callback(state, t)
-                self._calls.add(1e-9 * (time.monotonic_ns() - begun_ns), t)
-                wanted = self._checked(answer, state)
-                command = self._filtered(wanted, state)
+                self._calls.add(1e-9 * (time.monotonic_ns() - start_ns), t)
+                requested = self._checked(answer, state)
+                command = self._filtered(requested, state)
             except BaseException:
                 self._pending.appendleft(state)
                 raise
             self._answer(state, command)
-            if wanted.finished:
-                return self._finish(wanted, command)
+            if requested.finished:
+                return self._finish(requested, command)
             state = self._next()
 
-    def _finish(self, wanted: Command, sent: Command) -> str | None:
-        """Waits until filters and controller reach the last command; returns the reason of `watch`, as `run`."""
+    def _finish(self, requested: Command, sent: Command) -> str | None:
+        """Waits until filters and controller reach the last command; returns the reason of `stop_check`, like `run`."""
         near = 0
         for _ in range(FILTER_CYCLES if self._filters else 0):
-            near = near + 1 if is_near(sent, wanted) else 0
+            near = near + 1 if is_near(sent, requested) else 0
             if near > _NEAR_CYCLES:
                 break
             state = self._next()
-            reason = self._watch(self._time(state))
+            reason = self._stop_check(self._time(state))
             if reason is not None:
                 self._pending.appendleft(state)
                 return reason
-            sent = self._filtered(wanted, state)
+            sent = self._filtered(requested, state)
             self._answer(state, sent)
-        last = wanted if near else sent
-        violation = self._brake.find_motion()
+        last = requested if near else sent
+        violation = self._stop_planner.find_motion()
         if violation is not None:
             raise InvalidValueError(
                 f"last command at t = {self._t:.3f} s",
                 round(violation.value, 3),
-                f"{violation.condition.unit} is what standing still from there would take ({violation.text}), so the "
-                "arm was stopped within the limits, farther on; let the commands stop before finished=True",
+                f"{violation.condition.unit} would be needed to stop there ({violation.text}), so the arm was stopped "
+                "within the limits, farther on; make the commands stationary before finished=True",
             )
         state = self._hold(last)
-        if distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE or self._is_unplayed(state, last):
-            raise self._not_arrived(state, last)
+        if distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE or self._is_unexecuted(state, last):
+            raise self._not_arrived_error(state, last)
         return None
 
-    def _is_unplayed(self, state: RobotState, command: Command) -> bool:
-        """Returns whether torques were sent and the controller commands what it did before the first of them."""
-        if not isinstance(command, JointTorque) or np.abs(command.tau).max() < _FELT:
+    def _is_unexecuted(self, state: RobotState, command: Command) -> bool:
+        """Returns whether torques were sent but the controller still commands the torques from before the motion."""
+        if not isinstance(command, JointTorque) or np.abs(command.tau).max() < _MIN_TORQUE:
             return False
         return np.array_equal(state.tau_c, self._first_tau_c)
 
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.
 
-        After a delay of this process several are waiting. Each is answered in turn, because the controller's jitter
-        buffer still uses slightly late commands; states older than `CATCH_UP` cycles are skipped.
+        After a delay of this process several states are queued. Each is answered in turn, because the controller's
+        jitter buffer still uses slightly late commands; states older than `CATCH_UP` cycles are skipped.
         """
         deadline = time.monotonic() + self._state_timeout
         while True:
             while self._pending:
                 state = self._pending.popleft()
                 if state.faults:
-                    raise self._fault(state)
-                # A lock-step controller repeats a state whose answer it has not seen yet: it was answered, wait on.
+                    raise self._fault_error(state)
+                # A lock-step controller repeats a state until its answer arrives: ignore it if answered.
                 if state.message_id > self._answered_id:
                     if not self._driver.is_streaming(state):
-                        raise self._ended_by_controller(state)
+                        raise self._ended_error(state)
                     return state
             states = self._driver.poll(deadline - time.monotonic())
             if not states and time.monotonic() >= deadline:
-                raise self._lost()
+                raise self._lost_error()
             for state in states[:-CATCH_UP]:
                 if state.message_id > self._answered_id:
                     self._log.write(state, self._driver.received_ns, self._time(state))
-            # A fault anywhere in the burst ends the motion: no answer before it matters.
+            # A fault anywhere in the burst ends the motion: answers to earlier states have no effect.
             faulty = [state for state in states if state.faults]
             self._pending.extend(faulty[:1] or states[-CATCH_UP:])
 
@@ -270,16 +268,16 @@ class ControlLoop:
         self._answered_id = state.message_id
         self._command = command
         self._t = self._time(state)
-        self._brake.remember(command, state.message_id - self._first_id, state)
+        self._stop_planner.remember(command, state.message_id - self._first_id, state)
         self._log.write(state, self._driver.received_ns, self._t, sent_ns, command)
 
     def _hold(self, command: Command) -> RobotState:
-        """Repeats the last command until the controller has executed it: StopMove may overtake a queued one.
+        """Repeats the last command until the controller has executed it: StopMove may overtake a queued command.
 
-        A low-pass filter of the controller delays it: it waits as long as the commanded state comes closer.
+        A low-pass filter of the controller delays the command: this waits as long as the commanded state approaches it.
 
         Returns:
-            The last state, at the command or as close as it came.
+            The last state, at the command or as close as it got.
         """
         before, cycle = math.inf, 0
         while True:
@@ -289,89 +287,93 @@ class ControlLoop:
             if off == 0.0:
                 return state
             if cycle % SETTLE_CYCLES == 0:
-                if off <= ARRIVAL_TOLERANCE or off > _NEARER * before or self._watch(self._time(state)) is not None:
+                if (
+                    off <= ARRIVAL_TOLERANCE
+                    or off > _APPROACH * before
+                    or self._stop_check(self._time(state)) is not None
+                ):
                     return state
                 before = off
 
     def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
         """The single stop path: every motion ends here, also one that ran to its end.
 
-        Stops the commands within the limits if commands are still possible, then ends the motion over TCP. After
-        `ControlError` and `ConnectionLostError` the controller stops by itself.
+        It stops the arm within the limits if commands are still possible, then ends the motion over TCP. After
+        `ControlError` and `ConnectionLostError` the controller stops the arm.
         """
-        surprise = error
+        outcome = error
         if brake and self._command is not None and not isinstance(error, ControlError | ConnectionLostError):
             try:
                 self._stop_commands()
-            except BaseException as worse:
-                surprise = worse
+            except BaseException as failure:
+                outcome = failure
         first = self._log.recorder.count
-        if surprise is None:
-            surprise = self._end_well()
+        if outcome is None:
+            outcome = self._end_normally()
         else:
-            self._end_badly(surprise)
-        if isinstance(surprise, ControlError):
-            self._watch_standstill()
-            surprise.stop = self._log.recorder.rows(first)
-        if surprise is not None and surprise is not error:
-            raise surprise from error
+            self._end_after_error(outcome)
+        if isinstance(outcome, ControlError):
+            self._record_standstill()
+            outcome.stop = self._log.recorder.rows(first)
+        if outcome is not None and outcome is not error:
+            raise outcome from error
 
     def _stop_commands(self) -> None:
         try:
-            way = self._brake.plan()
-        except PlanningError:  # The commands were beyond every bound: only StopMove can end the motion.
+            commands = self._stop_planner.plan()
+        except PlanningError:  # The commands exceed all bounds: only StopMove can end the motion.
             return
         self._log.braking = True
         last_id = self._answered_id
         step = 0
-        while step < len(way):
+        while step < len(commands):
             state = self._next()
-            step = min(state.message_id - last_id, len(way))
-            self._answer(state, way[step - 1])
-        self._hold(way[-1])
+            step = min(state.message_id - last_id, len(commands))
+            self._answer(state, commands[step - 1])
+        self._hold(commands[-1])
 
-    def _end_well(self) -> ControlError | None:
-        """Ends a motion without an error so far; returns an error of the controller in its last commands."""
+    def _end_normally(self) -> ControlError | None:
+        """Ends a motion without an error so far; returns an error that the controller reports during its end."""
         states: list[RobotState] = []
 
-        def take(arrived: list[RobotState]) -> None:
-            others(arrived)
+        def collect(arrived: list[RobotState]) -> None:
+            listener(arrived)
             states.extend(arrived)
 
-        others, self._driver.on_states = self._driver.on_states, take
+        listener, self._driver.on_states = self._driver.on_states, collect
         try:
             self._driver.end()
-            deadline = time.monotonic() + REST_TIMEOUT
+            deadline = time.monotonic() + STANDSTILL_TIMEOUT
             while self._is_running(states) and time.monotonic() < deadline:
-                take(self._driver.poll(min(self._state_timeout, REST_TIMEOUT)))
+                collect(self._driver.poll(min(self._state_timeout, STANDSTILL_TIMEOUT)))
         finally:
-            self._driver.on_states, self._log.braking = others, False
+            self._driver.on_states, self._log.braking = listener, False
         faulty = next((state for state in states if state.faults), None)
-        return None if faulty is None else self._fault(faulty)
+        return None if faulty is None else self._fault_error(faulty)
 
     def _is_running(self, states: list[RobotState]) -> bool:
-        """Returns whether the newest of these states shows the motion without a fault; True without a state."""
+        """Returns whether the newest state still shows the motion, without a fault; True without a state."""
         return not states or (not any(state.faults for state in states) and self._driver.has_begun(states[-1]))
 
-    def _end_badly(self, error: BaseException) -> None:
-        others = self._driver.on_states
+    def _end_after_error(self, error: BaseException) -> None:
+        listener = self._driver.on_states
         if isinstance(error, ControlError) and not self._driver.has_listener:
-            self._driver.on_states = self._record  # The controller's own stop has begun.
+            self._driver.on_states = self._record  # Record the controller's own stop.
         try:
             self._driver.end(STOP_TIMEOUT)
         except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
-            error.add_note(f"ending the motion failed, too: {refusal}")
+            error.add_note(f"the end of the motion failed, too: {refusal}")
         finally:
-            self._driver.on_states, self._log.braking = others, False
+            self._driver.on_states, self._log.braking = listener, False
 
-    def _watch_standstill(self) -> None:
-        """Records the controller's own stop, so that the record shows it and the next motion starts at standstill."""
-        deadline = time.monotonic() + REST_TIMEOUT
+    def _record_standstill(self) -> None:
+        """Records the controller's own stop until standstill, so that the next motion starts there."""
+        deadline = time.monotonic() + STANDSTILL_TIMEOUT
         before: RobotState | None = None
         while time.monotonic() < deadline:
             states = self._driver.poll(self._state_timeout)
             self._record(states)
-            if not states or (before is not None and _stands(before, states[-1])):
+            if not states or (before is not None and _is_standstill(before, states[-1])):
                 return
             before = states[-1]
 
@@ -384,12 +386,12 @@ class ControlLoop:
         return check_command(command, self._kind, self._driver.n, self._time(state))
 
     def _filtered(self, command: Command, state: RobotState) -> Command:
-        """Returns the filtered command; the first one starts the filters and must match the commanded state."""
+        """Returns the filtered command; the first command starts the filters and must match the commanded state."""
         is_first = self._command is None
-        for link in self._filters:
+        for stage in self._filters:
             if is_first:
-                link.begin(command)
-            command = link.step(command)
+                stage.begin(command)
+            command = stage.step(command)
         if is_first:
             require_first(command, state, self._limits, has_psi=self._has_psi)
         return command
@@ -397,13 +399,13 @@ class ControlLoop:
     def _time(self, state: RobotState) -> float:
         return (state.message_id - self._first_id) * CYCLE_TIME
 
-    def _fault(self, state: RobotState) -> ControlError:
+    def _fault_error(self, state: RobotState) -> ControlError:
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._driver.received_ns, t)
         pressed = self._driver.find_safety_stop(state)
         lacks_commands = self._driver.is_lack_of_commands(state.faults)
         if pressed is None and lacks_commands and len(state.faults) == 1 and not self._has_power():
-            return self._cut_off()
+            return self._power_off_error()
         record = self._log.recorder.last(RECORD_CYCLES)
         report = self._driver.describe_faults(
             state.faults,
@@ -421,22 +423,22 @@ class ControlLoop:
         error.finding = report.finding
         return error if pressed is None else error.coded("safety_stop", status=pressed.code)
 
-    def _not_arrived(self, state: RobotState, command: Command) -> ControlError:
+    def _not_arrived_error(self, state: RobotState, command: Command) -> ControlError:
         if isinstance(command, JointTorque) or np.array_equal(state.q_c, self._first_q_c):
-            cause = "the controller has played none of the commands: they are lost on their way, look at the network"
+            cause = "the controller has executed none of the commands: they are lost, check the network"
         elif state.success_rate < 1.0:
             cause = (
-                f"{100.0 * state.success_rate:.1f} % of the last second's commands arrived in time: look at the network"
+                f"{100.0 * state.success_rate:.1f} % of the last second's commands arrived in time: check the network"
             )
         else:
-            cause = "something in the controller holds it back: look at its filters and soft limits"
+            cause = "the controller holds it back: check its filters and soft limits"
         record = self._log.recorder.last(RECORD_CYCLES)
         off = (
             ""
             if isinstance(command, JointTorque)
-            else f": {describe_distance(state, command, has_psi=self._has_psi)} from its end"
+            else f": {describe_distance(state, command, has_psi=self._has_psi)} away"
         )
-        return ControlError(f"the motion was executed and did not arrive{off}; {cause}", (), record)
+        return ControlError(f"the motion was executed and did not reach its end{off}; {cause}", (), record)
 
     def _has_power(self) -> bool:
         try:
@@ -444,33 +446,33 @@ class ControlLoop:
         except RcilabError:  # A lost connection has its own error.
             return True
 
-    def _cut_off(self) -> ControlError:
+    def _power_off_error(self) -> ControlError:
         record = self._log.recorder.last(RECORD_CYCLES)
-        said = "the motors were switched off while the motion ran, and the brakes hold the arm; call power_on()"
-        return ControlError(f"{self._driver.name}: {said}", (), record)
+        message = "motor power was switched off during the motion, and the brakes hold the arm; call power_on()"
+        return ControlError(f"{self._driver.name}: {message}", (), record)
 
-    def _ended_by_controller(self, state: RobotState) -> ControlError:
+    def _ended_error(self, state: RobotState) -> ControlError:
         self._log.write(state, self._driver.received_ns, self._time(state))
         if not self._has_power():
-            return self._cut_off()
+            return self._power_off_error()
         record = self._log.recorder.last(RECORD_CYCLES)
         mode = state.robot_mode.name.lower().replace("_", " ")
         return ControlError(
             f"the controller ended the motion by itself at t = {self._time(state):.3f} s without naming a fault "
-            f"(robot mode: {mode}); look at the controller's own display and the emergency stop",
+            f"(robot mode: {mode}); check the controller's own display and the emergency stop",
             (),
             record,
         )
 
-    def _lost(self) -> ConnectionLostError:
+    def _lost_error(self) -> ConnectionLostError:
         when = "before the first command" if math.isnan(self._t) else f"after t = {self._t:.3f} s"
         return ConnectionLostError(
-            f"{self._driver.name}: no state for {self._state_timeout:g} s, {when}; look whether the controller runs "
-            "and the cable is in, then connect again. The controller stops an arm that gets no commands by itself"
+            f"{self._driver.name}: no state for {self._state_timeout:g} s, {when}; check that the controller runs "
+            "and the cable is connected, then connect again. The controller stops an arm without commands"
         )
 
 
-def _stands(before: RobotState, after: RobotState) -> bool:
+def _is_standstill(before: RobotState, after: RobotState) -> bool:
     return (
         after.message_id > before.message_id
         and bool(np.array_equal(before.q_c, after.q_c))

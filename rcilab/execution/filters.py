@@ -50,7 +50,7 @@ def low_pass(u: Array, x: Array, k: float) -> Array:
 
 
 def low_pass_pose(u: Array, x: Array, k: float) -> Array:
-    """Returns the next pose from the commanded pose u and the last one x, (4, 4): the turn in the same proportion."""
+    """Returns the next pose from the commanded pose u and the last one x, (4, 4): the rotation in the same ratio."""
     T = u.copy()
     T[:3, 3] = low_pass(u[:3, 3], x[:3, 3], k)
     T[:3, :3] = np.array(slerp(as_rotation9(x[:3, :3]), as_rotation9(u[:3, :3]), k)).reshape(3, 3)
@@ -72,43 +72,45 @@ class SignalState(NamedTuple):
     acceleration: Array
 
 
-def limit_rate(behind: Array, wanted: Array, last: SignalState, bounds: Bounds) -> SignalState:
-    """Returns the next step of coordinates that each keep their own bounds.
+def limit_rate(lag: Array, command_velocity: Array, last: SignalState, bounds: Bounds) -> SignalState:
+    """Returns the next step of coordinates with independent bounds.
 
-    A stream inside the bounds passes unchanged. After a jump they run towards it as fast as the bounds allow and brake
-    in time (a jump of a few mrad is passed by part of it), which the vendor's law, that of libfranka's `limitRate`,
-    does not: it clips velocity, acceleration and jerk and runs past.
+    A stream inside the bounds passes unchanged. After a jump, each coordinate approaches the command as fast as the
+    bounds allow and brakes in time (a jump of a few mrad is overshot by part of it). The vendor's limiter, that of
+    libfranka's `limitRate`, clips velocity, acceleration and jerk and overshoots.
 
     Args:
-        behind: How far the command is from the last value, shape (n,).
-        wanted: The command's own step over this cycle as a velocity, shape (n,).
+        lag: Difference of the command from the last value, shape (n,).
+        command_velocity: Velocity of the command over this cycle, shape (n,).
         last: The last step.
         bounds: Each a number or of shape (n,).
     """
-    feed = np.clip(wanted, -bounds.velocity, bounds.velocity)
-    rest = behind - feed * CYCLE_TIME
-    velocity = np.clip(feed + np.sign(rest) * _closing_speed(np.abs(rest), bounds), -bounds.velocity, bounds.velocity)
+    feed = np.clip(command_velocity, -bounds.velocity, bounds.velocity)
+    remaining = lag - feed * CYCLE_TIME
+    velocity = np.clip(
+        feed + np.sign(remaining) * _closing_speed(np.abs(remaining), bounds), -bounds.velocity, bounds.velocity
+    )
     acceleration = (velocity - last.velocity) / CYCLE_TIME
-    highest = np.minimum(_rising(bounds.velocity - last.velocity, bounds.jerk), bounds.acceleration)
-    lowest = -np.minimum(_rising(bounds.velocity + last.velocity, bounds.jerk), bounds.acceleration)
+    highest = np.minimum(_max_acceleration(bounds.velocity - last.velocity, bounds.jerk), bounds.acceleration)
+    lowest = -np.minimum(_max_acceleration(bounds.velocity + last.velocity, bounds.jerk), bounds.acceleration)
     acceleration = np.minimum(np.maximum(acceleration, lowest), highest)
     step = bounds.jerk * CYCLE_TIME
     acceleration = np.clip(acceleration, last.acceleration - step, last.acceleration + step)
     return SignalState(last.velocity + acceleration * CYCLE_TIME, acceleration)
 
 
-def limit_vector_rate(behind: Array, wanted: Array, last: SignalState, bounds: Bounds) -> SignalState:
-    """Returns the next step of a vector whose length keeps the bounds: the tool's translation, or its rotation.
+def limit_vector_rate(lag: Array, command_velocity: Array, last: SignalState, bounds: Bounds) -> SignalState:
+    """Returns the next step of a vector with bounds of its length: the tool's translation, or its rotation.
 
-    As `limit_rate`, shapes (3,), bounds as numbers.
+    Like `limit_rate`, with shapes (3,) and numbers as bounds.
     """
-    feed = _shortened(wanted, bounds.velocity)
-    rest = behind - feed * CYCLE_TIME
-    length = float(np.linalg.norm(rest))
-    closing = rest * (float(_closing_speed(length, bounds)) / length) if length > 0.0 else rest
-    velocity = _shortened(feed + closing, bounds.velocity)
-    goal = _shortened((velocity - last.velocity) / CYCLE_TIME, bounds.acceleration)
-    # Reducing the acceleration is always allowed; from there it moves towards the goal as far as all bounds permit.
+    feed = _limit_length(command_velocity, bounds.velocity)
+    remaining = lag - feed * CYCLE_TIME
+    length = float(np.linalg.norm(remaining))
+    closing = remaining * (float(_closing_speed(length, bounds)) / length) if length > 0.0 else remaining
+    velocity = _limit_length(feed + closing, bounds.velocity)
+    goal = _limit_length((velocity - last.velocity) / CYCLE_TIME, bounds.acceleration)
+    # Reducing the acceleration is always allowed; the search goes from there towards the goal.
     size = float(np.linalg.norm(last.acceleration))
     ease = last.acceleration * max(0.0, 1.0 - float(bounds.jerk) * CYCLE_TIME / size) if size > 0.0 else np.zeros(3)
     low, high = 0.0, 1.0
@@ -174,8 +176,8 @@ class LowPass:
 class RateLimiter:
     """Keeps every command inside the arm's limits of velocity, acceleration and jerk, or of torque rate.
 
-    Poses are kept inside the tool's limits, as the vendor's client does it; what a jump of the tool asks of the joints
-    can still be too much.
+    Poses are kept inside the tool's limits, as in the vendor's client; a jump of the tool may still exceed the limits
+    of the joints.
 
     Args:
         limits: Bounds of the arm, from the manual's table or the vendor's (`cartesian_limits`); `LIMIT_MARGIN` is kept.
@@ -188,7 +190,7 @@ class RateLimiter:
         self._rotation = _bounds(c.rotation_velocity, c.rotation_acceleration, c.rotation_jerk)
         self._psi = None if psi is None else _bounds(psi.velocity, psi.acceleration, psi.jerk)
         self._torque_step = LIMIT_MARGIN * joint.torque_rate * CYCLE_TIME
-        self._command: Command | None = None  # As it was asked for.
+        self._command: Command | None = None  # The last one before the limiter.
         self._sent: Command | None = None
         self._rates: list[SignalState] = []
 
@@ -196,11 +198,11 @@ class RateLimiter:
         """Starts at standstill at the first command of a motion; torques start at zero."""
         self._command = self._sent = command
         if isinstance(command, JointPosition):
-            self._rates = [_rest(len(command.q))]
+            self._rates = [_standstill(len(command.q))]
         elif isinstance(command, JointTorque):
             self._sent = JointTorque(np.zeros_like(command.tau))
         else:
-            self._rates = [_rest(3), _rest(3), _rest(1)]
+            self._rates = [_standstill(3), _standstill(3), _standstill(1)]
 
     def step(self, command: Command) -> Command:
         """Returns the command, or as much of it as the limits allow in this cycle."""
@@ -212,8 +214,8 @@ class RateLimiter:
         elif (
             isinstance(command, JointPosition) and isinstance(before, JointPosition) and isinstance(sent, JointPosition)
         ):
-            wanted = (command.q - before.q) / CYCLE_TIME
-            self._rates[0] = limit_rate(command.q - sent.q, wanted, self._rates[0], self._joint)
+            command_velocity = (command.q - before.q) / CYCLE_TIME
+            self._rates[0] = limit_rate(command.q - sent.q, command_velocity, self._rates[0], self._joint)
             q = sent.q + self._rates[0].velocity * CYCLE_TIME
             self._sent = JointPosition(_snapped(q, command.q), command.finished)
         elif isinstance(before, CartesianPosition) and isinstance(sent, CartesianPosition):
@@ -229,10 +231,10 @@ class RateLimiter:
     def _pose(self, T: Array, T_before: Array, T_sent: Array) -> Array:
         p, p_sent = T[:3, 3], T_sent[:3, 3]
         R, R_sent = T[:3, :3], T_sent[:3, :3]
-        wanted = (p - T_before[:3, 3]) / CYCLE_TIME
-        self._rates[0] = limit_vector_rate(p - p_sent, wanted, self._rates[0], self._translation)
-        wanted = rotation_vector(T_before[:3, :3], R) / CYCLE_TIME
-        self._rates[1] = limit_vector_rate(rotation_vector(R_sent, R), wanted, self._rates[1], self._rotation)
+        command_velocity = (p - T_before[:3, 3]) / CYCLE_TIME
+        self._rates[0] = limit_vector_rate(p - p_sent, command_velocity, self._rates[0], self._translation)
+        command_velocity = rotation_vector(T_before[:3, :3], R) / CYCLE_TIME
+        self._rates[1] = limit_vector_rate(rotation_vector(R_sent, R), command_velocity, self._rates[1], self._rotation)
         T = np.eye(4)
         T[:3, 3] = _snapped(p_sent + self._rates[0].velocity * CYCLE_TIME, p)
         T[:3, :3] = _snapped(rotation_matrix(self._rates[1].velocity * CYCLE_TIME) @ R_sent, R)
@@ -241,45 +243,46 @@ class RateLimiter:
     def _arm_angle(self, psi: float | None, before: float | None, sent: float | None) -> float | None:
         if psi is None or before is None or sent is None or self._psi is None:
             return psi
-        wanted = np.array([(psi - before) / CYCLE_TIME])
-        self._rates[2] = limit_rate(np.array([psi - sent]), wanted, self._rates[2], self._psi)
+        command_velocity = np.array([(psi - before) / CYCLE_TIME])
+        self._rates[2] = limit_rate(np.array([psi - sent]), command_velocity, self._rates[2], self._psi)
         limited = sent + float(self._rates[2].velocity[0]) * CYCLE_TIME
         return psi if abs(limited - psi) <= _ARRIVED else limited
 
 
-def is_near(sent: Command, wanted: Command) -> bool:
-    """Returns whether the sent command is so close to the wanted one that the rest, in one cycle, is a small jerk."""
-    if isinstance(sent, CartesianPosition) and isinstance(wanted, CartesianPosition):
-        off = float(np.abs(sent.T_base_tool - wanted.T_base_tool).max())
-        return max(off, abs((sent.psi or 0.0) - (wanted.psi or 0.0))) <= _NEAR
-    if isinstance(sent, JointTorque) and isinstance(wanted, JointTorque):
-        return float(np.abs(sent.tau - wanted.tau).max()) <= _NEAR
-    if isinstance(sent, JointPosition) and isinstance(wanted, JointPosition):
-        return float(np.abs(sent.q - wanted.q).max()) <= _NEAR
+def is_near(sent: Command, requested: Command) -> bool:
+    """Returns whether a sent command is so close to the requested one that the difference is a small jerk."""
+    if isinstance(sent, CartesianPosition) and isinstance(requested, CartesianPosition):
+        off = float(np.abs(sent.T_base_tool - requested.T_base_tool).max())
+        return max(off, abs((sent.psi or 0.0) - (requested.psi or 0.0))) <= _NEAR
+    if isinstance(sent, JointTorque) and isinstance(requested, JointTorque):
+        return float(np.abs(sent.tau - requested.tau).max()) <= _NEAR
+    if isinstance(sent, JointPosition) and isinstance(requested, JointPosition):
+        return float(np.abs(sent.q - requested.q).max()) <= _NEAR
     return True
 
 
 def _closing_speed(distance: Array | float, bounds: Bounds) -> Array | float:
     """Returns the largest speed from which there is time to brake within a distance, acceleration and jerk limited.
 
-    From speed v, standing takes v^2 / (2 a) + v a / (2 j), with the jerk's ramps (exact from v = a^2 / j up).
+    The stopping distance from speed v is v^2 / (2 a) + v a / (2 j), with the jerk's ramps (exact for v >= a^2 / j).
     """
     a = _BRAKING * bounds.acceleration
     ramp = a * a / (2.0 * bounds.jerk)
     return np.minimum(_CATCH_UP * distance, np.sqrt(ramp * ramp + 2.0 * a * distance) - ramp)
 
 
-def _rising(room: Array, jerk: float | Array) -> Array:
-    """Returns the largest acceleration from which a velocity does not pass its bound, `room` away, when it eases off.
+def _max_acceleration(room: Array, jerk: float | Array) -> Array:
+    """Returns the largest acceleration with which a velocity does not exceed its bound, `room` above it.
 
-    With an acceleration a for a cycle, then less by the jerk in each, a velocity still grows by a h / 2 + a^2 / (2 j).
+    With acceleration a in one cycle and a decrease by the jerk in each following one, the velocity grows by
+    a h / 2 + a^2 / (2 j).
     """
     half = 0.5 * CYCLE_TIME
     return jerk * (np.sqrt(half * half + 2.0 * np.maximum(room, 0.0) / jerk) - half)
 
 
 def _is_allowed(acceleration: Array, last: SignalState, bounds: Bounds) -> bool:
-    """Returns whether a vector's acceleration keeps the bounds, now and when it eases off from here."""
+    """Returns whether an acceleration keeps the bounds, now and while it decreases to zero from here."""
     size = float(np.linalg.norm(acceleration))
     change = float(np.linalg.norm(acceleration - last.acceleration))
     reached = last.velocity + acceleration * (0.5 * CYCLE_TIME + 0.5 * size / float(bounds.jerk))
@@ -294,15 +297,15 @@ def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | 
     return Bounds(LIMIT_MARGIN * velocity, LIMIT_MARGIN * acceleration, LIMIT_MARGIN * jerk)
 
 
-def _rest(size: int) -> SignalState:
+def _standstill(size: int) -> SignalState:
     return SignalState(np.zeros(size), np.zeros(size))
 
 
-def _shortened(vector: Array, longest: float | Array) -> Array:
+def _limit_length(vector: Array, longest: float | Array) -> Array:
     length = float(np.linalg.norm(vector))
     return vector if length <= longest else vector * (float(longest) / length)
 
 
 def _snapped(x: Array, u: Array) -> Array:
-    """Returns the command itself where the sent value differs from it only by rounding."""
+    """Returns the command itself if the sent value differs from it only by rounding."""
     return u if float(np.abs(x - u).max()) <= _ARRIVED else x

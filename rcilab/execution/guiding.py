@@ -1,4 +1,4 @@
-"""Hand guiding, which the controller starts on request and may end by itself."""
+"""Hand guiding: the controller starts it on request and may end it by itself."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class HandGuide:
         self._driver.start_guiding(space, kind)
 
     def stop(self) -> None:
-        """Ends hand guiding; returns once the arm stands still."""
+        """Ends hand guiding; returns once the arm is stationary."""
         self._driver.stop_guiding()
 
     def has_ended(self, state: RobotState) -> bool:
         """Returns whether the controller has ended guiding by itself: a fault, an emergency stop, power off.
 
-        States that were on their way before the arm was freed do not count.
+        States that were sent before guiding began do not count.
         """
         guided = state.robot_mode is RobotMode.GUIDING
         self._was_seen |= guided

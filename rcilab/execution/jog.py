@@ -1,4 +1,4 @@
-"""Jogging: a callback that moves the arm as long as a jog is held, and stops it afterwards."""
+"""Jogging: a callback that moves the arm while a jog is held, and stops it afterwards."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 JogKind: TypeAlias = Literal["joint", "base", "tool"]
-"""Meaning of the numbers: joint velocities, or a twist of the tool in axes of the base or of the tool."""
+"""Meaning of the values: joint velocities, or a twist of the tool in base or tool axes."""
 
 _KINDS: tuple[JogKind, ...] = get_args(JogKind)
 _NO_TWIST = (0.0,) * 6
-LINGER = 1.0  # [s] at standstill after which a jog ends; until then the next one begins at once.
+LINGER = 1.0  # [s] Standstill after which a jog ends; until then another jog starts without delay.
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ def build_jog(kind: JogKind, values: ArrayLike, n: int) -> JogCommand:
     """Returns a jog of an arm with n joints.
 
     Raises:
-        InvalidValueError: The kind is unknown, or the values are not as many finite numbers as it needs.
+        InvalidValueError: The kind is unknown, or the values are not the required number of finite numbers.
     """
     size, unit = (n, "rad/s") if kind == "joint" else (6, "m/s, rad/s")
     return JogCommand(kind, tuple(as_vector(values, size, "values", unit).tolist()))
@@ -60,15 +60,15 @@ class JogSource(Protocol):
 
 
 class JogCallback:
-    """Returns the command of every cycle of a jog. Owned by the control loop's thread.
+    """The callback of a jog. Owned by the control loop's thread.
 
     Args:
-        source: Where the jog is read from.
+        source: The source of the held jog.
         model: The arm, with its tool.
-        q: Commanded joint angles now, shape (n,), [rad]; at standstill.
+        q: Present commanded joint angles, shape (n,), [rad]; at standstill.
 
     Raises:
-        PlanningError: A joint is outside its limits: the arm cannot move inside them.
+        PlanningError: A joint is outside its limits.
     """
 
     def __init__(self, source: JogSource, model: RobotModel, q: JointVector) -> None:
@@ -76,29 +76,28 @@ class JogCallback:
         self._jog = Jog(model, q)
         self._command: JogCommand | None = None
         self._cycle = 0
-        self._resting = 0
+        self._standstill_cycles = 0
         self.is_enabled = True
         """False: stop and end, even if a jog is held."""
 
     def __call__(self, state: RobotState, t: float) -> JointPosition:
-        """Returns the command that answers a state; the last one is sent at standstill when no jog is held any more."""
+        """Returns the command for a state; it is the last one `LINGER` after standstill without a jog."""
         cycle = round(t / CYCLE_TIME)
-        self._lead()
+        self._update_command()
         q = self._jog.q
         for _ in range(cycle - self._cycle):
             q = self._jog.step()
-        is_free = self._command is None and self._jog.is_stationary
-        self._resting = self._resting + cycle - self._cycle if is_free else 0
+        is_released = self._command is None and self._jog.is_stationary
+        self._standstill_cycles = self._standstill_cycles + cycle - self._cycle if is_released else 0
         self._cycle = cycle
-        is_over = is_free and (not self.is_enabled or self._resting * CYCLE_TIME >= LINGER)
+        is_over = is_released and (not self.is_enabled or self._standstill_cycles * CYCLE_TIME >= LINGER)
         return JointPosition(q, finished=is_over and cycle > 0)
 
-    def _lead(self) -> None:
-        """Follows the held jog."""
+    def _update_command(self) -> None:
         command = self._source.read(self._command) if self.is_enabled else None
         if command is None:
             if self._command is not None:
-                self._let_go(self._command.kind)
+                self._release(self._command.kind)
                 self._command = None
             return
         if command == self._command:
@@ -109,8 +108,8 @@ class JogCallback:
         else:
             self._jog.set_twist(command.values, frame=command.kind)
 
-    def _let_go(self, kind: JogKind) -> None:
-        """Stops; a tool stays on its line meanwhile."""
+    def _release(self, kind: JogKind) -> None:
+        """Stops the arm; a tool stays on its line meanwhile."""
         if kind == "joint":
             self._jog.stop()
         else:

@@ -1,4 +1,4 @@
-"""A prepared motion as a callback: one row of joint angles, or one pose of a path, for every controller cycle."""
+"""A path of the tool as a callback, one pose per controller cycle, and reports of progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PROGRESS_CYCLES = 50
 
 
 def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[int], None] | None = None) -> Callback:
-    """Returns the callback that streams a path of the tool: the pose at share k of the way in controller cycle k.
+    """Returns the callback that streams a path of the tool: the pose at share k in controller cycle k.
 
     Args:
         path: The path.

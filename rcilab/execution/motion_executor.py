@@ -1,4 +1,4 @@
-"""Executes prepared motions and callbacks over a driver, with the conditions that stop them."""
+"""Execution of motions and callbacks over a driver, with the conditions that stop them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
 
-LONGEST_PAUSE = 120_000  # Cycles that a motion is held for before it is given up: every cycle of it is recorded.
+LONGEST_PAUSE = 120_000  # Cycles for which a motion can be held: every one of them is recorded.
 HELD_TOO_LONG = "held for more than 120 s"
 """Reason for the end of a motion that is held for `LONGEST_PAUSE`."""
 
 
 class MotionExecutor:
-    """Runs one motion after the other; a session and the control process use it alike. Owned by the driver's thread.
+    """Runs motions, one at a time, for a session or the control process. Owned by the driver's thread.
 
     Args:
         driver: The connection.
-        log: Takes every cycle.
-        stop_check: Called in every cycle with the motion time; returns why the motion is to stop, or None.
-        limits: Bounds that every command keeps.
+        log: Records every cycle.
+        stop_check: Called in every cycle with the motion time; returns the reason to stop, or None.
+        limits: Bounds of every command.
         state_timeout: Time without a state, while moving, that counts as a lost connection, [s].
         on_stopping: Called with the reason when a motion begins to stop before its end.
     """
@@ -53,7 +53,7 @@ class MotionExecutor:
         self._on_stopping = on_stopping
         self._stream: MotionStream | None = None
         self._is_torque = False
-        self._reason: str | None = None  # Why a motion in torques is being stopped along its reference.
+        self._reason: str | None = None  # Why a torque motion is being stopped along its reference.
 
     def run(
         self,
@@ -67,24 +67,24 @@ class MotionExecutor:
     ) -> str | None:
         """Runs a motion to its end.
 
-        A `MotionStream` in torque mode passes a rate limiter, and stops along its reference: there is no commanded
-        position to brake, so the reference stops and the torques make the arm follow it.
+        A `MotionStream` in torque mode has a rate limiter, and it stops along its reference: without a commanded
+        position, the reference stops and the torques make the arm follow it.
 
         Args:
             callback: A `MotionStream`, or any other callback.
-            mode: How the arm is commanded.
+            mode: Command mode.
             model: The arm.
             filters: Filters of every command.
             box: The controller's safety box, if known, for fault messages.
             collision_thresholds: Those of the controller, shape (n,), [N m], if known, for fault messages.
 
         Returns:
-            None when it ran to its end, or why it stopped before.
+            None if it ran to its end, or the reason why it was stopped.
 
         Raises:
             ControlError: The controller stopped it.
             ConnectionLostError: The connection to the controller is lost.
-            Exception: What the callback raised; the arm was stopped.
+            Exception: An exception of the callback; the arm was stopped.
         """
         self._stream = callback if isinstance(callback, MotionStream) else None
         self._is_torque, self._reason = mode == "torque", None
@@ -95,7 +95,7 @@ class MotionExecutor:
             self._limits,
             ControllerMode[mode.upper()],
             self._log,
-            watch=self._check,
+            stop_check=self._check,
             state_timeout=self._state_timeout,
             model=model,
             filters=filters,
@@ -108,7 +108,7 @@ class MotionExecutor:
             self._stream = None
 
     def _check(self, t: float) -> str | None:
-        """Returns why the motion is to stop; called in every cycle."""
+        """Returns the reason to stop the motion, or None; called in every cycle."""
         reason, stream = self._stop_check(t), self._stream
         if reason is None and stream is not None and stream.held > LONGEST_PAUSE:
             reason = HELD_TOO_LONG

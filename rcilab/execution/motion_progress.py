@@ -14,16 +14,16 @@ class MotionProgress:
     time: float
     """Time since its first command, [s]."""
     duration: float
-    """Its duration with the present speed override, [s]; of a held motion, until it stands."""
-    place: float
-    """Time in its plan, [s]; less than `time` when it ran slower or was held."""
-    planned: float
+    """Its duration with the present speed override, [s]; of a held motion, until standstill."""
+    plan_time: float
+    """Time in its plan, [s]; less than `time` if it ran slower or was held."""
+    plan_duration: float
     """Duration of its plan, [s]."""
     speed_override: float
-    """Speed override: the part of its planned speed that it runs at or changes to; 0 when it is held."""
+    """Present or requested speed override, from 0 (held) to 1."""
     mode: Mode
     """Command mode."""
 
     def __repr__(self) -> str:
         percent = 100.0 * self.speed_override
-        return f"<MotionProgress: at {self.place:.3f} s of the plan, {percent:.0f} % of its speed, {self.mode}>"
+        return f"<MotionProgress: at {self.plan_time:.3f} s of the plan, {percent:.0f} % of its speed, {self.mode}>"

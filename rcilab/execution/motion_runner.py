@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 RunListener: TypeAlias = Callable[[Run, BaseException | None], None]
 """Called with the run of a motion and the error that ended it, or None."""
 
-_SPARE_CYCLES = 2000  # Room in the recorder for what comes before and after the motion itself.
+_SPARE_CYCLES = 2000  # Additional rows of the recorder, for the cycles before and after the motion.
 
 
 class MotionRunner:
@@ -40,12 +40,12 @@ class MotionRunner:
 
     Args:
         driver: The connection.
-        lock: Who may use it.
-        arm: What is configured on the robot.
-        realtime: False for a controller in lock-step, where timing means nothing.
+        lock: The lock of the connection.
+        arm: The configuration of the robot.
+        realtime: False for a controller in lock-step, which has no timing.
         state_timeout: Time without a state, while moving, that counts as a lost connection, [s].
         partner: See above.
-        record_all: Whether everything that the state has is recorded.
+        record_all: Whether runs store every field of the state.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class MotionRunner:
         self._listeners: tuple[RunListener, ...] = ()
 
     def on_run(self, listener: RunListener) -> Callable[[], None]:
-        """Calls a listener after every motion; returns what removes it.
+        """Adds a listener that is called after every motion; returns the function that removes it.
 
         Args:
             listener: Called in the thread that ran the motion, with its run and the error that ended it, or None.
@@ -104,7 +104,7 @@ class MotionRunner:
             Exception: An exception of the callback; the arm was stopped.
         """
         model = self._arm.model
-        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # It may be held.
+        time_needed = RECORD_TIME + (0.0 if plan is None else plan.duration)  # The motion may be held.
         capacity = math.ceil(time_needed / CYCLE_TIME) + _SPARE_CYCLES
         recorder = Recorder(model.n, capacity, complete=self._record_all)
         executor = MotionExecutor(

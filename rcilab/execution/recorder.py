@@ -17,11 +17,11 @@ from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.fault import FaultCode
 from rcilab.core.state import RobotState
 
-RECORD_TIME = 60.0  # [s] of cycles that a recorder keeps by default: longer than most motions, about 50 MB.
+RECORD_TIME = 60.0  # [s] Default capacity: longer than most motions, about 50 MB.
 _CYCLE_NS = round(CYCLE_TIME * 1e9)
 _NO_POSE = (math.nan,) * 16
 _NUMBERS = struct.Struct("<4d")
-_GRID_CYCLES = 8  # A clock shift of the controller, or a delay here, counts as lateness for at most so many cycles.
+_GRID_CYCLES = 8  # For so many cycles, a clock shift of the controller or a delay here counts as lateness.
 
 
 class Recorder:
@@ -29,9 +29,9 @@ class Recorder:
 
     Args:
         n: Number of joints.
-        capacity: Number of rows; when it is full the oldest row is overwritten.
-        buffer: Writable memory to use, such as a piece of a shared block; None allocates it.
-        complete: Whether rows hold everything that the state has.
+        capacity: Number of rows; a full recorder overwrites the oldest row.
+        buffer: Writable memory to use, such as a part of a shared block; None allocates it.
+        complete: Whether rows store every field of the state.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Recorder:
         self.complete = complete
         self.capacity = capacity
         self.count = 0
-        """Rows written since the beginning; the newest is number `count - 1`."""
+        """Number of rows written; the newest is number `count - 1`."""
         self._size = dtype.itemsize
         memory = bytearray(capacity * self._size) if buffer is None else buffer
         self._memory = memory
@@ -100,12 +100,12 @@ class Recorder:
         self.count += 1
 
     def repeat(self, message_id: int, received_ns: int, lateness: float, lost: int) -> None:
-        """Writes the newest row once more, for a cycle of which only this is another; it was not answered."""
+        """Writes a copy of the newest row with these values, for a cycle without an answer."""
         memory, size = self._memory, self._size
-        newest, place = (self.count - 1) % self.capacity * size, self.count % self.capacity * size
-        memory[place : place + size] = memory[newest : newest + size]
-        self._pack_start(memory, place, message_id, math.nan, received_ns, 0, lateness)
-        self._pack_lost(memory, place + self._lost_offset, lost)
+        newest, start = (self.count - 1) % self.capacity * size, self.count % self.capacity * size
+        memory[start : start + size] = memory[newest : newest + size]
+        self._pack_start(memory, start, message_id, math.nan, received_ns, 0, lateness)
+        self._pack_lost(memory, start + self._lost_offset, lost)
         self.count += 1
 
     @property
@@ -114,16 +114,16 @@ class Recorder:
         return self.count > self.capacity
 
     def rows(self, start: int = 0) -> NDArray[np.void]:
-        """Returns a copy of the rows that are still there, oldest first.
+        """Returns a copy of the rows that were not overwritten, oldest first.
 
         Args:
-            start: Number of the first row wanted; older ones are left out.
+            start: Number of the first row to return.
         """
         first = max(start, self.count - self.capacity, 0)
         return self._rows[np.arange(first, self.count) % self.capacity]
 
     def last(self, count: int) -> NDArray[np.void]:
-        """Returns a copy of the newest `count` rows (fewer when there are fewer), oldest first."""
+        """Returns a copy of the newest rows, at most `count`, oldest first."""
         return self.rows(self.count - count)
 
 
@@ -134,7 +134,7 @@ class CycleLog:
     This short history follows another computer's clock and a controller that skipped a cycle.
 
     Args:
-        recorder: Where rows go.
+        recorder: The recorder.
         on_row: Called after every row; must be quick.
         state_cycles: Cycles from one state to the next.
     """
@@ -146,7 +146,7 @@ class CycleLog:
         self._state_cycles = state_cycles
         self._on_row = on_row
         self.lateness = 0.0
-        """Lateness of the newest row, [s]; NaN when the loop did not wait for it."""
+        """Lateness of the newest row, [s]; NaN if the loop did not wait for it."""
         self.lost_total = 0
         """States that were not received."""
         self.state: RobotState | None = None
@@ -158,7 +158,7 @@ class CycleLog:
         self._nothing = (math.nan,) * recorder.n
         self._arrays_of = attrgetter(*STATE_FIELDS, *(OTHER_STATE_FIELDS[:-4] if recorder.complete else ()))
         self._numbers_of = attrgetter(*OTHER_STATE_FIELDS[-4:]) if recorder.complete else None
-        self._idle_count = -1  # What the recorder counted when the newest row was one of no motion, and ours.
+        self._idle_count = -1  # `recorder.count` after the newest row, if that was written here outside a motion.
 
     def restart(self) -> None:
         """Resets the grid and the last number for a new connection."""
@@ -175,15 +175,15 @@ class CycleLog:
         *,
         is_awaited: bool = True,
     ) -> None:
-        """Records one state and, where there was one, the answer to it.
+        """Records one state and its answer, if there was one.
 
         Args:
             state: The state.
-            received_ns: When it arrived, monotonic, [ns].
+            received_ns: Monotonic time of its arrival, [ns].
             t: Motion time, [s].
-            sent_ns: When it was answered, monotonic, [ns]; 0 when it was not.
-            command: What was sent in answer.
-            is_awaited: Whether the loop waited for it; the lateness of one that was already waiting is not known.
+            sent_ns: Monotonic time of the answer, [ns]; 0 without one.
+            command: The command sent as answer.
+            is_awaited: Whether the loop waited for it; the lateness of a state that was already queued is unknown.
         """
         before, self.state = self.state, state
         number = state.message_id

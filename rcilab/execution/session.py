@@ -1,4 +1,4 @@
-"""The session with one arm: the same object for a real robot, `connect`, and a simulated one, `simulate`."""
+"""The session with one arm: the same class for a real robot, `connect`, and a simulated one, `simulate`."""
 
 from __future__ import annotations
 
@@ -72,16 +72,16 @@ def connect(
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
 
     Args:
-        address: `rci://HOST:PORT`; `?udp_port=N` when the robot takes commands at another UDP port,
-            `?client_port=M` when it sends states to another port of ours; `?world_port=W` for `world`.
+        address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,
+            `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`.
         model: The arm, with its tool and load; None uses the arm that the controller reports. The tool is the
-            controller's: if it differs from the model's, a warning says so, and `robot.set_tool` sets yours.
+            controller's: a warning reports a difference from the model's, which `robot.set_tool` sets.
         timeout: Timeout of the connection, of the first state, and of every response, [s].
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
 
     Raises:
         ConnectionLostError: The robot does not respond, or states do not arrive; the message says what to check.
-        ModelError: The model is another arm than the controller's, or the controller's arm is not known.
+        ModelError: The model differs from the controller's arm, or that arm is not known.
         InvalidValueError: The address, the model or the timeout is not valid.
     """
     return open_session(address, model, timeout, record_all=record_all)
@@ -102,15 +102,15 @@ def open_session(
     """Returns a session as `connect` does, with further options for a simulation.
 
     Args:
-        address: See `connect`, as the next three.
+        address: See `connect`, also for the next three.
         model: The arm.
         timeout: [s].
         record_all: As for `connect`.
-        realtime: False for a controller in lock-step, where timing means nothing.
+        realtime: False for a controller in lock-step, which has no timing.
         state_timeout: Time without a state, while moving, that counts as a lost connection, [s]; None is
-            `STATE_TIMEOUT`, or `LOCAL_STATE_TIMEOUT` for a controller on this machine: there is no cable to lose, and a
-            busy machine pauses it.
-        on_close: Called once when the session is closed, such as to end a private controller.
+            `STATE_TIMEOUT`, or `LOCAL_STATE_TIMEOUT` for a controller on this machine, which pauses when the machine
+            is busy.
+        on_close: Called once when the session is closed, for example to end a private controller.
         world: The simulation control of a virtual robot; None without one.
         partner: Process id of a controller on this machine that is in lock-step with us; None: it is not.
     """
@@ -124,12 +124,12 @@ def open_session(
         model = driver.with_tool(model)
         if world is None and driver.simulation_address is not None:
             world = SimulationControl(*driver.simulation_address)
-        closing = ExitStack()
-        closing.callback(on_close)
+        exit_stack = ExitStack()
+        exit_stack.callback(on_close)
         if world is not None:
-            closing.callback(world.close)
-        closing.callback(driver.close)
-        lock = SessionLock(closing.close)
+            exit_stack.callback(world.close)
+        exit_stack.callback(driver.close)
+        lock = SessionLock(exit_stack.close)
         if state_timeout is None:
             state_timeout = LOCAL_STATE_TIMEOUT if driver.is_local else STATE_TIMEOUT
         arm = ConfiguredArm(model=model)
@@ -143,20 +143,20 @@ def open_session(
 
 
 class RobotSession(Closeable):
-    """A connected arm: its state, power, configuration, and motions at 1 kHz. Made by `connect` and `simulate`.
+    """A connected arm: its state, power, configuration, and motions at 1 kHz. Created by `connect` and `simulate`.
 
-    The commands of the maker's own protocol are in the attribute named like the scheme of its addresses:
+    The commands of the maker's protocol are in the attribute with the name of its address scheme:
     `robot.rci.set_filters(...)` for `rci://`.
 
     While a motion runs, `stop`, `close`, `state`, `power_off`, which ends the motion, and the commands that the
-    controller accepts during a motion may be called, from any thread and from a callback. Other calls are refused
-    without effect on the motion. A session stays usable after faults: call `recover()`.
+    controller accepts during a motion may be called, from any thread and from a callback. Other calls are refused and
+    do not affect the motion. A session remains usable after faults: call `recover()`.
 
     Args:
         driver: The connection.
-        arm: What is configured on the robot.
+        arm: The configuration of the robot.
         lock: The lock of the connection; closes it with the session.
-        runner: Runs motions on it.
+        runner: Runs motions on the connection.
         simulation: The simulation control of a virtual robot; None without a simulation port.
     """
 
@@ -175,12 +175,12 @@ class RobotSession(Closeable):
         self._simulation = simulation
         self._commands = driver.open_commands(arm, lock)
         self._streamed: tuple[MotionStream, SpeedOverride[bool]] | None = None
-        """The stream of the running `execute`."""
+        """Stream and speed override of the running `execute`."""
         with _sessions_lock:
             _sessions.add(self)
 
     def __getattr__(self, name: str) -> Any:
-        """Gives the maker's own commands by the scheme of its addresses."""
+        """Returns the commands of the maker's protocol for the name of its address scheme."""
         commands, scheme = self.__dict__.get("_commands"), ""
         if commands is not None:
             scheme = self._driver.scheme
@@ -190,7 +190,7 @@ class RobotSession(Closeable):
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}", name=name, obj=self)
 
     def __dir__(self) -> list[str]:
-        """Lists the maker's own commands, too, so that completion finds them."""
+        """Includes the name of the address scheme, for completion."""
         return sorted({*super().__dir__(), self._driver.scheme})
 
     @property
@@ -205,7 +205,7 @@ class RobotSession(Closeable):
 
     @property
     def safety_box(self) -> SafetyBox | None:
-        """The safety box of the tool, if this session has set one; motions are checked with it."""
+        """The safety box of the tool, if set in this session; motions are checked with it."""
         return self._arm.safety_box
 
     @property
@@ -222,14 +222,14 @@ class RobotSession(Closeable):
         """
         if self._simulation is None:
             raise UsageError(
-                f"{self._driver.name}: no world port is known; simulate() always has one, and connect() takes it "
+                f"{self._driver.name}: no simulation port is known; simulate() always has one, and connect() reads it "
                 "from the address: add ?world_port=PORT, which rcilab controller prints (world HOST:PORT)"
             )
         return self._simulation
 
     @property
     def world(self) -> SimulationControl:
-        """Short for `simulation`."""
+        """The same as `simulation`."""
         return self.simulation
 
     @property
@@ -239,11 +239,11 @@ class RobotSession(Closeable):
 
     @property
     def is_closed(self) -> bool:
-        """Whether it was closed; open a new one then."""
+        """Whether the session was closed."""
         return self._lock.is_closing
 
     def on_run(self, listener: RunListener) -> Callable[[], None]:
-        """Calls a listener with the result of every motion, as soon as it has ended; returns what removes it.
+        """Adds a listener that is called at the end of every motion; returns the function that removes it.
 
         Args:
             listener: Called in the thread that ran the motion, with its run and the error that ended it, or None.
@@ -253,8 +253,8 @@ class RobotSession(Closeable):
     @property
     def state(self) -> RobotState:
         """The newest state; inside a callback, the one passed to it."""
-        with self._lock.take_unless_moving() as is_mine:
-            if is_mine or self._driver.latest is None:
+        with self._lock.acquire_unless_moving() as is_acquired:
+            if is_acquired or self._driver.latest is None:
                 return self.receive_state()
         return self._driver.latest
 
@@ -269,7 +269,7 @@ class RobotSession(Closeable):
             UsageError: The session is closed, or a motion runs.
         """
         require_timeout(timeout)
-        with self._lock.take("receive_states"):
+        with self._lock.acquire("receive_states"):
             states = self._driver.poll(timeout)
         if not states:
             raise self._no_state(timeout)
@@ -280,17 +280,17 @@ class RobotSession(Closeable):
 
         Args:
             timeout: Timeout, [s].
-            max_age: Largest age of the state, [s]: a state that is certainly not older is returned without waiting. 0
-                accepts only one that is sent after the call.
+            max_age: Largest age of the state, [s]: a newest state that is not older is returned without waiting. 0
+                accepts only a state sent after the call.
 
         Raises:
             ConnectionLostError: No state was received.
-            UsageError: The session is closed, or a motion runs: `state` is the newest then.
+            UsageError: The session is closed, or a motion runs; `state` returns the newest state then.
         """
         require_timeout(timeout)
         if not as_number(max_age, "max_age", "s") >= 0.0:
             raise InvalidValueError("max_age", max_age, "must not be below 0 [s]")
-        with self._lock.take("receive_state"):
+        with self._lock.acquire("receive_state"):
             while self._driver.poll(0.0):
                 pass
             if self._driver.latest is not None and self._driver.age <= max_age:
@@ -302,28 +302,28 @@ class RobotSession(Closeable):
 
     def power_on(self) -> None:
         """Switches the motors on."""
-        with self._lock.take("power_on"):
+        with self._lock.acquire("power_on"):
             self._driver.power(True)
 
     def power_off(self) -> None:
         """Switches the motors off, which ends a running motion."""
-        with self._lock.take_unless_moving() as is_mine:
-            if is_mine:
+        with self._lock.acquire_unless_moving() as is_acquired:
+            if is_acquired:
                 self._driver.power(False)
                 return
         self._driver.power(False, alongside=True)
 
     def is_powered(self) -> bool:
         """Returns whether the motors are on."""
-        with self._lock.take("is_powered"):
+        with self._lock.acquire("is_powered"):
             return self._driver.is_powered()
 
     def set_tool(self, T_flange_tool: Pose) -> None:
-        """Sets the tool by its pose in the flange frame; `model` has it from then on."""
+        """Sets the tool by its pose in the flange frame; `model` includes it from then on."""
         self.configure(RobotConfiguration(tool=as_pose(T_flange_tool, "T_flange_tool")))
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
-        """Sets the load at the flange; `model` has it from then on.
+        """Sets the load at the flange; `model` includes it from then on.
 
         Args:
             mass: [kg], up to the arm's payload.
@@ -334,7 +334,7 @@ class RobotSession(Closeable):
         self._commands.set_load(mass, center_of_mass, inertia)
 
     def set_safety_box(self, box: SafetyBox) -> None:
-        """Sets the safety box that the origin of the tool must stay in, and whether it is active."""
+        """Sets the safety box of the tool's origin, and whether it is active."""
         self.configure(RobotConfiguration(box=require_box(box)))
 
     def set_output(self, signal: int, level: bool) -> None:
@@ -348,12 +348,12 @@ class RobotSession(Closeable):
         return self._commands.read_input(require_signal(signal, capabilities_of(self.model).inputs))
 
     def reboot(self) -> None:
-        """Restarts the controller. The session is closed then: connect again once the controller is up."""
+        """Restarts the controller and closes the session: connect again once the controller is ready."""
         require_feature(self.model, "reboot")
         self._commands.reboot()
 
     def configure(self, configuration: RobotConfiguration) -> None:
-        """Sends a configuration, part by part; after a refusal the parts before it are in force.
+        """Sends a configuration, part by part; after a refusal the earlier parts remain in effect.
 
         Raises:
             ModelError: The arm lacks a part.
@@ -373,20 +373,19 @@ class RobotSession(Closeable):
     ) -> Run:
         """Checks a motion by the conditions of the mode, streams it and returns its run.
 
-        From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` says how far it
-        is. In
-        torque mode the arm is compliant, see `rcilab.execution.command_builder`.
+        From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` returns its
+        progress. In torque mode the arm is compliant, see `rcilab.execution.command_builder`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.
-            certificate: From an earlier `check(motion, model, mode=mode)`; then only its validity is verified.
+            certificate: From an earlier `check(motion, model, mode=mode)`: only its validity is verified then.
             progress: Called with time and duration about 20 times a second.
             mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques.
             speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it later.
 
         Raises:
             InvalidValueError: The speed override is out of range; nothing moved.
-            PlanningError: With this override it would violate a condition; nothing moved.
+            PlanningError: With this override the motion would violate a condition; nothing moved.
             ConformanceError: The motion violates a condition; nothing moved.
             CertificateError: The certificate does not match; nothing moved.
             UsageError: The motion does not start at the arm's position; nothing moved.
@@ -428,8 +427,8 @@ class RobotSession(Closeable):
         return MotionProgress(
             time=cycle * CYCLE_TIME,
             duration=scaled.duration,
-            place=scaled.plan_time_at(cycle),
-            planned=scaled.motion.duration,
+            plan_time=scaled.plan_time_at(cycle),
+            plan_duration=scaled.motion.duration,
             speed_override=scaled.override,
             mode=override.mode,
         )
@@ -439,7 +438,7 @@ class RobotSession(Closeable):
 
         Raises:
             UsageError: No such motion runs.
-            PlanningError: It arrives before it could be held.
+            PlanningError: It ends before it could be held.
         """
         self._change_speed_override(0.0)
 
@@ -448,7 +447,7 @@ class RobotSession(Closeable):
         self.set_speed_override(speed_override)
 
     def set_speed_override(self, speed_override: float) -> None:
-        """Sets the speed override of the motion that `execute` runs in another thread, checked as the motion was.
+        """Sets the speed override of the motion that `execute` runs in another thread; the change is checked.
 
         Args:
             speed_override: 0.1 to 1.
@@ -462,7 +461,7 @@ class RobotSession(Closeable):
 
     def _change_speed_override(self, speed_override: float) -> None:
         if (streamed := self._streamed) is None:
-            raise UsageError("no motion of execute() runs whose speed override could change").coded("no_pace")
+            raise UsageError("no motion of execute() is running whose speed override could change").coded("no_pace")
         streamed[1].change(speed_override)
 
     def control(
@@ -475,22 +474,22 @@ class RobotSession(Closeable):
     ) -> Run:
         """Runs a callback in every controller cycle until it returns a command with `finished=True`.
 
-        The first command must be where the arm is, `JointPosition(state.q_c)` or
+        The first command must be the present position, `JointPosition(state.q_c)` or
         `CartesianPosition(state.T_base_tool_c)`; torques begin within one cycle's rate of zero. t counts controller
         cycles since the first call, in seconds, so a lost packet does not stretch time. With a filter or a limiter the
-        motion ends when what is sent has arrived at the last command.
+        motion ends when the sent command has reached the last one.
 
         A tool that starts outside its safety box may only move inwards, as with `execute`: the controller stops a
-        motion that moves farther out, or past a face that it did not start beyond.
+        motion that moves farther out, or through another face.
 
         Args:
-            callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, as the mode asks for.
+            callback: `(state, t) -> JointPosition | CartesianPosition | JointTorque`, depending on the mode.
             mode: Command mode.
-            cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the vendor's client has one at 100.
-                None sends them as they are.
+            cut_off: Cut-off frequency of a low-pass filter of the commands, [Hz]; the vendor's client uses 100. None:
+                no filter.
             rate_limit: Keeps the commands inside the limits of velocity, acceleration, jerk or torque rate: those of
-                the manual, or "sdk", the Cartesian ones of the vendor's limiter. Poses keep the tool's limits, which
-                need not be enough for the joints. None leaves all of it to the callback.
+                the manual, or "sdk", the Cartesian limits of the vendor's limiter. Poses keep the tool's limits, which
+                may not be enough for the joints. None: no limiter.
 
         Raises:
             ControlError: The controller stopped the motion; see `.faults` and `.run`, and call `recover()`.
@@ -508,11 +507,11 @@ class RobotSession(Closeable):
             return self._runner.run(callback, mode, filters=filters)
 
     def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
-        """Moves to joint angles by the manual's S profile and returns when the arm is there: the vendor's MOVEJ.
+        """Moves to joint angles by the manual's S profile and returns at the end: the vendor's MOVEJ.
 
         An arm whose maker has no such profile moves by "jerk_limited", see `plan_joint`. Unlike the vendor's, it starts
-        at the commanded angles; a move to the present angles ends at once; the speed has a range; the motion is checked
-        before it starts.
+        at the commanded angles, a move to the present angles ends at once, the speed is bounded, and the motion is
+        checked before it starts.
 
         Args:
             goal: Joint angles, shape (n,), [rad].
@@ -533,22 +532,22 @@ class RobotSession(Closeable):
             return self._runner.run(stream, "joint_position", motion)
 
     def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
-        """Moves the tool straight to a pose by the manual's S profile, and returns when it is there: MOVEL.
+        """Moves the tool on a line to a pose by the manual's S profile and returns at the end: MOVEL.
 
-        The wire carries poses, the controller computes the joints (Cartesian position mode); an arm without that mode
-        is sent the joint angles. Position, orientation and arm angle run in proportion, so a large turn on a short way
-        is fast. Where the tool only turns, the way is the angle about any axis; the vendor's agrees for base z only.
-        Identical start and goal, on which the vendor's never returns, end at once. What the joints would do is planned
-        and checked first.
+        The session sends poses, and the controller computes the joint angles (Cartesian position mode); an arm without
+        that mode receives joint angles. Position, orientation and arm angle run in proportion, so a large rotation on a
+        short line is fast. If the tool only rotates, the path is the angle about any axis; the vendor's is the same for
+        base z only. A move with identical start and goal, on which the vendor's never returns, ends at once. The joint
+        motion is planned and checked first.
 
         Args:
             goal: Pose of the tool in base.
-            speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1; of 1 rad/s and 2.5 rad/s^2 where the tool only turns.
-            psi: Arm angle of a 7-axis arm at the goal, [rad], 0 too; None leaves it to the controller, which holds it.
+            speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1; of 1 rad/s and 2.5 rad/s^2 if the tool only rotates.
+            psi: Arm angle of a 7-axis arm at the goal, [rad]; None: the controller holds its own.
             progress: Called with time and duration about 20 times a second.
 
         Raises:
-            PlanningError: A pose on the way is out of reach or singular; the message says where and why.
+            PlanningError: A pose on the path is out of reach or singular; the message contains the pose and the reason.
             ConformanceError: The joints would violate a condition; nothing moved.
             ControlError: The controller stopped it; call `recover()`.
         """
@@ -561,20 +560,20 @@ class RobotSession(Closeable):
     def move_c(
         self, via: Pose, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None
     ) -> Run:
-        """Moves the tool on the arc over `via` to a pose by the manual's S profile; returns when it is there: MOVEC.
+        """Moves the tool on the arc through `via` to a pose by the manual's S profile and returns at the end: MOVEC.
 
-        As the vendor's, the orientation turns from start to goal and that of `via` is ignored. Three positions on a
-        line are an error here, not a return value. For the rest see `move_l`.
+        As in the vendor's, the orientation changes from start to goal and that of `via` is ignored. Three positions on
+        a line raise an error. See also `move_l`.
 
         Args:
             via: A pose whose position lies on the arc.
             goal: Pose of the tool in base.
             speed: Part of 1 m/s and 2.5 m/s^2, 0.001 to 1.
-            psi: Arm angle of a 7-axis arm at the goal, [rad]; None leaves it to the controller, which holds it.
+            psi: Arm angle of a 7-axis arm at the goal, [rad]; None: the controller holds its own.
             progress: Called with time and duration about 20 times a second.
 
         Raises:
-            PlanningError: The positions make no circle, or a pose on the way is out of reach or singular.
+            PlanningError: The positions define no circle, or a pose on the path is out of reach or singular.
             ConformanceError: The joints would violate a condition; nothing moved.
             ControlError: The controller stopped it; call `recover()`.
         """
@@ -587,10 +586,10 @@ class RobotSession(Closeable):
     def stop(self, reason: str = ON_REQUEST) -> None:
         """Stops a running motion within the limits; `execute` or `control` then returns its run.
 
-        May be called from another thread or from a callback. Does nothing if no motion runs or is about to.
+        May be called from another thread or from a callback. Does nothing if no motion is being checked or is running.
 
         Args:
-            reason: Reason for `Run.stopped`; the first one counts.
+            reason: Value of `Run.stopped`; the first one counts.
         """
         self._lock.stop(reason)
 
@@ -599,16 +598,16 @@ class RobotSession(Closeable):
 
         Raises:
             ManualRecoveryError: The arm is too far outside its range or its safety box.
-            CommandRejectedError: The controller refuses; the message says what it waits for.
-            DeadlineError: It accepted, and the faults remained.
+            CommandRejectedError: The controller refuses; the message contains the reason.
+            DeadlineError: It accepted, but the faults remained.
         """
-        with self._lock.take("recover"):
+        with self._lock.acquire("recover"):
             self._driver.recover()
 
     def close(self) -> None:
         """Stops a running motion within the limits and ends the connection. May be called twice.
 
-        The call that runs the motion returns its run. From inside a callback, the connection ends with the motion.
+        The call that runs the motion returns its run. When called from a callback, the connection ends with the motion.
         """
         self._lock.close()
 
@@ -617,8 +616,8 @@ class RobotSession(Closeable):
 
     def _no_state(self, timeout: float) -> ConnectionLostError:
         return ConnectionLostError(
-            f"{self._driver.name}: no state within {timeout:g} s; look whether the controller runs and the cable is "
-            "in, then connect again"
+            f"{self._driver.name}: no state within {timeout:g} s; check that the controller is running and the cable "
+            "is connected, then connect again"
         )
 
     def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:

@@ -11,14 +11,14 @@ from rcilab.i18n.translator import Remark
 
 _CLOSED = Remark("the session was closed while a motion ran", "session_closed")
 _CLOSE_TIMEOUT = 10.0  # [s] for another thread to stop its motion; the slowest joint needs 0.4 s.
-_LOOK = 0.02  # [s] Longest wait for another thread's request before what that thread does is checked again.
+_POLL_PERIOD = 0.02  # [s] Between two checks while waiting for another thread's request.
 
 
 class SessionLock:
-    """Threads take it in turn for requests; while one runs a motion, only `stop` and `close` are accepted.
+    """Threads acquire it in turn for requests; while one runs a motion, only `stop` and `close` are accepted.
 
     Attributes:
-        is_closing: Whether it cannot be taken any more.
+        is_closing: Whether it can no longer be acquired.
 
     Args:
         disconnect: Ends the connection, once it is not in use; may be called twice.
@@ -28,24 +28,24 @@ class SessionLock:
         self.is_closing = False
         self._disconnect = disconnect
         self._busy = threading.RLock()  # Held by the thread that uses the connection.
-        self._mover: int | None = None  # The thread that runs a motion.
-        self._can_stop = False  # A motion is being checked, or runs.
-        self._reason: str | None = None  # Why the motion is to stop.
+        self._motion_thread: int | None = None  # The thread that runs a motion.
+        self._can_stop = False  # A motion is being checked or is running.
+        self._reason: str | None = None  # Why the motion is being stopped.
 
     @property
     def is_moving(self) -> bool:
         """Whether a motion runs, in any thread."""
-        return self._mover is not None
+        return self._motion_thread is not None
 
     def reason_to_stop(self, t: float) -> str | None:
-        """Returns why the running motion is to stop, or None; its control loop calls it in every cycle."""
+        """Returns the reason to stop the running motion, or None; its control loop calls this in every cycle."""
         if self.is_closing:
             return _CLOSED
         return self._reason
 
     @contextmanager
-    def take(self, what: str) -> Iterator[None]:
-        """Takes the connection: waits for another thread's request, not for a motion.
+    def acquire(self, what: str) -> Iterator[None]:
+        """Acquires the connection: waits for another thread's request, but not for a motion.
 
         Args:
             what: Purpose, for the error.
@@ -54,35 +54,35 @@ class SessionLock:
             UsageError: A motion runs, or the connection closes.
         """
         self._require_free(what)
-        while not self._busy.acquire(timeout=_LOOK):
+        while not self._busy.acquire(timeout=_POLL_PERIOD):
             self._require_free(what)
         try:
-            self._require_free(what)  # Also where the lock is ours: a callback has it too.
+            self._require_free(what)  # Also if this thread has the lock: a callback has it, too.
             yield
         finally:
             self._busy.release()
 
     @contextmanager
-    def take_unless_moving(self) -> Iterator[bool]:
-        """Takes the connection as `take` does, or gives False: a motion runs, or began while it was waited for.
+    def acquire_unless_moving(self) -> Iterator[bool]:
+        """Acquires the connection like `acquire`, or yields False if a motion is running or begins meanwhile.
 
         Raises:
             UsageError: The connection closes.
         """
-        is_mine = False
-        while not (self.is_moving or is_mine):
+        is_acquired = False
+        while not (self.is_moving or is_acquired):
             self._require_open()
-            is_mine = self._busy.acquire(timeout=_LOOK)
+            is_acquired = self._busy.acquire(timeout=_POLL_PERIOD)
         try:
-            yield is_mine and not self.is_moving
+            yield is_acquired and not self.is_moving
         finally:
-            if is_mine:
+            if is_acquired:
                 self._busy.release()
 
     @contextmanager
     def begin_motion(self, what: str) -> Iterator[None]:
-        """Takes the connection for a motion; a stop while it is still being checked counts. Raises as `take` does."""
-        with self.take(what):
+        """Acquires the connection for a motion; a stop counts from here on. Raises like `acquire`."""
+        with self.acquire(what):
             self._reason, self._can_stop = None, True
             try:
                 yield
@@ -91,17 +91,17 @@ class SessionLock:
 
     @contextmanager
     def move(self) -> Iterator[None]:
-        """Runs the motion of `begin_motion`: other uses are refused from here on, also by its callback."""
-        self._mover = threading.get_ident()
+        """Runs the motion of `begin_motion`: other requests, also those of its callback, are refused meanwhile."""
+        self._motion_thread = threading.get_ident()
         try:
             yield
         finally:
-            self._mover = None
+            self._motion_thread = None
             if self.is_closing:
                 self._disconnect()
 
     def stop(self, reason: str) -> None:
-        """Stops the motion that runs or is about to; does nothing without one.
+        """Stops the motion that is being checked or is running; does nothing without one.
 
         Args:
             reason: Reason for its run; the first one counts.
@@ -112,13 +112,13 @@ class SessionLock:
     def close(self) -> None:
         """Ends the connection once it is free; called from a callback, when the motion has ended."""
         self.is_closing = True
-        if self._mover == threading.get_ident():
+        if self._motion_thread == threading.get_ident():
             return
-        is_mine = self._busy.acquire(timeout=_CLOSE_TIMEOUT)
+        is_acquired = self._busy.acquire(timeout=_CLOSE_TIMEOUT)
         try:
             self._disconnect()
         finally:
-            if is_mine:
+            if is_acquired:
                 self._busy.release()
 
     def _require_open(self) -> None:
@@ -128,5 +128,6 @@ class SessionLock:
     def _require_free(self, what: str) -> None:
         self._require_open()
         if self.is_moving:
-            said = f"a motion is running already: no {what} meanwhile; let it end, or stop() it first"
-            raise UsageError(said).coded("moving")
+            raise UsageError(
+                f"{what} is not possible while a motion is running; wait for its end, or stop() it first"
+            ).coded("moving")

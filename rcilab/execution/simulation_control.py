@@ -3,8 +3,8 @@
     with rcilab.simulate(model, plant="mujoco") as robot:
         robot.world.push([0, 0, -20, 0, 0, 0], link=4, duration=0.5)
 
-It does not use the RCI: a virtual controller has a separate simulation port, a real one does not. Every method may be
-called from any thread, while a motion runs and from inside a callback, and returns when it is done.
+It uses a separate simulation port, which only virtual controllers have. Every method may be called from any thread,
+also while a motion runs and from a callback, and returns when the request is done.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from rcilab.sim.api import (
     encode_world_request,
 )
 
-TIMEOUT = LONGEST_STALL + 5.0  # [s] A controller that stalls on request answers afterwards; on a busy machine later.
+TIMEOUT = LONGEST_STALL + 5.0  # [s] A stalled controller responds after the stall, on a busy machine later.
 
 
 class SimulationControl(Closeable):
@@ -69,11 +69,11 @@ class SimulationControl(Closeable):
         self._socket: socket.socket | None = None
         self._reader = LineReader()
         self._last_id = 0
-        self._is_turned_away = False  # The last answer was to the connection and not to a request, and the last one.
+        self._is_refused = False  # Whether the server refused the connection with the last response.
 
     @property
     def address(self) -> str:
-        """Where the world port is, HOST:PORT."""
+        """Address of the simulation port, HOST:PORT."""
         return f"{self._address[0]}:{self._address[1]}"
 
     def push(
@@ -90,11 +90,11 @@ class SimulationControl(Closeable):
             wrench: Force and moment, base axes, shape (6,), [N, N m].
             link: Number of the link, from 1; None: the tool.
             point: Where the force acts, in the frame of the link (or the tool), shape (3,), [m]; None: at its origin.
-            duration: For how long, in the robot's own time, [s]; None: until `release`.
+            duration: Duration in the robot's time, [s]; None: until `release`.
             rise_time: Time in which the force rises, and falls at its end, [s]; 0: a step.
         """
-        place = None if point is None else _numbers(point, 3, "point", "m")
-        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, place, duration, rise_time))
+        at = None if point is None else _numbers(point, 3, "point", "m")
+        self.ask(Push(_numbers(wrench, 6, "wrench", "N, N m"), link, at, duration, rise_time))
 
     def release(self) -> None:
         """Removes the external force."""
@@ -109,11 +109,11 @@ class SimulationControl(Closeable):
         self.ask(SetInput(signal, level))
 
     def set_loop_back(self, on: bool = True) -> None:
-        """Wires every digital output to the input of the same number, or cuts these wires."""
+        """Connects every digital output to the input with the same number, or disconnects them."""
         self.ask(LoopBack(on))
 
     def set_auto_limit(self, on: bool = True) -> None:
-        """Makes commands stop inside the soft joint limits instead of raising a fault beyond them, or not."""
+        """Makes commands stop inside the soft joint limits instead of raising a fault beyond them."""
         self.ask(AutoLimit(on))
 
     def set_limits(self, table: str) -> None:
@@ -124,13 +124,13 @@ class SimulationControl(Closeable):
         """Simulates network faults.
 
         Args:
-            faults: The faults; None: none.
-            direction: "commands", "states" (and answers over TCP), or "both".
+            faults: The faults; None: no faults.
+            direction: "commands", "states" (and responses over TCP), or "both".
         """
         self.ask(Network(NetworkFaults() if faults is None else faults, direction))
 
     def stall(self, duration: float, after: float = 0.0, period: float | None = None) -> None:
-        """Stops the controller's clock for a while; a new call replaces an earlier request.
+        """Stops the controller's clock for a time; a new call replaces an earlier one.
 
         Args:
             duration: Duration, [s]; 0 cancels pending stalls.
@@ -140,11 +140,11 @@ class SimulationControl(Closeable):
         self.ask(StallClock(duration, after, period))
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Places a fixed box next to the arm, or moves the one of that name; MuJoCo only.
+        """Adds a fixed box next to the arm, or moves the box with that name; MuJoCo only.
 
         Args:
             name: Its name.
-            size: Edges along its own axes, shape (3,), [m].
+            size: Edge lengths along its axes, shape (3,), [m].
             pose: Its centre and orientation in base.
         """
         pose = as_pose(pose)
@@ -160,11 +160,11 @@ class SimulationControl(Closeable):
         self.ask(Floor(on))
 
     def set_walls(self, on: bool = True) -> None:
-        """Makes the faces of the active safety box solid for the links, wherever it is set, or not; MuJoCo only."""
+        """Makes the faces of the active safety box solid for the links; MuJoCo only."""
         self.ask(Walls(on))
 
     def mount(self, load: Payload | None) -> None:
-        """Attaches a physical load to the flange, independent of set_load; None: that of set_load again."""
+        """Attaches a physical load to the flange, independent of set_load; None: the load of set_load."""
         if load is None:
             self.ask(Mount())
             return
@@ -175,7 +175,7 @@ class SimulationControl(Closeable):
         """Returns the status of the simulation, which is not part of the robot's state."""
         answer = self.ask(GetStatus())
         if not isinstance(answer, WorldStatus):
-            raise ProtocolError(f"{self}: asked for the status, it answered {answer}")
+            raise ProtocolError(f"{self}: the response to a status request is {answer}")
         return answer
 
     def close(self) -> None:
@@ -187,11 +187,11 @@ class SimulationControl(Closeable):
         return "<World at {}:{}>".format(*self._address)
 
     def ask(self, request: WorldRequest) -> WorldAnswer:
-        """Returns the answer to a request.
+        """Returns the response to a request.
 
         Raises:
-            InvalidValueError: A value cannot be used; raised before anything is sent.
-            UsageError: The controller refuses; the message says why.
+            InvalidValueError: A value is not valid; nothing was sent.
+            UsageError: The controller refuses; the message contains the reason.
             ConnectionLostError: The simulation port does not exist or does not respond.
         """
         with self._lock:
@@ -203,16 +203,16 @@ class SimulationControl(Closeable):
             except (OSError, DecodeError) as error:
                 self._disconnect()
                 raise ConnectionLostError(
-                    f"{self} does not answer {request.name} ({error}); look whether the virtual controller still runs"
+                    f"{self} does not respond to {request.name} ({error}); check that the virtual controller is running"
                 ).coded("world_silent") from error
-            if self._is_turned_away:
+            if self._is_refused:
                 self._disconnect()
         if isinstance(answer, Refused):
             raise UsageError(plain_text(answer.reason)).coded(answer.code, **answer.facts)
         return answer
 
     def _connect(self) -> socket.socket:
-        if self._socket is not None and _is_over(self._socket):
+        if self._socket is not None and _is_closed(self._socket):
             self._disconnect()  # The server closed this idle connection in favour of another client.
         if self._socket is None:
             self._socket = socket.create_connection(self._address, self._timeout)
@@ -224,14 +224,14 @@ class SimulationControl(Closeable):
         deadline = time.monotonic() + self._timeout
         while True:
             if time.monotonic() > deadline:
-                raise TimeoutError("it answers other requests")
+                raise TimeoutError("it responds to other requests")
             data = connection.recv(65536)
             if not data:
                 raise ConnectionResetError("it closed the connection")
             for line in self._reader.feed(data):
                 number, answer = decode_world_answer(line)
-                self._is_turned_away = number == 0 and isinstance(answer, Refused)
-                if number == self._last_id or self._is_turned_away:
+                self._is_refused = number == 0 and isinstance(answer, Refused)
+                if number == self._last_id or self._is_refused:
                     return answer
 
     def _disconnect(self) -> None:
@@ -240,11 +240,11 @@ class SimulationControl(Closeable):
             self._socket = None
 
 
-def _is_over(connection: socket.socket) -> bool:
-    """Returns whether the other side has closed a connection on which no answer is awaited."""
-    look = select.poll()
-    look.register(connection, select.POLLIN)
-    return bool(look.poll(0))
+def _is_closed(connection: socket.socket) -> bool:
+    """Returns whether the server has closed an idle connection."""
+    poll = select.poll()
+    poll.register(connection, select.POLLIN)
+    return bool(poll.poll(0))
 
 
 def _numbers(value: ArrayLike, count: int, name: str, unit: str) -> tuple[float, ...]:

@@ -15,11 +15,11 @@ from rcilab.core.errors import RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.sim.api import WorldRequest, WorldStatus
 
-PERIOD = 0.3  # [s] between two polls of the status: as fast as a person reads it.
+PERIOD = 0.3  # [s] Of the status: as fast as a person can read it.
 
 
 class SimulationStatusPoller(Closeable):
-    """Uses one simulation port in a thread of its own.
+    """Uses one simulation port in a separate thread.
 
     Args:
         world: The simulation port; closed with this object.
@@ -31,14 +31,14 @@ class SimulationStatusPoller(Closeable):
         self._requests: deque[WorldRequest] = deque()
         self._error: RcilabError | None = None
         self._is_ending = False
-        self._is_asking = False
+        self._is_sending = False
         self.status: WorldStatus | None = None
-        """The last polled status; None before the first poll and without a response."""
-        self._thread = threading.Thread(target=self._run, name="world watch", daemon=True)
+        """The latest status; None before the first poll and without a response."""
+        self._thread = threading.Thread(target=self._run, name="simulation status", daemon=True)
         self._thread.start()
 
     def ask(self, request: WorldRequest) -> None:
-        """Queues a request and returns at once; it replaces a queued one of its kind."""
+        """Queues a request and returns at once; it replaces a queued one of the same kind."""
         with self._condition:
             self._requests = deque(other for other in self._requests if _kind(other) != _kind(request))
             self._requests.append(request)
@@ -46,11 +46,11 @@ class SimulationStatusPoller(Closeable):
 
     @property
     def is_settled(self) -> bool:
-        """Whether every request was sent; a status read afterwards includes them."""
+        """Whether all requests were sent, so that the next status includes them."""
         with self._condition:
-            return not self._requests and not self._is_asking
+            return not self._requests and not self._is_sending
 
-    def take_error(self) -> RcilabError | None:
+    def pop_error(self) -> RcilabError | None:
         """Returns the error of a request since the last call, or None."""
         with self._condition:
             error, self._error = self._error, None
@@ -61,7 +61,7 @@ class SimulationStatusPoller(Closeable):
         with self._condition:
             self._is_ending = True
             self._condition.notify()
-        self._thread.join(2.0)  # It may be waiting for a controller that hangs: then it ends after that.
+        self._thread.join(2.0)  # A controller that hangs may delay its end.
 
     def _run(self) -> None:
         while True:
@@ -70,7 +70,7 @@ class SimulationStatusPoller(Closeable):
                     self._condition.wait(PERIOD)
                 request = self._requests.popleft() if self._requests else None
                 is_ending = self._is_ending and request is None
-                self._is_asking = request is not None
+                self._is_sending = request is not None
             if is_ending:
                 self._world.close()
                 return
@@ -83,7 +83,7 @@ class SimulationStatusPoller(Closeable):
                 with self._condition:
                     self._error = error if request is not None else self._error
             with self._condition:
-                self._is_asking = False
+                self._is_sending = False
 
 
 def _kind(request: WorldRequest) -> tuple[str, object]:

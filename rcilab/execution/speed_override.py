@@ -1,4 +1,4 @@
-"""The speed override of a motion that is streamed: changes are planned here and handed to where its rows are read."""
+"""The speed override of a streamed motion: plans a change and replaces the rows that are still to be sent."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from rcilab.motion.speed_scaling import SpeedScaledMotion
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-LEADS = (120, 400, 1500, 5000)  # Cycles from now on which a change may begin: the time that planning it may take.
-HANDOVER = 40  # Cycles between now and the first row that is exchanged.
+LEADS = (120, 400, 1500, 5000)  # Cycles from now until a change begins: the time available for planning it.
+HANDOVER = 40  # Cycles from now to the first row that is replaced.
 
-_Handed = TypeVar("_Handed", covariant=True)
+_Result = TypeVar("_Result", covariant=True)
 
 
-class RowSink(Protocol[_Handed]):
-    """Where the rows of the motion in progress are streamed from."""
+class RowSink(Protocol[_Result]):
+    """The rows of the motion in progress."""
 
     def cycle(self) -> int:
-        """Returns the motion's cycle now.
+        """Returns the present cycle of the motion.
 
         Raises:
             UsageError: No motion is in progress.
         """
         ...
 
-    def switch(self, first: int, changed: SpeedScaledMotion) -> _Handed | None:
-        """Continues with the rows of a changed motion from a cycle on; None: too late for that."""
+    def switch(self, first: int, changed: SpeedScaledMotion) -> _Result | None:
+        """Continues with the rows of a changed motion from a cycle on; returns None if it is too late."""
         ...
 
     def was_refused(self) -> bool:
-        """Returns whether the last switch was refused after all."""
+        """Returns whether the last switch was refused later."""
         ...
 
 
@@ -55,7 +55,7 @@ class StreamRows:
         return self._stream.cycle
 
     def switch(self, first: int, changed: SpeedScaledMotion) -> bool | None:
-        """Continues with the rows of a changed motion; None: too late for that."""
+        """Continues with the rows of a changed motion; returns None if it is too late."""
         return self._stream.switch(first, changed.q[first:], holds=changed.is_held) or None
 
     def was_refused(self) -> bool:
@@ -63,16 +63,16 @@ class StreamRows:
         return False
 
 
-class SpeedOverride(Generic[_Handed]):
-    """Plans changes of speed for the motion in progress. Thread-safe; a change takes some 10 to 100 ms to plan.
+class SpeedOverride(Generic[_Result]):
+    """Plans changes of speed for the motion in progress. Thread-safe; planning a change takes 10 to 100 ms.
 
     Args:
-        rows: Where the motion's rows are streamed from.
+        rows: The rows of the motion.
     """
 
-    def __init__(self, rows: RowSink[_Handed]) -> None:
+    def __init__(self, rows: RowSink[_Result]) -> None:
         self._rows = rows
-        self._planning = threading.Lock()
+        self._lock = threading.Lock()
         self._model: RobotModel | None = None
         self._previous: SpeedScaledMotion | None = None  # Before the last change.
         self.motion: SpeedScaledMotion | None = None
@@ -80,32 +80,32 @@ class SpeedOverride(Generic[_Handed]):
         self.mode: Mode = "joint_position"
 
     def begin(self, motion: SpeedScaledMotion, model: RobotModel, mode: Mode) -> None:
-        """Registers a motion that begins."""
+        """Registers a new motion."""
         self.motion, self._previous, self._model, self.mode = motion, None, model, mode
 
-    def change(self, factor: float) -> _Handed:
-        """Continues at another part of the planned speed, from 0 (held) to 1; returns what the sink gave.
+    def change(self, factor: float) -> _Result:
+        """Changes the speed override, 0 (held) to 1; returns the result of `RowSink.switch`.
 
-        The change is planned along the path and checked by the conditions of the motion's mode before any of it is
-        streamed.
+        The change is planned on the path and checked by the conditions of the motion's mode before it is streamed.
 
         Raises:
-            PlanningError: There is no change within the limits from here; the motion goes on as it is.
+            PlanningError: The change is not possible within the limits from here; the motion continues unchanged.
             UsageError: No motion is in progress, or this machine is too busy to plan the change in time.
         """
         for lead in LEADS:
-            with self._planning:
+            with self._lock:
                 if self._rows.was_refused():
                     self.motion = self._previous
                 cycle = self._rows.cycle()
                 if self.motion is None or self._model is None:
-                    raise UsageError("no motion runs whose speed could change").coded("no_pace")
+                    raise UsageError("no motion is running whose speed override could change").coded("no_pace")
                 changed = plan_speed_override(self.motion, cycle + lead, factor, self._model, self.mode)
-                first = min(self._rows.cycle() + HANDOVER, changed.changed)  # What was to change before goes along.
-                handed = self._rows.switch(first, changed)
-                if handed is not None:
+                # Rows of an earlier change that has not begun are replaced, too.
+                first = min(self._rows.cycle() + HANDOVER, changed.changed)
+                result = self._rows.switch(first, changed)
+                if result is not None:
                     self._previous, self.motion = self.motion, changed
-                    return handed
+                    return result
         raise UsageError(
-            "this machine is too busy to change the speed of the motion in time; it goes on as it is"
+            "this machine is too busy to change the speed override in time; the motion continues unchanged"
         ).coded("too_busy")

@@ -1,4 +1,4 @@
-"""Whether a motion starts where the arm is."""
+"""Check of the start position of a motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rcilab.core.arrays import JointVector
 
 
 def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
-    """Returns why a motion cannot start here, as a sentence, or None if it starts at the arm's position.
+    """Returns a message if a motion does not start at the arm's position, or None.
 
     Args:
         start: Start of the motion, shape (n,), [rad].
@@ -26,8 +26,8 @@ def describe_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
     others = int((off > START_POSITION_TOLERANCE).sum()) - 1
     more = f" (and {others} more joint{'s' if others > 1 else ''})" if others else ""
     return (
-        f"the motion starts elsewhere than the arm is: joint {joint + 1} would start at "
-        f"{math.degrees(start[joint]):.4f} deg and stands at {math.degrees(q_c[joint]):.4f} deg, "
+        f"the motion does not start at the arm's position: joint {joint + 1} starts at "
+        f"{math.degrees(start[joint]):.4f} deg and is at {math.degrees(q_c[joint]):.4f} deg, "
         f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
         "plan the motion from robot.state.q_c, or move the arm to its start first: "
         "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"

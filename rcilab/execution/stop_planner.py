@@ -1,4 +1,4 @@
-"""Stop planners: one per type of command, from any point of a stream."""
+"""Stop planners, one per type of command: they stop from any point of a command stream."""
 
 from __future__ import annotations
 
@@ -25,38 +25,38 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 _JOINT_SHARE = 0.6  # Part of the joints' acceleration and jerk for a stop of the tool: the rest is for their motion.
-_STEP = 1e-6  # [rad] Of a difference.
-_SINGULAR = 1e-3  # Part of the largest singular value below which a direction counts as lost.
-_FLOOR = 1e-9  # So that a joint with nothing to do asks for no division by zero.
-_HISTORY = 3  # Commands that a third difference looks back to.
-_FAR = 1e3  # Position bounds that a Cartesian brake never meets: [m], [rad].
+_STEP = 1e-6  # [rad] Of a central difference.
+_SINGULAR = 1e-3  # Share of the largest singular value below which a direction counts as singular.
+_FLOOR = 1e-9  # Avoids a division by zero for a joint that does not move.
+_HISTORY = 3  # Previous commands in a third difference.
+_FAR = 1e3  # Position bounds that a Cartesian stop never reaches: [m], [rad].
 
 
 class StopPlanner(Protocol):
     """Stores the last commands and plans the stop. Owned by the control loop."""
 
     def begin(self, state: RobotState) -> None:
-        """Starts from the arm standing at its commanded state."""
+        """Starts from a stationary arm at its commanded state."""
         ...
 
     def remember(self, command: Any, cycle: int, state: RobotState) -> None:
-        """Stores a command that was sent in answer to a controller cycle's state."""
+        """Stores the command that was sent for a controller cycle."""
         ...
 
     def plan(self) -> Sequence[Command]:
-        """Returns the commands that stop within the limits, one per cycle after the last; at least one."""
+        """Returns the commands of a stop within the limits, one per following cycle; at least one."""
         ...
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns the violation when the last command is repeated although it still moved, or None."""
+        """Returns the violation if the arm stopped at the last command because it is repeated, or None."""
         ...
 
 
 class StreamStopPlanner:
     """Stops a stream of sampled coordinates.
 
-    The past is taken as the parabola through the last three samples: its continuation by a curve that keeps the
-    limits keeps them in backward differences too, because those are means of that curve's derivatives.
+    It continues the parabola through the last three samples with a curve inside the limits. The backward differences
+    are then inside the limits, too, because they are means of the curve's derivatives.
 
     Args:
         limits: Bounds of the coordinates.
@@ -68,7 +68,7 @@ class StreamStopPlanner:
         """The last three samples, each with the number of its cycle, oldest first."""
 
     def begin(self, *past: tuple[int, Array]) -> None:
-        """Starts from three samples, each with the number of its cycle, oldest first."""
+        """Starts from three samples with their cycle numbers, oldest first."""
         self.past = list(past)
 
     def remember(self, x: Array, cycle: int) -> None:
@@ -77,14 +77,14 @@ class StreamStopPlanner:
             self.past = [*self.past[-2:], (cycle, x)]
 
     def rows(self) -> Array:
-        """Returns the samples after the last until standstill, shape (N, n)."""
+        """Returns the samples after the last one until standstill, shape (N, n)."""
         near, ddq = self.differences()
         dq = near + ddq * ((self.past[-1][0] - self.past[-2][0]) * CYCLE_TIME / 2.0)
         rows = plan_stop(self._limits, self.last, dq, ddq).q
         return rows[1:] if len(rows) > 1 else rows
 
     def differences(self) -> tuple[Array, Array]:
-        """Returns the first and second divided difference of the last samples, shape (n,) each, per s and s^2."""
+        """Returns the first and second divided differences of the last samples, shape (n,), per s and s^2."""
         (t0, x0), (t1, x1), (t2, x2) = self.past
         near, far = (x2 - x1) / ((t2 - t1) * CYCLE_TIME), (x1 - x0) / ((t1 - t0) * CYCLE_TIME)
         return near, 2.0 * (near - far) / ((t2 - t0) * CYCLE_TIME)
@@ -100,7 +100,7 @@ class JointStopPlanner:
 
     Args:
         limits: Bounds of the joints.
-        period: Cycles from one command to the next, in which the last one is repeated.
+        period: Cycles between two commands; the last command is repeated meanwhile.
     """
 
     def __init__(self, limits: JointLimits, period: int = 1) -> None:
@@ -109,7 +109,7 @@ class JointStopPlanner:
         self._stream = StreamStopPlanner(limits)
 
     def begin(self, state: RobotState) -> None:
-        """Starts from the arm standing at its commanded angles."""
+        """Starts from a stationary arm at its commanded angles."""
         self._stream.begin(*((cycle, state.q_c) for cycle in (-3, -2, -1)))
 
     def remember(self, command: JointPosition, cycle: int, state: RobotState) -> None:
@@ -121,7 +121,7 @@ class JointStopPlanner:
         return [JointPosition(row) for row in self._stream.rows()]
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns the violation when the last command is repeated, or None."""
+        """Returns the violation if the last command is repeated, or None."""
         monitor = JointMonitor(self._limits)
         (before, first), *later = self._stream.past
         monitor.reset(first.tolist())
@@ -135,14 +135,14 @@ class JointStopPlanner:
 class CartesianStopPlanner:
     """Stops a commanded pose: position, rotation about the last orientation, and arm angle independently.
 
-    The controller also checks the joints that it computes, and they are often more restrictive: stopping a tool with
-    10 m/s^2 can exceed the limits of the elbow. Acceleration and jerk are therefore reduced to what the joints allow at
-    this configuration.
+    The controller also checks the joint angles that it computes, and they are often more restrictive: stopping a tool
+    with 10 m/s^2 can exceed the limits of the elbow. Acceleration and jerk are therefore reduced to what the joints
+    allow in this configuration.
 
     Args:
         limits: Bounds of the arm.
-        model: The arm, for what the joints allow.
-        period: Cycles from one command to the next, in which the last one is repeated.
+        model: The arm, for the limits of its joints.
+        period: Cycles between two commands; the last command is repeated meanwhile.
     """
 
     def __init__(self, limits: Limits, model: RobotModel, period: int = 1) -> None:
@@ -153,7 +153,7 @@ class CartesianStopPlanner:
         self._q = model.home
 
     def begin(self, state: RobotState) -> None:
-        """Starts from the arm standing at its commanded pose."""
+        """Starts from a stationary arm at its commanded pose."""
         still = CartesianPosition(state.T_base_tool_c)
         self._poses = [(cycle, still) for cycle in (-3, -2, -1)]
         self._q = state.q_c
@@ -175,16 +175,16 @@ class CartesianStopPlanner:
             past.append((cycle, np.concatenate((pose.T_base_tool[:3, 3], turn, [psi]))))
         stream = StreamStopPlanner(self._bounds())
         stream.begin(*past)
-        way: list[Command] = []
+        commands: list[Command] = []
         for row in stream.rows():
             T = np.eye(4)
             T[:3, :3] = rotation_matrix(row[3:6]) @ R
             T[:3, 3] = row[:3]
-            way.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
-        return way
+            commands.append(CartesianPosition(T, None if last.psi is None else last.psi + float(row[6])))
+        return commands
 
     def find_motion(self) -> LimitViolation | None:
-        """Returns the violation when the last command is repeated, or None. Joints are not computed."""
+        """Returns the violation if the last command is repeated, or None. The joints are not checked."""
         monitor = CartesianMonitor(self._limits)
         (before, first), *later = self._poses
         monitor.reset(Pose.from_matrix(first.T_base_tool), first.psi)
@@ -196,14 +196,14 @@ class CartesianStopPlanner:
         return _first_violation(monitor, lambda: monitor.step(pose, last.psi, self._period))
 
     def _bounds(self) -> JointLimits:
-        """Returns bounds of position, rotation and arm angle, seven coordinates, as if they were joints."""
+        """Returns the bounds of position, rotation and arm angle, seven coordinates, as those of joints."""
         c, psi = self._limits.cartesian, self._limits.arm_angle
         velocity = np.array([c.translation_velocity] * 3 + [c.rotation_velocity] * 3 + [1.0])
         acceleration = np.array([c.translation_acceleration] * 3 + [c.rotation_acceleration] * 3 + [1.0])
         jerk = np.array([c.translation_jerk] * 3 + [c.rotation_jerk] * 3 + [1.0])
-        if psi is not None:  # Without one the seventh coordinate stays at 0, where any bound will do.
+        if psi is not None:  # Without one the seventh coordinate stays at 0, and its bound has no effect.
             velocity[6], acceleration[6], jerk[6] = psi.velocity, psi.acceleration, psi.jerk
-        # The tool's bounds hold for the length of a vector, these here for each of its three coordinates.
+        # The tool's bounds apply to the length of a vector, these to each of its three coordinates.
         acceleration[:6] /= math.sqrt(3.0)
         jerk[:6] /= math.sqrt(3.0)
         needed, joint = _joint_shares(self._model, self._q), self._limits.joint
@@ -228,7 +228,7 @@ class TorqueStopPlanner:
         self._tau: JointVector = np.zeros_like(limits.torque_rate)
 
     def begin(self, state: RobotState) -> None:
-        """Starts without torque."""
+        """Starts at zero torque."""
         self._tau = np.zeros_like(self._step)
 
     def remember(self, command: JointTorque, cycle: int, state: RobotState) -> None:
@@ -237,11 +237,11 @@ class TorqueStopPlanner:
 
     def plan(self) -> Sequence[Command]:
         """Returns the torques of the stop."""
-        way = [JointTorque(self._tau)]
-        while way[-1].tau.any():
-            tau = way[-1].tau
-            way.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
-        return way
+        commands = [JointTorque(self._tau)]
+        while commands[-1].tau.any():
+            tau = commands[-1].tau
+            commands.append(JointTorque(np.sign(tau) * np.maximum(np.abs(tau) - self._step, 0.0)))
+        return commands
 
     def find_motion(self) -> LimitViolation | None:
         """Returns None: torques may be repeated."""
@@ -251,19 +251,19 @@ class TorqueStopPlanner:
 def _first_violation(
     monitor: JointMonitor | CartesianMonitor, repeat: Callable[[], list[LimitViolation]]
 ) -> LimitViolation | None:
-    """Returns what the first broken cycle of as many repetitions breaks as a third difference looks back to."""
+    """Returns the first violation in `_HISTORY` repetitions of the last command, or None."""
     for _ in range(_HISTORY):
         violations = [violation for violation in repeat() if violation.condition.order > 0]
-        if violations:  # Where a joint or the tool is, is no motion.
+        if violations:  # Positions are not checked.
             return violations[0]
     return None
 
 
 def _joint_shares(model: RobotModel, q: JointVector) -> Array:
-    """Returns how much of each joint's motion each coordinate of the tool asks for at most, shape (n, 7).
+    """Returns the largest motion of each joint per unit of each tool coordinate, shape (n, 7).
 
-    The absolute values of the inverse Jacobian, with the arm angle as seventh row where there is one; at a singularity
-    those of the least-squares inverse.
+    These are the absolute values of the inverse Jacobian, with the arm angle as seventh row if there is one; at a
+    singularity those of the least-squares inverse.
     """
     J = np.zeros((7, model.n))
     J[:6] = model.jacobian(q)

@@ -1,4 +1,4 @@
-"""The stream of a motion whose rows can be replaced while it runs: for speed override, pause, or a stop on its path."""
+"""Stream of a motion whose rows can be replaced while it runs: for speed override, pause, or a stop on its path."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rcilab.motion import plan_stop
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-SETTLING = 300  # Cycles that torque mode stays at its end: two time constants of the compliant arm.
+SETTLING = 300  # Cycles that torque mode stays at the end: two time constants of the compliant arm.
 
 
 class MotionStream:
@@ -27,7 +27,7 @@ class MotionStream:
 
     Args:
         rows: Joint angles, shape (N, n), [rad].
-        mode: How the arm is commanded.
+        mode: Command mode.
         model: The arm, with its tool and load.
         on_cycle: Called with the number of every cycle.
     """
@@ -44,9 +44,9 @@ class MotionStream:
         self._settling = SETTLING if mode == "torque" else 0
         self._on_cycle = on_cycle
         self.cycle = 0
-        """Of the newest command."""
+        """Cycle of the newest command."""
         self.held = 0
-        """Cycles for which the arm has been held; 0: it moves."""
+        """Number of cycles for which the arm has been held; 0: it moves."""
 
     def __call__(self, state: RobotState, t: float) -> Command:
         """Returns the command that answers a state."""
@@ -58,7 +58,7 @@ class MotionStream:
             self._on_cycle(cycle)
         rows, last = self._rows, len(self._rows) - 1
         row = cycle - self._first
-        # Rows that are still to come continue these: a held arm waits for them.
+        # With further rows to follow, the arm is held at the last one.
         self.held = row - last if row > last and (self._holds or self._next is not None) else 0
         is_over = not self._holds and self._next is None and row >= last + self._settling
         command = self._command(rows, min(row, last), state)
@@ -68,31 +68,30 @@ class MotionStream:
         """Replaces the following rows; returns False, without effect, if they do not continue the stream.
 
         Args:
-            first: Cycle of their first row, which must be ahead; they continue what is streamed until then.
+            first: Cycle of their first row, in the future; they must continue the present rows.
             rows: Shape (N, n), [rad].
             holds: Whether the arm is held in the last row, before the goal.
         """
-        if first <= self.cycle + 1 or not self._fits(first, rows):
+        if first <= self.cycle + 1 or not self._continues_stream(first, rows):
             return False
         self._next = (first, rows, holds)
         return True
 
-    def _fits(self, first: int, rows: JointPath) -> bool:
-        """Returns whether no joint would have to jump: the caller may have planned from outdated rows."""
-        begun, before, _ = self._next if self._next is not None else (math.inf, self._rows, False)
-        if first <= begun:
-            begun, before = self._first, self._rows
-        step = rows[0] - before[min(first - 1 - int(begun), len(before) - 1)]
+    def _continues_stream(self, first: int, rows: JointPath) -> bool:
+        """Returns whether rows continue the stream without a jump: the caller may have planned from outdated rows."""
+        start, before, _ = self._next if self._next is not None else (math.inf, self._rows, False)
+        if first <= start:
+            start, before = self._first, self._rows
+        step = rows[0] - before[min(first - 1 - int(start), len(before) - 1)]
         return bool((np.abs(step) <= CYCLE_TIME * self._model.limits.joint.velocity).all())
 
     def stop(self) -> None:
         """Stops from here, every joint as fast as its limits allow, and ends there.
 
-        For torque mode, without a commanded position to brake: the reference stops, and the torques make the arm follow
-        it.
+        For torque mode, which has no commanded position: the reference stops, and the torques make the arm follow it.
         """
         rows, k = self._rows, min(self.cycle - self._first, len(self._rows) - 1)
-        before, far = rows[max(k - 1, 0)], rows[max(k - 2, 0)]
-        dq, ddq = (rows[k] - before) / CYCLE_TIME, (rows[k] - 2.0 * before + far) / CYCLE_TIME**2
-        way = plan_stop(self._model.limits.joint, rows[k], dq, ddq).q
-        self._rows, self._first, self._holds, self._next = way, self.cycle, False, None
+        before, earlier = rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+        dq, ddq = (rows[k] - before) / CYCLE_TIME, (rows[k] - 2.0 * before + earlier) / CYCLE_TIME**2
+        stop = plan_stop(self._model.limits.joint, rows[k], dq, ddq).q
+        self._rows, self._first, self._holds, self._next = stop, self.cycle, False, None

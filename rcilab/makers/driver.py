@@ -102,14 +102,14 @@ class FaultReport:
 
 
 class RequestLock(Protocol):
-    """Decides who may send a request now; a session's `SessionLock`."""
+    """The lock of a connection: a session's `SessionLock`."""
 
-    def take(self, what: str) -> AbstractContextManager[None]:
-        """Takes the connection; raises UsageError while a motion runs."""
+    def acquire(self, what: str) -> AbstractContextManager[None]:
+        """Acquires the connection; raises UsageError while a motion is running."""
         ...
 
-    def take_unless_moving(self) -> AbstractContextManager[bool]:
-        """Takes the connection, or gives False while a motion runs."""
+    def acquire_unless_moving(self) -> AbstractContextManager[bool]:
+        """Acquires the connection, or yields False while a motion is running."""
         ...
 
     def close(self) -> None:

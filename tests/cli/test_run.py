@@ -53,7 +53,7 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
     captured = capsys.readouterr()
     assert captured.out == ""
     (line,) = captured.err.splitlines()
-    assert line.startswith("rcilab: the motion starts elsewhere than the arm is: joint ")
+    assert line.startswith("rcilab: the motion does not start at the arm's position: joint ")
     assert "plan_joint(robot.model, robot.state.q_c, motion.q[0])" in line
     assert "rcilab run --to-start" in line
 

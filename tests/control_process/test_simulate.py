@@ -86,7 +86,7 @@ def test_a_stale_certificate_is_refused(robot):
 def test_a_motion_that_starts_elsewhere_names_joint_angles_and_remedy(robot):
     elsewhere = np.array(MODEL.home)
     elsewhere[3] += math.radians(2.0)
-    with pytest.raises(UsageError, match=r"joint 4 would start at 62\.0000 deg and stands at 60\.0000 deg") as caught:
+    with pytest.raises(UsageError, match=r"joint 4 starts at 62\.0000 deg and is at 60\.0000 deg") as caught:
         robot.execute(plan_joint(MODEL, elsewhere, GOAL))
     assert "2 deg apart" in str(caught.value)
     assert "robot.state.q_c" in str(caught.value)

@@ -182,7 +182,7 @@ def test_a_missing_or_stale_certificate_is_refused_at_once(supervisor):
     with pytest.raises(CertificateError, match="checked for the mode cartesian_position"):
         supervisor.execute(gentle, check(gentle, MODEL, mode="cartesian_position").require().certificate)
     away = plan_joint(MODEL, GOAL, MODEL.home)
-    with pytest.raises(CertificateError, match=r"stands at .* plan the motion from robot\.state\.q_c") as caught:
+    with pytest.raises(CertificateError, match=r"and is at .* plan the motion from robot\.state\.q_c") as caught:
         supervisor.execute(away, check(away, MODEL).certificate)
     assert caught.value.changed == ("start state",)
 

@@ -33,7 +33,7 @@ def test_commands_that_were_all_lost_are_no_success(mode):
         if mode == "torque":
             motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1, law="torque_rate_limited")
         robot.world.set_network(NetworkFaults(loss=1.0), "commands")
-        with pytest.raises(ControlError, match=r"did not arrive.*played none of the commands"):
+        with pytest.raises(ControlError, match=r"did not reach its end.*executed none of the commands"):
             robot.execute(motion, mode=mode)
         assert np.array_equal(robot.state.q_c, MODEL.home) or mode == "torque"
 

@@ -56,7 +56,7 @@ def test_the_last_command_is_played_before_the_motion_ends(make_robot):
 
 def test_a_first_command_elsewhere_names_the_joint_and_both_angles(make_robot):
     peer, robot = make_robot()
-    with pytest.raises(InvalidValueError, match=r"joint 2 is commanded to .* deg and stands at 11\.4592 deg"):
+    with pytest.raises(InvalidValueError, match=r"joint 2 is commanded to .* deg and is at 11\.4592 deg"):
         robot.control(lambda state, t: JointPosition(state.q_c + np.array([0, 0.1, 0, 0, 0, 0, 0])))
     assert peer.commands == []
     assert isinstance(peer.requests[-1], rci.StopMove)
@@ -86,8 +86,8 @@ def test_a_first_arm_angle_that_is_the_arms_or_absent_is_sent(make_robot, psi):
             lambda q: JointPosition([0, 0, np.nan, 0, 0, 0, 0]),
             r"command at t = 0\.201 s: .*nan.* in joint 3: must be finite",
         ),
-        (lambda q: JointPosition(np.zeros(6)), r"needs \(7,\)"),
-        (lambda q: JointPosition([1.0, [2.0]]), "is not"),
+        (lambda q: JointPosition(np.zeros(6)), r"must have shape \(7,\)"),
+        (lambda q: JointPosition([1.0, [2.0]]), "must be an array"),
         (lambda q: q, "must be a JointPosition"),
         (lambda q: CartesianPosition(np.eye(4)), "must be a JointPosition"),
     ],

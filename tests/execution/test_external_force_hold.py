@@ -81,8 +81,8 @@ def test_a_lost_controller_is_told_once(push, world):
     world.error = ConnectionLostError("gone")
     push.hold(DOWN)
     errors = []
-    wait_for(lambda: errors.append(push.take_error()) or errors[-1] is not None)
-    assert push.take_error() is None
+    wait_for(lambda: errors.append(push.pop_error()) or errors[-1] is not None)
+    assert push.pop_error() is None
     assert world.asked == []
 
 

@@ -27,7 +27,7 @@ def test_a_callback_that_ends_at_speed_is_brought_to_rest_and_told_so(mode):
 
         with pytest.raises(
             InvalidValueError,
-            match=r"last command at t = .* is what standing still from there would take.*joint 2: .*acceleration",
+            match=r"last command at t = .* would be needed to stop there.*joint 2: .*acceleration",
         ):
             robot.control(swing, mode)
         state = robot.state
@@ -49,7 +49,7 @@ def test_a_pose_that_ends_at_speed_is_brought_to_rest_and_told_so():
 
         with pytest.raises(
             InvalidValueError,
-            match=r"last command at t = .* is what standing still from there would take.*acceleration",
+            match=r"last command at t = .* would be needed to stop there.*acceleration",
         ):
             robot.control(swing, "cartesian_position")
         assert robot.state.faults == ()

@@ -58,22 +58,22 @@ def test_a_motion_of_a_session_is_held_and_gone_on_with():
         wait_for(lambda: moved)
         with pytest.raises(InvalidValueError, match=r"speed.override"):
             robot.set_speed_override(0.01)
-        wait_for(lambda: robot.progress.place > 0.05)  # It moves by then.
+        wait_for(lambda: robot.progress.plan_time > 0.05)  # It moves by then.
         before = robot.progress
         assert before is not None
         assert (before.speed_override, before.mode) == (1.0, "joint_impedance")
         assert before.duration == pytest.approx(motion.duration, abs=CYCLE_TIME)
-        assert before.place == pytest.approx(before.time)
+        assert before.plan_time == pytest.approx(before.time)
         assert before.time >= moved[0]
         robot.pause()
         wait_for(lambda: not robot.state.dq_c.any())
         held = robot.progress
         assert held.speed_override == 0.0
-        assert before.place < held.place < held.time
+        assert before.plan_time < held.plan_time < held.time
         wait_for(lambda: robot.progress.time > held.time)
-        assert robot.progress.place == held.place
+        assert robot.progress.plan_time == held.plan_time
         robot.resume(0.7)
-        wait_for(lambda: robot.progress.place > held.place)
+        wait_for(lambda: robot.progress.plan_time > held.plan_time)
         assert robot.progress.speed_override == 0.7
         mover.join(30.0)
         assert robot.progress is None

@@ -26,7 +26,7 @@ def test_whoever_calls_in_mid_motion_is_refused_and_the_motion_goes_on(make_robo
     def disturb():
         for call in (robot.receive_state, robot.recover, robot.power_on, lambda: robot.rci.set_coor(Pose()),
                      lambda: robot.rci.set_filters(100, 100, 100), lambda: robot.control(wave(10))):  # fmt: skip
-            with pytest.raises(UsageError, match="a motion is running already") as caught:
+            with pytest.raises(UsageError, match="is not possible while a motion is running") as caught:
                 call()
             refused.append(caught.value)
         assert robot.state.message_id > 0

@@ -15,13 +15,13 @@ def test_a_request_waits_for_another_threads_turn() -> None:
     turns, seen = SessionLock(lambda: None), []
 
     def ask() -> None:
-        with turns.take("a question"):
+        with turns.acquire("a question"):
             seen.append("asked")
 
     asker = threading.Thread(target=ask)
     with turns.begin_motion("a motion"):
         asker.start()
-        with turns.take("its own question"):  # Who sets out may still ask.
+        with turns.acquire("its own question"):  # Who sets out may still ask.
             assert seen == []
     asker.join(5.0)
     assert seen == ["asked"]
@@ -30,9 +30,9 @@ def test_a_request_waits_for_another_threads_turn() -> None:
 def test_a_request_is_refused_while_a_motion_runs_in_its_own_thread_too() -> None:
     turns = SessionLock(lambda: None)
     with turns.begin_motion("a motion"), turns.move():
-        with pytest.raises(UsageError, match="no question meanwhile"), turns.take("question"):
+        with pytest.raises(UsageError, match="question is not possible"), turns.acquire("question"):
             pass
-    with turns.take("question"):
+    with turns.acquire("question"):
         assert not turns.is_moving
 
 
@@ -57,7 +57,7 @@ def test_a_motion_that_closes_its_own_connection_comes_to_its_end_first() -> Non
         assert turns.reason_to_stop(0.0) is not None
         assert said == []
     assert said == ["disconnected"]
-    with pytest.raises(UsageError, match="closed"), turns.take("question"):
+    with pytest.raises(UsageError, match="closed"), turns.acquire("question"):
         pass
 
 

@@ -145,7 +145,7 @@ def test_a_motion_whose_commands_are_all_lost_says_that_it_did_not_arrive(is_fre
     with simulate(MODEL, lockstep=not is_free) as robot:
         robot.power_on()
         robot.world.set_network(NetworkFaults(loss=1.0), direction="commands")
-        with pytest.raises(ControlError, match=r"joint 2 is 5\.73 deg from its end; .* played none of the commands"):
+        with pytest.raises(ControlError, match=r"joint 2 is 5\.73 deg away; .* executed none of the commands"):
             robot.move_j(MODEL.home + np.eye(MODEL.n)[1] * 0.1, speed=1.0)
 
 
@@ -174,7 +174,7 @@ def test_auto_limit_leads_a_command_to_rest_inside_the_soft_limit(robot):
     robot.rci.set_joint_limit(MODEL.limits.joint.lower, upper)
     robot.world.set_auto_limit()
     try:
-        with pytest.raises(ControlError, match=r"did not arrive: joint 1 is \d\.\d+ deg from its end; .* soft limits"):
+        with pytest.raises(ControlError, match=r"did not reach its end: joint 1 is \d\.\d+ deg away; .* soft limits"):
             robot.control(follow)
         reached = np.array(robot.state.q_c)
         assert start[0] + 0.03 < reached[0] < upper[0]
@@ -273,7 +273,7 @@ def test_a_controller_without_a_world_says_so_in_words():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         world = SimulationControl(*free.getsockname())
-        with pytest.raises(ConnectionLostError, match="does not answer status"):
+        with pytest.raises(ConnectionLostError, match="does not respond to status"):
             world.status()
 
 

@@ -281,7 +281,7 @@ def test_a_callback_and_another_thread_switch_outputs_and_ramp_a_force_while_the
         assert run.stopped is None
         assert seen[:2] == [(True, SafetyStop.NONE, True), (False, SafetyStop.NONE, True)]
         assert others[:4] == [True, False, True, False]
-        with pytest.raises(UsageError, match="a motion is running"):
+        with pytest.raises(UsageError, match="while a motion is running"):
             robot.control(lambda state, t: robot.rci.set_filters(100, 100, 100), "cartesian_impedance")
 
 
@@ -434,7 +434,7 @@ def test_motors_that_are_switched_off_end_a_motion_and_the_error_says_so(after):
         with connect(str(controller.address), MODEL) as robot:
             robot.power_on()
             cut = in_motion(robot, after, robot.power_off)
-            with pytest.raises(ControlError, match="motors were switched off while the motion ran"):
+            with pytest.raises(ControlError, match="motor power was switched off during the motion"):
                 robot.move_j(MODEL.home + 0.5, speed=0.05)
             cut.join()
             robot.power_on()

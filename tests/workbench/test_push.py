@@ -43,7 +43,7 @@ class FakePush:
     def release(self) -> None:
         self.held = None
 
-    def take_error(self):
+    def pop_error(self):
         error, self.error = self.error, None
         return error
 

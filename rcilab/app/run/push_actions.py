@@ -157,7 +157,7 @@ class PushActions:
             self._push.release()
         if acting is not None or state.push.acting is not None:
             self._store.update(push=replace(state.push, acting=acting))
-        error = None if self._push is None else self._push.take_error()
+        error = None if self._push is None else self._push.pop_error()
         if error is not None:
             self._grip = self._button = None
             self._store.say("bad", tell_error(error))

@@ -122,7 +122,7 @@ class WorldActions:
             self._store.update(world=WorldState())
         if self._watch is None:
             return
-        error = self._watch.take_error()
+        error = self._watch.pop_error()
         if error is not None:
             self._store.say("bad", tell_error(error))
         is_settled, world, said = self._watch.is_settled, self._store.state.world, self._watch.status

@@ -49,20 +49,20 @@ class RciSessionCommands(RciCommands):
 
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; the session's `model` has it from then on."""
-        with self._lock.take("SetCoor"):
+        with self._lock.acquire("SetCoor"):
             model = self._arm.model.with_tool(T_flange_tool)
             super().set_coor(T_flange_tool)
             self._arm.model = model
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
         """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
-        with self._lock.take("SetCartesianLimit"):
+        with self._lock.acquire("SetCartesianLimit"):
             super().set_cartesian_limit(box)
             self._arm.safety_box = box
 
     def set_collision_behavior(self, thresholds: ArrayLike) -> None:
         """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
-        with self._lock.take("SetCollisionBehavior"):
+        with self._lock.acquire("SetCollisionBehavior"):
             super().set_collision_behavior(thresholds)
             self._arm.collision_thresholds = as_vector(thresholds, self.n, "thresholds")
 
@@ -73,7 +73,7 @@ class RciSessionCommands(RciCommands):
             lower: Shape (n,), [rad], inside the arm's own range.
             upper: Shape (n,), [rad].
         """
-        with self._lock.take("SetJointLimit"):
+        with self._lock.acquire("SetJointLimit"):
             super().set_joint_limit(lower, upper)
             self._arm.model = self._arm.model.with_joint_limits(lower, upper)
 
@@ -85,7 +85,7 @@ class RciSessionCommands(RciCommands):
             center_of_mass: In the flange frame, shape (3,), [m].
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
-        with self._lock.take("SetLoad"):
+        with self._lock.acquire("SetLoad"):
             center = load_center(center_of_mass)
             load = Payload(mass=mass, center_of_mass=center, inertia=inertia)  # type: ignore[arg-type]
             model = self._arm.model.with_load(load)
@@ -102,15 +102,15 @@ class RciSessionCommands(RciCommands):
 
     def reboot(self) -> None:
         """Restarts the controller. The session is closed then: connect again once it is up."""
-        with self._lock.take("RebootRobot"):
+        with self._lock.acquire("RebootRobot"):
             super().reboot()
         self._lock.close()
 
     def _request(self, request: Request, timeout: float | None = None) -> Any:
         if request.code in WHILE_MOVING or request == SetMotorPower(0):
-            with self._lock.take_unless_moving() as is_mine:
+            with self._lock.acquire_unless_moving() as is_mine:
                 if is_mine:
                     return super()._request(request, timeout)
             return self._link.request_alongside(request, timeout)
-        with self._lock.take(type(request).__name__):
+        with self._lock.acquire(type(request).__name__):
             return super()._request(request, timeout)
