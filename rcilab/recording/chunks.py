@@ -1,10 +1,10 @@
-r"""A file of blocks with checksums: after a crash it can be read up to the last complete block.
+r"""A file of chunks with checksums: after a crash it can be read up to the last complete chunk.
 
     magic       8 bytes, b"\\x89RCIRUN\\n"
     version     u32
-    blocks      kind (4 ASCII letters), length of the payload (u32), CRC-32 of kind and payload (u32), payload
+    chunks      kind (4 ASCII letters), length of the payload (u32), CRC-32 of kind and payload (u32), payload
 
-All numbers are little-endian. Reading ends at the first block that is incomplete or has a wrong checksum. The kinds are
+All numbers are little-endian. Reading ends at the first chunk that is incomplete or has a wrong checksum. The kinds are
 described in `run_file.py`.
 """
 
@@ -25,7 +25,7 @@ _BLOCK = struct.Struct("<4sII")
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """One complete block."""
+    """One complete chunk."""
 
     kind: str
     payload: bytes
@@ -36,14 +36,14 @@ def encode_header() -> bytes:
     return _HEADER.pack(MAGIC, VERSION)
 
 
-def encode_block(kind: str, payload: bytes) -> bytes:
-    """Returns one block; `kind` has four letters."""
+def encode_chunk(kind: str, payload: bytes) -> bytes:
+    """Returns one chunk; `kind` has four letters."""
     name = kind.encode("ascii")
     return _BLOCK.pack(name, len(payload), zlib.crc32(name + payload)) + payload
 
 
-def decode_blocks(content: bytes, name: str) -> tuple[Chunk, ...]:
-    """Returns the blocks of a file up to the last complete one.
+def decode_chunks(content: bytes, name: str) -> tuple[Chunk, ...]:
+    """Returns the chunks of a file up to the last complete one.
 
     Args:
         content: Content of the file.
@@ -57,20 +57,20 @@ def decode_blocks(content: bytes, name: str) -> tuple[Chunk, ...]:
         problem = "is empty" if not content else "is not a run: rcilab did not write it, or its beginning is missing"
         raise InvalidValueError("run file", name, problem).coded("no_run", file=name)
     if len(content) < _HEADER.size:
-        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
+        raise InvalidValueError("run file", name, "ends before its first cycle; nothing was recorded in it").coded(
             "run_empty", file=name
         )
     _, version = _HEADER.unpack_from(content)
     if version != VERSION:
         advice = "read it with the rcilab that wrote it, and export it from there"
         raise VersionMismatchError(f"run file {name!r}", version, VERSION, advice)
-    blocks: list[Chunk] = []
+    chunks: list[Chunk] = []
     offset = _HEADER.size
     while offset + _BLOCK.size <= len(content):
         kind, length, checksum = _BLOCK.unpack_from(content, offset)
         payload = content[offset + _BLOCK.size : offset + _BLOCK.size + length]
         if len(payload) < length or zlib.crc32(kind + payload) != checksum:
             break
-        blocks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
+        chunks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
         offset += _BLOCK.size + length
-    return tuple(blocks)
+    return tuple(chunks)

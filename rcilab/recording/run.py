@@ -422,7 +422,7 @@ def build_run(
 
 
 def load_run(file: str | PathLike[str], *, max_rows: int = DEFAULT_MAX_ROWS) -> Run:
-    """Returns the run in a `.rcirun` file; of a truncated file, everything up to its last complete block.
+    """Returns the run in a `.rcirun` file; of a truncated file, everything up to its last complete chunk.
 
     Args:
         file: Path of the file.

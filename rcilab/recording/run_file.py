@@ -1,6 +1,6 @@
 """The file of a run, `.rcirun`: written while the arm moves, and readable even after a crash of the writer.
 
-The file is a sequence of blocks (`chunks.py`), in this order:
+The file is a sequence of chunks (`chunks.py`), in this order:
 
     HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia]} or null,
             "fields": [[name, numpy type, shape], ...] of one cycle, "bytes": its size,
@@ -11,13 +11,13 @@ The file is a sequence of blocks (`chunks.py`), in this order:
             a second PLAN follows the cycles, with the motion as executed; the last one is valid
     CYCL    u32 number of cycles, then zlib of their bytes, transposed: the first byte of every cycle, then the second
             byte of every cycle, and so on (adjacent bytes are then similar and compress to a quarter). Any number of
-            these blocks
+            these chunks
     TAIL    JSON: {"stopped": why the motion ended early or null, "stop_code": its code for other languages or "",
             "truncated": whether the beginning is missing, "paced": whether the speed override was changed during the
             motion}. A file without it is incomplete: after a crash, with a full disk, or because it is still being
             written
 
-All units are SI. A reader ignores blocks of other kinds.
+All units are SI. A reader ignores chunks of other kinds.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
-from rcilab.recording.chunks import Chunk, decode_blocks, encode_block, encode_header
+from rcilab.recording.chunks import Chunk, decode_chunks, encode_chunk, encode_header
 from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 ENDING = ".rcirun"
-BLOCK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
+CHUNK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
 
 _OPTIONAL_FIELDS = {"braking", *STATE_FIELDS}  # Not recorded by the first versions.
 _STOP_CODES = {
@@ -111,17 +111,17 @@ class RunWriter:
             "setup": (setup or Setup()).as_dict(),
             "report": None if report is None else report_facts(report),
         }
-        stream.write(encode_header() + encode_block("HEAD", json.dumps(head).encode()))
+        stream.write(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()))
         if plan is not None:
             self._write_plan(plan)
         stream.flush()
 
     def add(self, cycles: NDArray[np.void]) -> None:
-        """Adds cycles; they are written in blocks of `BLOCK_CYCLES`."""
+        """Adds cycles; they are written in chunks of `CHUNK_CYCLES`."""
         self._pending = np.concatenate([self._pending, cycles]) if len(self._pending) else cycles
-        while len(self._pending) >= BLOCK_CYCLES:
-            self._write(self._pending[:BLOCK_CYCLES])
-            self._pending = self._pending[BLOCK_CYCLES:]
+        while len(self._pending) >= CHUNK_CYCLES:
+            self._write(self._pending[:CHUNK_CYCLES])
+            self._pending = self._pending[CHUNK_CYCLES:]
         self._stream.flush()
 
     def finish(
@@ -132,7 +132,7 @@ class RunWriter:
         plan: Motion | None = None,
         has_speed_override: bool = False,
     ) -> None:
-        """Writes the remaining cycles and the last block.
+        """Writes the remaining cycles and the last chunk.
 
         Args:
             stopped: Why the motion ended early; None if it did not.
@@ -151,17 +151,17 @@ class RunWriter:
             "truncated": truncated,
             "paced": has_speed_override or plan is not None,
         }
-        self._stream.write(encode_block("TAIL", json.dumps(tail).encode()))
+        self._stream.write(encode_chunk("TAIL", json.dumps(tail).encode()))
         self._stream.flush()
 
     def _write_plan(self, plan: Motion) -> None:
         buffer = BytesIO()
         plan.save(buffer)
-        self._stream.write(encode_block("PLAN", buffer.getvalue()))
+        self._stream.write(encode_chunk("PLAN", buffer.getvalue()))
 
     def _write(self, cycles: NDArray[np.void]) -> None:
         planes = np.frombuffer(cycles.tobytes(), np.uint8).reshape(len(cycles), self._dtype.itemsize).T
-        self._stream.write(encode_block("CYCL", _ROWS.pack(len(cycles)) + zlib.compress(planes.tobytes(), 1)))
+        self._stream.write(encode_chunk("CYCL", _ROWS.pack(len(cycles)) + zlib.compress(planes.tobytes(), 1)))
 
 
 class RunFile:
@@ -237,7 +237,7 @@ def write_run(run: Run, stream: IO[bytes]) -> None:
 
 
 def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) -> R:
-    """Reads a `.rcirun` file, of a truncated one everything up to its last complete block.
+    """Reads a `.rcirun` file, of a truncated one everything up to its last complete chunk.
 
     Args:
         file: Path of the file.
@@ -260,14 +260,14 @@ def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) 
 
 def decode_content(content: bytes, name: str, max_rows: int, build: Callable[..., R]) -> R:
     """Reads the content of a `.rcirun` file; see `read_run`."""
-    blocks = decode_blocks(content, name)
-    if not blocks or blocks[0].kind != "HEAD":
-        raise InvalidValueError("run file", name, "ends before its first block; nothing was recorded in it").coded(
+    chunks = decode_chunks(content, name)
+    if not chunks or chunks[0].kind != "HEAD":
+        raise InvalidValueError("run file", name, "ends before its first cycle; nothing was recorded in it").coded(
             "run_empty", file=name
         )
-    require_rows(sum(_count_cycles(block) for block in blocks), max_rows, "run file", name)
+    require_rows(sum(_count_cycles(chunk) for chunk in chunks), max_rows, "run file", name)
     try:
-        return _build(blocks, max_rows, build)
+        return _build(chunks, max_rows, build)
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
     except (RcilabError, zlib.error, struct.error) as error:
@@ -291,24 +291,24 @@ def report_facts(report: Report) -> list[dict[str, Any]]:
     ]
 
 
-def _count_cycles(block: Chunk) -> int:
-    """Returns the number of cycles in the header of a block."""
-    return _ROWS.unpack_from(block.payload)[0] if block.kind == "CYCL" and len(block.payload) >= _ROWS.size else 0
+def _count_cycles(chunk: Chunk) -> int:
+    """Returns the number of cycles in the header of a chunk."""
+    return _ROWS.unpack_from(chunk.payload)[0] if chunk.kind == "CYCL" and len(chunk.payload) >= _ROWS.size else 0
 
 
-def _build(blocks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) -> R:
-    head = json.loads(blocks[0].payload)
+def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) -> R:
+    head = json.loads(chunks[0].payload)
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
     if dtype.itemsize > _LARGEST_ROW:
         raise ValueError(f"a cycle takes {dtype.itemsize} bytes, the maximum is {_LARGEST_ROW}")
     _layout_for(dtype)  # Checked before memory for the cycles is allocated.
-    parts = [_decode_cycles(block.payload, dtype) for block in blocks if block.kind == "CYCL"]
+    parts = [_decode_cycles(chunk.payload, dtype) for chunk in chunks if chunk.kind == "CYCL"]
     cycles = _to_current_layout(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
-    plans = [block.payload for block in blocks if block.kind == "PLAN"]
-    tails = [json.loads(block.payload) for block in blocks if block.kind == "TAIL"]
+    plans = [chunk.payload for chunk in chunks if chunk.kind == "PLAN"]
+    tails = [json.loads(chunk.payload) for chunk in chunks if chunk.kind == "TAIL"]
     tail = tails[-1] if tails else {}
     stopped = tail.get("stopped")
     if not isinstance(stopped, str | None):

@@ -1,4 +1,4 @@
-"""The arm behind the controller: a small protocol, and the arm that follows every setpoint exactly.
+"""The protocol of the arm behind the controller.
 
 Once a millisecond the controller hands its plant a `Setpoint` and gets a `Measurement` back. A plant knows neither
 sockets nor modes nor faults; it decides only how an arm answers a setpoint. Commands were checked before they come

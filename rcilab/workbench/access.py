@@ -63,7 +63,7 @@ def is_local(host: str) -> bool:
     """Returns whether only this machine can reach an address.
 
     Raises:
-        UsageError: It is not a valid token.
+        UsageError: It is not an address of this machine.
     """
     try:
         return is_loopback(host)

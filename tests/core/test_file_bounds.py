@@ -19,7 +19,7 @@ import rcilab
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.recording.chunks import encode_block, encode_header
+from rcilab.recording.chunks import encode_chunk, encode_header
 from tests.recording.runs import export_run, some_run
 
 MODEL = rcilab.load_model("xMatePro7")
@@ -35,8 +35,8 @@ def recording(path: Path) -> Path:
     rows = 900_000
     pack, zeros = zlib.compressobj(9), bytes(size * 1000)
     packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
-    block = encode_block("CYCL", struct.pack("<I", rows) + packed)
-    path.write_bytes(encode_header() + encode_block("HEAD", json.dumps(head).encode()) + 10 * block)
+    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed)
+    path.write_bytes(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()) + 10 * block)
     return path
 
 
@@ -49,8 +49,8 @@ def broad(path: Path) -> Path:
     rows = 1_000_000
     pack, zeros = zlib.compressobj(1), bytes(4096 * 1000)
     packed = b"".join(pack.compress(zeros) for _ in range(rows // 1000)) + pack.flush()
-    block = encode_block("CYCL", struct.pack("<I", rows) + packed)
-    path.write_bytes(encode_header() + encode_block("HEAD", json.dumps(head).encode()) + block)
+    block = encode_chunk("CYCL", struct.pack("<I", rows) + packed)
+    path.write_bytes(encode_header() + encode_chunk("HEAD", json.dumps(head).encode()) + block)
     return path
 
 

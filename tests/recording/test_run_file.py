@@ -17,10 +17,10 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
-from rcilab.recording.chunks import MAGIC, decode_blocks, encode_block, encode_header
+from rcilab.recording.chunks import MAGIC, decode_chunks, encode_chunk, encode_header
 from rcilab.recording.live import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run
-from rcilab.recording.run_file import BLOCK_CYCLES, RunFile, RunWriter, write_run
+from rcilab.recording.run_file import CHUNK_CYCLES, RunFile, RunWriter, write_run
 from rcilab.recording.run_html import run_html
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, export_run, some_cycles, some_run
 
@@ -58,11 +58,11 @@ def test_the_reason_of_a_stop_comes_back_with_its_code_from_earlier_files_too(is
 
 def without_stop_code(content: bytes) -> bytes:
     """A file as earlier versions wrote it."""
-    *head, tail = decode_blocks(content, "earlier")
+    *head, tail = decode_chunks(content, "earlier")
     facts = json.loads(tail.payload)
     del facts["stop_code"]
-    blocks = b"".join(encode_block(block.kind, bytes(block.payload)) for block in head)
-    return encode_header() + blocks + encode_block("TAIL", json.dumps(facts).encode())
+    blocks = b"".join(encode_chunk(block.kind, bytes(block.payload)) for block in head)
+    return encode_header() + blocks + encode_chunk("TAIL", json.dumps(facts).encode())
 
 
 def test_a_file_holds_the_plan_that_was_run_in_the_end_and_its_errors_are_right(tmp_path):
@@ -95,14 +95,14 @@ def test_a_file_cut_anywhere_opens_up_to_the_last_whole_block(tmp_path):
     whole = export_run(run, ".rcirun")
     ends = [at for at, _ in block_places(whole)]
     rows = [0, 0, 0, 0] + [
-        min(k * BLOCK_CYCLES, len(run.cycles)) for k in range(1, len(ends))
+        min(k * CHUNK_CYCLES, len(run.cycles)) for k in range(1, len(ends))
     ]  # Header, head, plan: none.
     places = sorted({p for end in ends for p in (end - 1, end, end + 1, end + 7)} | set(range(12, len(whole), 9973)))
     for cut in places:
         if cut >= len(whole):
             continue
         if cut < ends[1]:
-            with pytest.raises(InvalidValueError, match="ends before its first block"):
+            with pytest.raises(InvalidValueError, match="ends before its first cycle"):
                 decode_run(whole[:cut])
             continue
         back = decode_run(whole[:cut])
@@ -114,7 +114,7 @@ def test_a_file_cut_anywhere_opens_up_to_the_last_whole_block(tmp_path):
 
 @pytest.mark.parametrize("cut", [1, 7, 8, 11])
 def test_a_file_cut_in_its_header_says_so(cut):
-    with pytest.raises(InvalidValueError, match=r"rcilab did not write it|ends before its first block"):
+    with pytest.raises(InvalidValueError, match=r"rcilab did not write it|ends before its first cycle"):
         decode_run(export_run(some_run(), ".rcirun")[:cut])
 
 
@@ -124,7 +124,7 @@ def test_a_spoiled_byte_costs_what_comes_after_it_and_nothing_before():
     ends = [at for at, _ in block_places(bytes(content))]
     content[ends[3] + 40] ^= 1  # In the second block of cycles.
     back = decode_run(bytes(content))
-    assert back.cycles.tobytes() == run.cycles[:BLOCK_CYCLES].tobytes()
+    assert back.cycles.tobytes() == run.cycles[:CHUNK_CYCLES].tobytes()
     assert not back.is_complete
 
 
@@ -137,7 +137,7 @@ def test_what_was_written_before_a_crash_is_there(tmp_path):
     for start in range(0, len(run.cycles), 33):
         live.add(run.cycles[start : start + 33])
     crashed = rcilab.load_run(path)  # Nobody has closed it.
-    assert len(crashed.cycles) == len(run.cycles) // BLOCK_CYCLES * BLOCK_CYCLES
+    assert len(crashed.cycles) == len(run.cycles) // CHUNK_CYCLES * CHUNK_CYCLES
     assert not crashed.is_complete
     assert "cut off" in repr(crashed)
     ended = live.finish("on request")
@@ -171,8 +171,8 @@ def test_other_files_are_refused_in_words(tmp_path):
     for content, words in (
         (b"", "is empty"),
         (b"PK\x03\x04 a zip", "rcilab did not write it"),
-        (encode_header() + encode_block("HEAD", b"{}"), "is damaged"),
-        (encode_header() + encode_block("CYCL", b""), "ends before its first block"),
+        (encode_header() + encode_chunk("HEAD", b"{}"), "is damaged"),
+        (encode_header() + encode_chunk("CYCL", b""), "ends before its first cycle"),
     ):
         (tmp_path / "x.rcirun").write_bytes(content)
         with pytest.raises(InvalidValueError, match=words):
@@ -225,7 +225,7 @@ def test_a_block_that_lies_is_refused_in_words(kind, make, words):
     content = export_run(some_run(), ".rcirun")
     head_ends = block_places(content)[1][0]
     with pytest.raises(InvalidValueError, match=words):
-        decode_run(content[:head_ends] + encode_block(kind, make()))
+        decode_run(content[:head_ends] + encode_chunk(kind, make()))
 
 
 @pytest.mark.parametrize("delay", [1, 24, 42])
