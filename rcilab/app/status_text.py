@@ -105,14 +105,20 @@ def phase_code(status: SupervisorStatus) -> str:
 def _tell_loss(code: str, status: SupervisorStatus) -> Message:
     """Returns what has gone, of whom, and what to press; a lost connection to our own controller names no cable."""
     if code in _CRASHES:
-        pid = status.controller_pid if code == "crashed.controller" else status.worker_pid
-        return message(f"incident.{code}", next=message("incident.again" if pid is not None else "incident.press"))
+        return message(f"incident.{code}", next=message(_what_follows(status)))
     if code == "lost.other_arm":
         return message("incident.lost.other_arm", address=status.target)
     if status.target == "virtual":
         return message("incident.lost.virtual")
     known = code if code in _LOST else "lost.unreachable"
     return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")
+
+
+def _what_follows(status: SupervisorStatus) -> str:
+    """Returns the key of what comes next after the end of a process of ours."""
+    if status.incident is not None and status.incident.is_restarted:
+        return "incident.again"
+    return "incident.choose" if status.phase == "closed" else "incident.press"
 
 
 def tell_remedy(fault: FaultCode, text: Text) -> str:

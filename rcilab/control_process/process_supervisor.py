@@ -33,6 +33,8 @@ class ProcessExit:
     """One English sentence: which process ended, how, and what happens next."""
     is_worker: bool
     """Whether it was the control process: all pending requests are lost."""
+    is_restarted: bool = False
+    """Whether it is being started again."""
 
 
 class ProcessSupervisor:
@@ -203,7 +205,7 @@ class ProcessSupervisor:
                 start()
             except ConnectionLostError as error:
                 return replace(exited, message=str(error))
-        return exited
+        return replace(exited, is_restarted=again)
 
     def _end_controller(self) -> None:
         controller, self._controller = self._controller, None

@@ -77,6 +77,8 @@ class Incident:
     """Key of `MESSAGES`."""
     message: str
     """One English sentence."""
+    is_restarted: bool = False
+    """Whether it is the end of a process of ours that is being started again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -583,7 +583,7 @@ class Supervisor(Closeable):
         for exited in self._processes.reap():
             self._connecting = None
             self._crash = exited.code, exited.message
-            self._record_incident(*self._crash)
+            self._record_incident(*self._crash, is_restarted=exited.is_restarted)
             if exited.is_worker:
                 self._client.fail_all(ConnectionLostError(exited.message))
 
@@ -615,9 +615,9 @@ class Supervisor(Closeable):
             return "starting", "starting", MESSAGES["starting"]
         return "connecting", "connecting", MESSAGES["connecting"].format(address=self._processes.address)
 
-    def _record_incident(self, code: str, message: str) -> None:
+    def _record_incident(self, code: str, message: str, *, is_restarted: bool = False) -> None:
         number = 1 if self._incident is None else self._incident.number + 1
-        self._incident = Incident(number=number, code=code, message=message)
+        self._incident = Incident(number=number, code=code, message=message, is_restarted=is_restarted)
         self._loss_periods = _LOSS_PERIODS  # A loss is reported once.
 
     def _end_processes(self, reason: RcilabError) -> None:

@@ -14,6 +14,10 @@ from rcilab.app.view_actions import SetView
 from rcilab.i18n.translator import message
 from rcilab.i18n.units import USUAL
 
+_WRAPPED = """() => [...document.querySelectorAll('#root label')].filter((label) => label.offsetParent
+  && label.getBoundingClientRect().height > 1.5 * parseFloat(getComputedStyle(label).lineHeight))
+  .map((label) => label.textContent)"""
+
 
 def test_the_language_changes_everywhere_and_back(page):
     page.open_tab("Settings")
@@ -24,6 +28,21 @@ def test_the_language_changes_everywhere_and_back(page):
     page.tab.locator('[role="tab"][aria-selected="true"]', has_text="设置").wait_for()  # The tab stays open.
     choose(page, "语言", "English")
     page.tab.get_by_role("tab", name="Settings").wait_for()
+
+
+def test_every_label_of_the_chinese_page_is_on_one_line(page):
+    page.bench.dispatcher.ask(SetView(name="language", value="zh"))
+    for tab, group, label in (
+        ("目标", "", "四元数"),
+        ("配置", "到达软限位时", "auto_limit"),
+        ("运行", "数字输出与输入", "输出接到输入"),
+        ("设置", "", "关节坐标系"),
+    ):
+        page.open_tab(tab)
+        if group:
+            page.unfold(group)
+        page.tab.locator("label:visible", has_text=label).wait_for()
+        assert page.tab.evaluate(_WRAPPED) == []
 
 
 def test_a_warning_stays_beside_later_good_news_and_keeps_its_colour(page):

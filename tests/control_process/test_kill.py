@@ -87,7 +87,7 @@ def test_a_controller_killed_while_the_arm_rests_is_named_and_the_control_proces
             supervisor.power_off().wait(SOON)
         before = supervisor.status()
         os.kill(before.controller_pid, signal.SIGKILL)
-        wait_for(lambda: supervisor.status().incident)
+        assert wait_for(lambda: supervisor.status().incident).is_restarted
         status = wait_for_phase(supervisor, "idle")
         assert (status.incident.number, status.incident.code) == (1, "crashed.controller")
         assert "virtual controller has ended unexpectedly (signal 9" in status.incident.message
@@ -207,6 +207,7 @@ def test_what_dies_again_and_again_is_left_alone_until_somebody_restarts_it():
             os.kill(status.worker_pid, signal.SIGKILL)
             status = wait_for_phase(supervisor, "crashed")
         assert "3 times in a minute; use restart" in status.message
+        assert not status.incident.is_restarted
         supervisor.restart()
         assert supervisor.status().phase == "idle"
         assert supervisor.status().incident.number == 4

@@ -105,6 +105,20 @@ def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
     assert said.code == "incident.crashed.controller"
 
 
+@pytest.mark.parametrize(
+    ("phase", "is_restarted", "english"),
+    [
+        ("starting", True, "it is being started again"),  # It has no process id yet.
+        ("crashed", False, "press Start it again"),
+        ("closed", False, "choose once more what to connect to"),  # Where nothing is open there is no such button.
+    ],
+)
+def test_what_to_do_about_a_process_that_died_can_be_done(phase, is_restarted, english):
+    incident = Incident(number=1, code="crashed.controller", message="", is_restarted=is_restarted)
+    said = tell_incident(incident.code, incident.message, status(phase=phase, code=phase, incident=incident))
+    assert english in Text("en").render(said)
+
+
 class Power:
     """A robot side whose control process comes late and refuses power once."""
 

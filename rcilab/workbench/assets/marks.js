@@ -6,7 +6,7 @@
   "use strict";
   // .rl-NAME, an element of ours: "NAME" is the box around the one it is in, as viser wraps every control; "in-NAME" that.
   const NAMES = new Set(["anyone", "axes", "bare", "buttons", "choices", "exports", "held", "jogset", "joints",
-    "pairs", "poses", "ring", "rows", "setup-head", "strip", "ticks", "tools", "trios", "triples", "under", "wall", "worded"]);
+    "pairs", "poses", "ring", "rows", "setup-head", "strip", "tools", "trios", "triples", "under", "wall", "worded"]);
   const MARKERS = [...NAMES].map((name) => ".rl-" + name).join();
   const MANY = 7;  // Tabs: the main panel has eight, the others one or two.
   let root = null, marked = new Map();
@@ -31,7 +31,10 @@
         if (name === "bare") mark(outer.parentElement.closest(".mantine-Paper-root"), "around-bare");
       });
     });
-    root.querySelectorAll(".mantine-Flex-root > div:first-child").forEach((box) => { if (box.querySelector("label")) mark(box, "label"); });
+    root.querySelectorAll(".mantine-Flex-root > div:first-child").forEach((box) => { 
+      if (box.querySelector("label")) mark(box, "label");
+      if (box.parentElement.querySelector(".mantine-Checkbox-root")) mark(box, "of-tick");
+    });
     root.querySelectorAll("div > p > label:empty").forEach((label) => mark(label.parentElement.parentElement, "nameless"));
     root.querySelectorAll(".mantine-Paper-root").forEach((group) => {
       let before = group.previousElementSibling;

@@ -25,7 +25,6 @@ class ExtrasPanel:
         """Adds the switches."""
         self._switches: dict[Extra, BoundControl] = {}
         with gui.add_folder(self._text("extra.title")):
-            gui.add_html('<i class="rl-ticks"></i>')
             for extra in EXTRAS:
                 if extra == "elbow" and state.model.redundancy.kind != "arm_angle":
                     continue
