@@ -150,7 +150,7 @@ CHECK = ("check", "--model", "xMatePro7")
         (header, "a.npz", CHECK, "MB, unpacked, are more than 1024.0"),
         (slow, "a.npz", CHECK, "rows of 1 ms are more than 1000000"),
         (sparse, "a.csv", CHECK, "7000001 rows of 1 ms are more than 1000000"),
-        (wide, "a.csv", CHECK, "characters are more than a line has"),
+        (wide, "a.csv", CHECK, "allowed in a line"),
         (tall, "a.csv", CHECK, "rows of 1 ms are more than 1000000"),
     ],
 )
@@ -191,7 +191,7 @@ def test_what_is_meant_is_taken(tmp_path: Path):
 def test_a_program_that_takes_hours_is_refused_before_it_is_judged():
     there = (Waypoint.joint(MODEL.home + 0.1, dwell=600.0), Waypoint.joint(MODEL.home, dwell=600.0))
     program = Program(model=MODEL.name, start=MODEL.home, waypoints=there)
-    with pytest.raises(PlanningError, match="take fewer rounds or shorter dwells, or pass max_rows=12"):
+    with pytest.raises(PlanningError, match="use fewer rounds or shorter dwells, or pass max_rows=12"):
         rcilab.plan_program(MODEL, program)
     assert rcilab.plan_program(MODEL, program, max_rows=2 * DEFAULT_MAX_ROWS).duration > 1200.0
 
