@@ -48,7 +48,7 @@ def _condition(row: ConditionResult) -> dict[str, Any]:
         "bound": _finite(row.bound),
         "unit": row.unit,
         "ratio": _finite(row.ratio),
-        "place": row.place,
+        "place": row.location,
         "time": _finite(row.time),
         "source": row.source,
         "fault": None if row.fault is None else row.fault.manual_name,
@@ -58,7 +58,7 @@ def _condition(row: ConditionResult) -> dict[str, Any]:
 def _violation(violation: Violation) -> dict[str, Any]:
     return {
         "id": violation.condition.id,
-        "place": violation.place,
+        "place": violation.location,
         "time": _finite(violation.time),
         "value": _finite(violation.value),
         "bound": _finite(violation.bound),

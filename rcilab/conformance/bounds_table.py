@@ -1,4 +1,4 @@
-"""Conditions as a monitor evaluates them in every cycle: one value and two bounds for each axis."""
+"""Conditions as a table of bounds, which a monitor evaluates in every cycle."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ class BoundsTable:
     """Conditions with their bounds, one entry for each axis of each condition.
 
     Args:
-        rows: The conditions, in the order of the values that `evaluate` gets.
-        limits: Where their bounds come from.
+        rows: The conditions, in the order of the values passed to `evaluate`.
+        limits: Limits that define their bounds.
     """
 
     def __init__(self, rows: Iterable[Condition], limits: AnyLimits) -> None:
@@ -27,18 +27,18 @@ class BoundsTable:
             self._upper += upper.tolist()
 
     def evaluate(self, values: Sequence[float]) -> list[LimitViolation]:
-        """Returns what values break; every value has to be strictly between its bounds, which NaN never is.
+        """Returns the violations; every value must be strictly between its bounds, which NaN never is.
 
-        Every cycle evaluates some ninety numbers: one loop with both bounds is faster than two maps, and a keyword of
-        `zip` takes as long as five comparisons.
+        Every cycle evaluates about ninety numbers: one loop with both bounds is faster than two maps, and the keyword
+        argument of `zip` takes as long as five comparisons.
         """
         for lower, value, upper in zip(self._lower, values, self._upper):  # noqa: B905
             if not lower < value < upper:
-                return self.broken(values)
+                return self.violations(values)
         return []
 
-    def broken(self, values: Sequence[float]) -> list[LimitViolation]:
-        """Returns what values break; no values break nothing."""
+    def violations(self, values: Sequence[float]) -> list[LimitViolation]:
+        """Returns the violations of all values; missing values at the end are not checked."""
         bounds = zip(self._rows, values, self._lower, self._upper, strict=False)
         return [
             LimitViolation(row, axis, value, low if value <= low else high)

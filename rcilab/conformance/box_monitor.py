@@ -1,4 +1,4 @@
-"""The safety box, cycle by cycle, for motions that command no tool pose."""
+"""Check of the safety box, cycle by cycle, for modes without commanded tool poses."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
 
 class BoxMonitor:
-    """Checks where commanded joint angles bring the tool: the row "cartesian.position" alone.
+    """Checks the tool position at commanded joint angles by the row "cartesian.position".
 
     Owned by the thread that runs the cycle.
 
     Attributes:
-        excess: How far the tool was outside in the last step, [m]; below zero inside.
+        excess: Distance of the tool outside the box in the last step, [m]; negative inside.
 
     Args:
-        box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a
-            tool that starts outside.
+        box: The safety box; None, or an inactive box, is no bound; an `EntryBox` for a tool that starts outside.
         row: The condition; see `JointMonitor`.
     """
 
@@ -31,21 +30,21 @@ class BoxMonitor:
 
     @property
     def is_active(self) -> bool:
-        """Whether there is a box at all: without one the tool's position is not needed."""
+        """Whether there is a box; without one the tool's position is not needed."""
         return self._box is not None
 
     def step(self, position: Sequence[float]) -> list[LimitViolation]:
-        """Takes the commanded tool of this cycle and returns what it breaks.
+        """Checks the commanded tool position of this cycle and returns its violations.
 
         Args:
-            position: Origin of the tool in the base, three numbers, [m].
+            position: Position of the tool in base, three numbers, [m].
         """
         if self._box is not None:
             self.excess = self._box.excess(position)
-        return self.broken()
+        return self.violations()
 
-    def broken(self) -> list[LimitViolation]:
-        """Returns what the last step broke."""
+    def violations(self) -> list[LimitViolation]:
+        """Returns the violations of the last step."""
         if self.excess < BOX_TOLERANCE:
             return []
         return [LimitViolation(self._row, 0, self.excess, BOX_TOLERANCE)]

@@ -1,4 +1,4 @@
-"""The conditions on commanded tool poses, cycle by cycle, in plain floats."""
+"""Check of commanded tool poses, cycle by cycle, in plain floats."""
 
 from __future__ import annotations
 
@@ -8,39 +8,39 @@ from typing import TypeAlias
 
 from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.common_conditions import TOOL_CONDITIONS
-from rcilab.conformance.divided_differences import spans
+from rcilab.conformance.divided_differences import difference_times
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 
-_TURN = 2.0 * math.pi  # [rad]
+_FULL_TURN = 2.0 * math.pi  # [rad]
 Six: TypeAlias = tuple[float, float, float, float, float, float]
 Four: TypeAlias = tuple[float, float, float, float]
 
-_REST: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_NO_BOX = -1.0  # [m] Inside, when there is no box to be outside of.
+_ZERO: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_NO_BOX = -1.0  # [m] Excess if there is no box: inside.
 
 
 class CartesianMonitor:
-    """Checks one commanded tool pose a cycle, and the arm angle when one is commanded.
+    """Checks one commanded tool pose per cycle, and the arm angle if one is commanded.
 
     Owned by the thread that runs the cycle. Twist, acceleration and jerk are backward differences over one cycle in
-    base axes; translation and rotation are checked by their norms. An arm angle's differences are taken the short way
-    round, so that passing pi is not a jump. Behind a gap they are divided differences, as those of `JointMonitor`.
+    base axes; translation and rotation are checked by their norms. Differences of the arm angle are taken in the
+    shorter direction, so that passing pi is not a jump. After a gap they are divided differences, as in `JointMonitor`.
 
     Attributes:
         twist: Velocity of the tool, linear first, 6 floats, [m/s, rad/s].
         acceleration: Its backward difference, 6 floats, [m/s^2, rad/s^2].
         jerk: The acceleration's backward difference, 6 floats, [m/s^3, rad/s^3].
-        arm_angle: The arm angle and its first, second and third difference, [rad, rad/s, rad/s^2, rad/s^3]; None while
-            it is not commanded.
+        arm_angle: The arm angle and its first, second and third difference, [rad, rad/s, rad/s^2, rad/s^3]; None if it
+            is not commanded.
 
     Args:
         limits: Bounds of the tool and the arm angle.
-        box: Where the tool shall stay; None, or one that is not active, bounds nothing; an `EntryBox` for a tool
-            that starts outside. The monitor starts at standstill at the base; `reset` moves it.
+        box: The safety box; None, or an inactive box, is no bound; an `EntryBox` for a tool that starts outside. The
+            monitor starts at standstill at the base; `reset` sets another state.
         rows: The conditions, in the order of `TOOL_CONDITIONS`; see `JointMonitor`.
     """
 
@@ -52,32 +52,32 @@ class CartesianMonitor:
         self.reset(IDENTITY)
 
     def reset(self, pose: Pose, psi: float | None = None) -> None:
-        """Restarts the history: the tool stands at `pose`, the elbow at `psi`.
+        """Restarts the history at standstill at `pose` and `psi`.
 
         Args:
-            pose: Pose of the tool in the base.
-            psi: Arm angle, [rad]; None while it is not commanded.
+            pose: Pose of the tool in base.
+            psi: Arm angle, [rad]; None if it is not commanded.
         """
         self._pose = pose
         self._spacing = (1, 1)
-        self.twist: Six = _REST
-        self.acceleration: Six = _REST
-        self.jerk: Six = _REST
+        self.twist: Six = _ZERO
+        self.acceleration: Six = _ZERO
+        self.jerk: Six = _ZERO
         self.arm_angle: Four | None = None if psi is None else (psi, 0.0, 0.0, 0.0)
         self._values: tuple[float, ...] = self._signals(_NO_BOX)
 
     def step(self, pose: Pose, psi: float | None = None, cycles: int = 1) -> list[LimitViolation]:
-        """Takes the commanded pose of this cycle and returns what it breaks, in the order of the rows.
+        """Checks the commanded pose of this cycle and returns its violations, in the order of the rows.
 
-        A value that is not a number breaks every condition on it. The history advances in any case; after a violation
-        the caller has to `reset`.
+        NaN violates every condition on it. The history advances in any case; after a violation the caller must
+        `reset`.
 
         Args:
-            pose: Pose of the tool in the base.
-            psi: Arm angle, [rad]; None is not checked, and the next one counts as at standstill.
+            pose: Pose of the tool in base.
+            psi: Arm angle, [rad]; None is not checked, and the history of the next one starts at standstill.
             cycles: Cycles since the last step, 1 or more.
         """
-        times = spans(cycles, self._spacing)
+        times = difference_times(cycles, self._spacing)
         h, second, third = times
         self._spacing = (cycles, self._spacing[0])
         rotation, (x, y, z) = pose.parts
@@ -91,15 +91,15 @@ class CartesianMonitor:
         self._values = self._signals(_NO_BOX if self._box is None else self._box.excess(pose.parts[1]))
         return self._rows.evaluate(self._values)
 
-    def broken(self) -> list[LimitViolation]:
-        """Returns what the last step broke."""
-        return self._rows.broken(self._values)
+    def violations(self) -> list[LimitViolation]:
+        """Returns the violations of the last step."""
+        return self._rows.violations(self._values)
 
-    def _signals(self, outside: float) -> tuple[float, ...]:
-        """Returns the value of every row; `outside` is how far the tool is outside the box, [m]."""
+    def _signals(self, excess: float) -> tuple[float, ...]:
+        """Returns the value of every row; `excess` is the tool's distance outside the box, [m]."""
         angle = self.arm_angle or (0.0, 0.0, 0.0, 0.0)
         return (
-            outside,
+            excess,
             *angle,
             *_norms(self.twist),
             *_norms(self.acceleration),
@@ -118,15 +118,15 @@ def _norms(values: Six) -> tuple[float, float]:
     return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)
 
 
-def _arm_angle_differences(last: Four | None, psi: float | None, times: tuple[float, float, float]) -> Four | None:
+def _arm_angle_differences(previous: Four | None, psi: float | None, times: tuple[float, float, float]) -> Four | None:
     if psi is None:
         return None
-    if last is None:
+    if previous is None:
         return psi, 0.0, 0.0, 0.0
-    step = psi - last[0]
+    step = psi - previous[0]
     if not -math.pi <= step <= math.pi and math.isfinite(step):
-        step = math.remainder(step, _TURN)
+        step = math.remainder(step, _FULL_TURN)
     first, second, third = times
     dpsi = step / first
-    ddpsi = (dpsi - last[1]) / second
-    return psi, dpsi, ddpsi, (ddpsi - last[2]) / third
+    ddpsi = (dpsi - previous[1]) / second
+    return psi, dpsi, ddpsi, (ddpsi - previous[2]) / third

@@ -1,4 +1,4 @@
-"""The proof that a motion was checked: for this motion, this arm, this start, and no other."""
+"""The proof that a motion was checked for one arm and one start."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 
 NO_SAFETY_BOX = "none"
-"""The part of a certificate for a motion that was checked without a safety box."""
+"""Certificate part of a motion that was checked without a safety box."""
 NOT_CHECKED = "not judged"  # The text is part of certificates in saved runs.
-"""The part of a certificate for a motion whose distances were not checked: no hand-off accepts it."""
+"""Certificate part of a motion whose distances were not checked; such a motion cannot be executed."""
 
 MODEL_PARTS = ("model", "limits", "tool", "load")
 
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What a conforming motion was checked with, by fingerprint. A plain value that can be sent between processes."""
+    """Fingerprints of all inputs of the check of a conforming motion. A plain value, to be sent between processes."""
 
     entries: tuple[tuple[str, str], ...]
     """Name and fingerprint of each part."""
@@ -57,17 +57,17 @@ class Certificate:
         distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
     ) -> None:
-        """Makes sure that this certificate is for this motion on this arm from this start.
+        """Requires that this certificate is for this motion on this arm from this start.
 
         Args:
-            motion: The motion that is about to run.
-            model: The arm as it is now, with its tool and load.
-            start_q: Commanded joint angles now (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
-            box: The safety box that is in force now. Without an active one, a motion that was checked inside a box is
-                accepted too.
-            distance: How far the links must stay from each other and from the floor here; None accepts the one it
-                was checked with. A motion whose distances were not checked is refused.
-            mode: How the motion is about to be commanded; each mode has its own conditions.
+            motion: The motion to run.
+            model: The arm, with its current tool and load.
+            start_q: Current commanded joint angles (`state.q_c`), shape (n,), [rad]; or a StartState for a moving arm.
+            box: The safety box that is set. Without an active one, a motion that was checked inside a box is accepted
+                too.
+            distance: Required distances of the links from each other and from the floor; None accepts those of the
+                check. A motion whose distances were not checked is refused.
+            mode: Mode in which the motion will run; each mode has its own conditions.
 
         Raises:
             CertificateError: Something differs from the check; `.changed` and the message name it.
@@ -76,10 +76,10 @@ class Certificate:
         require_motion(motion)
         require_model(model)
         start = as_start(start_q, len(self.start_q)) if motion.n == len(self.start_q) else None
-        now = {"motion": ""}
+        current = {"motion": ""}
         if start is not None:
-            now = dict(issue_certificate(motion, model, start, box, distance, mode).entries)
-        changed = [name for name, fingerprint in self.entries if now.get(name, fingerprint) != fingerprint]
+            current = dict(issue_certificate(motion, model, start, box, distance, mode).entries)
+        changed = [name for name, fingerprint in self.entries if current.get(name, fingerprint) != fingerprint]
         if start is not None and "start state" in changed and self._same_start(start):
             changed.remove("start state")
         if "safety box" in changed and active_box(box) is None:
@@ -95,37 +95,37 @@ class Certificate:
         return f"<Certificate {self.digest[:8]} for motion {self.parts['motion'][:8]}>"
 
     def _same_start(self, start: StartState) -> bool:
-        near = np.abs(start.q - np.array(self.start_q)).max() <= START_POSITION_TOLERANCE
-        still = StartState(np.array(self.start_q), start.dq, start.ddq)
-        return bool(near) and self.parts["start state"] == _start_fingerprint(still)
+        is_near = np.abs(start.q - np.array(self.start_q)).max() <= START_POSITION_TOLERANCE
+        moved = StartState(np.array(self.start_q), start.dq, start.ddq)
+        return bool(is_near) and self.parts["start state"] == _start_fingerprint(moved)
 
     def _reason(self, changed: list[str], start: StartState | None, mode: Mode) -> str:
         if changed == ["start state"] and start is not None:
-            off = start.q - np.array(self.start_q)
-            i = int(np.abs(off).argmax())
-            if abs(off[i]) > START_POSITION_TOLERANCE:
+            offset = start.q - np.array(self.start_q)
+            i = int(np.abs(offset).argmax())
+            if abs(offset[i]) > START_POSITION_TOLERANCE:
                 return (
                     f"the motion was checked from another start: joint {i + 1} is commanded to "
-                    f"{degrees(start.q[i]):.4f}° now, the motion starts from {degrees(self.start_q[i]):.4f}°; "
-                    f"plan it again from where the arm is (state.q_c)"
+                    f"{degrees(start.q[i]):.4f}°, the motion starts at {degrees(self.start_q[i]):.4f}°; "
+                    f"plan it again from the arm's commanded position (state.q_c)"
                 )
-            return "the motion was checked from another start: the arm moves differently now; plan it again"
+            return "the motion was checked from another start: the velocity of the arm has changed; plan it again"
         if changed == ["mode"]:
             return (
-                f"the motion was checked for the mode {self.parts['mode']}, and is about to run in the mode {mode}, "
+                f"the motion was checked for the mode {self.parts['mode']}, not for the mode {mode}, "
                 f"which has other conditions; check it again with mode={mode!r}"
             )
         if changed == ["safety box"]:
             return (
-                "the certificate is stale: it does not cover the safety box that is in force; check the motion again "
-                "with box=..., the one that robot.set_safety_box was given"
+                "the certificate is stale: it does not cover the safety box that is set; check the motion again "
+                "with box=..., the box passed to robot.set_safety_box"
             )
         if changed == ["safety distance"]:
             if self.parts["safety distance"] == NOT_CHECKED:
                 return "collisions were not checked: check the motion again, without distance=None"
             return (
-                "the certificate is stale: it does not cover the safety distance that is asked for here; check the "
-                "motion again with that distance=..."
+                "the certificate is stale: it does not cover the required safety distance; check the motion "
+                "again with that distance=..."
             )
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
@@ -140,11 +140,11 @@ def issue_certificate(
     distance: ClearanceLimit | None = None,
     mode: Mode = "joint_position",
 ) -> Certificate:
-    """Returns the certificate of a motion; only a report that is ok may hand it out."""
-    prints = model.fingerprint
+    """Returns the certificate of a motion; only for a report that is ok."""
+    fingerprints = model.fingerprint
     parts = {
         "motion": motion.fingerprint,
-        **{name: prints[name] for name in MODEL_PARTS},
+        **{name: fingerprints[name] for name in MODEL_PARTS},
         "safety box": _box_fingerprint(box),
         "safety distance": _distance_fingerprint(distance),
         "mode": mode,
@@ -175,7 +175,7 @@ def _distance_fingerprint(distance: ClearanceLimit | None) -> str:
 
 
 def _box_fingerprint(box: SafetyBox | None) -> str:
-    bound = active_box(box)
-    if bound is None:
+    active = active_box(box)
+    if active is None:
         return NO_SAFETY_BOX
-    return hashlib.sha256(repr((bound.size, bound.T_base_box.as_row_major())).encode()).hexdigest()
+    return hashlib.sha256(repr((active.size, active.T_base_box.as_row_major())).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""The check of a whole motion at once: the controller's arithmetic, vectorised."""
+"""Check of a whole motion, with the controller's arithmetic in vectorised form."""
 
 from __future__ import annotations
 
@@ -42,35 +42,35 @@ def check(
 ) -> Report:
     """Checks a motion against the conditions of its robot's controller, and the distances between its links.
 
-    Every row of the 1 ms grid is checked by backward differences, as the controller does it: the arm comes from the
-    start state, and after the last row the controller holds it. For a moving arm row 0 is the command that it
-    already has, and row 1 the first new one. Torques, which the manual recommends to bound, are those of the model
-    with its tool and load and without gravity, as the manual counts commanded torques (4.4).
+    Every row of the 1 ms grid is checked by backward differences, as by the controller: before the first row the arm is
+    in the start state, and after the last row the controller holds it. For a moving arm row 0 is the last command, and
+    row 1 the first new one. Torques, for which the manual recommends bounds, are those of the model with its tool and
+    load and without gravity, as the manual defines commanded torques (4.4).
 
-    No controller checks for collisions, so the rows on distances are rcilab's own: links that touch each other or the
-    floor are refused, 20 mm are recommended. Distances are those between capsules, computed so often that no point of a
-    link moves more than 5 mm in between, and in every cycle near a bound. They take most of the time.
+    No controller checks for collisions, so the rows on distances are rcilab's own: contact of links with each other or
+    the floor violates a necessary condition, less than 20 mm a recommended one. Distances are those between capsules,
+    computed so often that no point of a link moves more than 5 mm in between, and in every cycle near a bound. They
+    take most of the time.
 
-    By default the angles themselves are commanded. In Cartesian modes the tool's poses and arm angles that follow
-    from them are: tool, arm angle, singularity and the joint angles of the poses are checked. In torque mode the
-    torques that make the arm follow are commanded: the torques and the arm's range are checked.
+    By default joint angles are commanded. In Cartesian modes the corresponding poses of the tool and arm angles are:
+    tool, arm angle, singularity and joint angles are checked. In torque mode the torques of the motion are commanded:
+    torques and joint ranges are checked.
 
-    A motion that ends inside the joint ranges may start outside, by `RECOVERY_RANGE` at most, and lead back, not
-    farther out, as `plan_recovery` plans it. A tool that starts outside the box may move inwards only.
+    A motion that ends inside the joint ranges may start up to `RECOVERY_RANGE` outside, and must then move back and not
+    farther out, like those of `plan_recovery`. A tool that starts outside the box may only move inwards.
 
     Args:
         motion: The motion.
         model: The arm.
-        start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one; None for
-            an arm that stands where the motion starts.
-        box: Where the tool shall stay, as sent with `robot.set_safety_box`; None, or one that is not active, is not
-            checked.
-        distance: How far links shall stay from each other and from the floor, and where that is. None does not
-            check it: for planning while the operator drags a target, as no hand-off accepts the certificate.
-        mode: How it will be commanded, as in `control`; the certificate is for this mode.
+        start: Commanded joint angles of a stationary arm, shape (n,), [rad]; a StartState for a moving one; None for a
+            stationary arm at the start of the motion.
+        box: The safety box, as set with `set_safety_box`; None, or an inactive box, is not checked.
+        distance: Required distances of the links from each other and from the floor, and its height. None does not
+            check them, for fast planning while a target is dragged; `execute` does not accept such a certificate.
+        mode: Mode in which the motion will run, as in `control`; the certificate is for this mode.
 
     Raises:
-        InvalidValueError: The motion is for another number of joints, or the start, the mode or another argument is not
+        InvalidValueError: The motion has another number of joints, or the start, the mode or another argument is not
             valid for this arm.
     """
     require_motion(motion)
@@ -100,7 +100,7 @@ def _report(
     distance: ClearanceLimit | None,
     mode: Mode,
 ) -> Report:
-    """Returns the report of some of the conditions on a motion for this arm."""
+    """Returns the report on a motion by some of the conditions."""
     checker = _MotionChecker(motion, model, start, box, distance, mode)
     results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
@@ -119,7 +119,7 @@ def _report(
 
 
 class _MotionChecker:
-    """Compares one motion's signals with the bounds."""
+    """Compares the signals of one motion with the bounds."""
 
     def __init__(
         self,
@@ -144,30 +144,30 @@ class _MotionChecker:
         row = int(self._ratio(values[:, column], lower[column], upper[column]).argmax())
         value = float(values[row, column])
         ok = bool(((lower < smallest) & (largest < upper)).all())
-        bad = None if ok else ~((lower < values) & (values < upper))
+        is_violated = None if ok else ~((lower < values) & (values < upper))
         result = ConditionResult(
             condition=condition,
             value=value,
-            bound=_passed(value, lower, upper, column),
+            bound=_nearest_bound(value, lower, upper, column),
             ratio=float(reach[column]),
             joint=_axis(condition, column),
             time=first_time + row * CYCLE_TIME,
-            broken=0 if bad is None else int(np.count_nonzero(bad)),
+            broken=0 if is_violated is None else int(np.count_nonzero(is_violated)),
             links=self._signals.links(condition, row),
-            led_in=self._signals.start_outside if condition.signal == "position" else 0.0,
+            start_excess=self._signals.start_excess if condition.signal == "position" else 0.0,
         )
-        if bad is None:
+        if is_violated is None:
             return result, []
-        runs = _runs(bad)
+        runs = _runs(is_violated)
         if condition.necessity == "recommended" and condition.stage == "throughout":
-            runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # One is advice enough.
+            runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # Only the worst.
         ratio = self._ratio(values, lower, upper)
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
 
     def usage(self, conditions: tuple[Condition, ...]) -> Usage:
-        """Returns the worst of the necessary conditions that hold throughout, in every row of the motion."""
-        wanted = [row for row in conditions if row.necessity == "necessary" and row.stage == "throughout"]
-        return worst_of((row, self._used(row)) for row in wanted)
+        """Returns the worst of the necessary conditions on every row of the motion, by row."""
+        necessary = [row for row in conditions if row.necessity == "necessary" and row.stage == "throughout"]
+        return worst_of((row, self._used(row)) for row in necessary)
 
     def _used(self, condition: Condition) -> Array:
         values, _ = self._signals.table(condition)
@@ -175,10 +175,10 @@ class _MotionChecker:
         return near_bound(ratio) if condition.order == 0 and condition.signal in ("joint", "position") else ratio
 
     def _ratio(self, values: Array, lower: Array, upper: Array) -> Array:
-        """Returns how much of the way from the middle of the allowed range to the bound is used."""
-        if not np.isfinite(lower).all():  # The box: 0 as deep inside as can be, 1 on its faces.
+        """Returns the distance from the middle of the allowed range, as a share of that of the bound."""
+        if not np.isfinite(lower).all():  # The box: 0 at its centre, 1 on its faces.
             return np.maximum(1.0 + (values - upper) / self._depth, 0.0)
-        if not np.isfinite(upper).all():  # A distance: 0 far away, 1 at its bound.
+        if not np.isfinite(upper).all():  # A clearance: 0 at `FAR` or more beyond the bound, 1 at the bound.
             return np.maximum(1.0 + (lower - values) / FAR, 0.0)
         middle = (lower + upper) / 2.0
         ratio = np.abs(values - middle if middle.any() else values)
@@ -191,12 +191,18 @@ class _MotionChecker:
         column, begin, end = run
         row = begin + int(ratio[begin:end, column].argmax())
         value, worst = float(values[row, column]), float(ratio[row, column])
-        off_start = self._signals.is_off_start
+        is_off_start = self._signals.is_off_start
         joint = _axis(condition, column)
         is_angle = condition.signal == "joint" and condition.order == 0
-        soft = self._limits.joint.exceeded_soft_limit(joint, value) if is_angle else None
+        soft_limit = self._limits.joint.exceeded_soft_limit(joint, value) if is_angle else None
         advice = advise(
-            condition, self._motion, row=begin, count=end - begin, ratio=worst, off_start=off_start, soft=soft
+            condition,
+            self._motion,
+            row=begin,
+            count=end - begin,
+            ratio=worst,
+            is_off_start=is_off_start,
+            soft_limit=soft_limit,
         )
         return Violation(
             condition=condition,
@@ -205,7 +211,7 @@ class _MotionChecker:
             count=end - begin,
             value=value,
             worst_time=first_time + row * CYCLE_TIME,
-            bound=_passed(value, *condition.bounds(self._limits), column),
+            bound=_nearest_bound(value, *condition.bounds(self._limits), column),
             ratio=worst,
             advice=advice,
             links=self._signals.links(condition, row),
@@ -213,7 +219,7 @@ class _MotionChecker:
 
 
 def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:
-    """Returns the limits of a motion: one that leads back inside may start outside; a moving one may pause there."""
+    """Returns the limits for a motion; if it ends inside, or starts moving, a joint may start outside its range."""
     joint = limits.joint
     ends_inside = bool(((joint.lower < motion.goal) & (motion.goal < joint.upper)).all())
     if not ends_inside and not start.moving:
@@ -221,8 +227,8 @@ def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:
     return replace(limits, joint=range_from(joint, start.q, RECOVERY_RANGE))
 
 
-def _passed(value: float, lower: Array, upper: Array, column: int) -> float:
-    """Returns the bound on the side of a value."""
+def _nearest_bound(value: float, lower: Array, upper: Array, column: int) -> float:
+    """Returns the bound on the value's side of the middle of the range."""
     low, high = float(lower[column]), float(upper[column])
     return high if value >= (low + high) / 2.0 else low
 
@@ -231,11 +237,11 @@ def _axis(condition: Condition, column: int) -> int:
     return column + 1 if condition.is_per_joint else 0
 
 
-def _runs(bad: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
-    """Returns column, first row and row after the last of every run of consecutive rows that are bad."""
-    edges = np.diff(np.pad(bad, ((1, 1), (0, 0))).astype(np.int8), axis=0)
+def _runs(is_violated: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
+    """Returns column, first row and row after the last of every run of violating rows."""
+    edges = np.diff(np.pad(is_violated, ((1, 1), (0, 0))).astype(np.int8), axis=0)
     runs: list[tuple[int, int, int]] = []
-    for column in np.flatnonzero(bad.any(axis=0)).tolist():
+    for column in np.flatnonzero(is_violated.any(axis=0)).tolist():
         begins = np.flatnonzero(edges[:, column] == 1).tolist()
         ends = np.flatnonzero(edges[:, column] == -1).tolist()
         runs += [(column, begin, end) for begin, end in zip(begins, ends, strict=True)]

@@ -1,7 +1,7 @@
-"""The conditions on distances between links and from the floor: rcilab's own, no controller checks them.
+"""Conditions on distances between links and from the floor: rcilab's own, because no controller checks them.
 
-An arm that is commanded into its own base, or into the table, moves there and raises a fault at the contact. So these
-rows are necessary and raise no fault, and the virtual controller does not check them, as the real one does not.
+An arm that is commanded into its own base, or into the table, moves until the contact raises a fault. These rows are
+therefore necessary, but raise no fault, and the virtual controller does not check them either.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rcilab.core.condition import AnyLimits, Bounds, Condition, Necessity
 
 OWN = "rcilab's own, not the controller's; capsules of the URDF"
 FAR = 0.1  # [m]
-"""How far beyond its bound a distance uses nothing of it: a hand's width."""
+"""Distance beyond its bound from which a clearance counts as unused. Reason: about the width of a hand."""
 
 Distance: TypeAlias = Literal["link_distance", "floor_distance"]
 """The signals that are distances."""
@@ -29,21 +29,21 @@ _QUANTITIES: dict[Distance, str] = {
 
 
 def clearance_conditions(distance: ClearanceLimit) -> tuple[Condition, ...]:
-    """Returns the rows for a safety distance: what is necessary first, then what is recommended beyond it."""
+    """Returns the rows for a safety distance: the necessary ones, then the recommended ones."""
     necessary: dict[Distance, float] = {"link_distance": distance.links, "floor_distance": distance.floor}
     if distance.floor_height is None:
         del necessary["floor_distance"]
     return (
-        *(_row(signal, "necessary", least) for signal, least in necessary.items()),
+        *(_row(signal, "necessary", minimum) for signal, minimum in necessary.items()),
         *(
             _row(signal, "recommended", distance.advised)
-            for signal, least in necessary.items()
-            if distance.advised > least
+            for signal, minimum in necessary.items()
+            if distance.advised > minimum
         ),
     )
 
 
-def _row(signal: Distance, necessity: Necessity, least: float) -> Condition:
+def _row(signal: Distance, necessity: Necessity, minimum: float) -> Condition:
     name = {"link_distance": "links", "floor_distance": "floor"}[signal]
     return Condition(
         id=f"clearance.{name}" + ("" if necessity == "necessary" else ".advised"),
@@ -56,17 +56,17 @@ def _row(signal: Distance, necessity: Necessity, least: float) -> Condition:
         stage="throughout",
         signal=signal,
         order=0,
-        bounds=_above(least),
+        bounds=_above(minimum),
     )
 
 
-def _above(least: float) -> Callable[[AnyLimits], Bounds]:
+def _above(minimum: float) -> Callable[[AnyLimits], Bounds]:
     def bounds(limits: AnyLimits) -> Bounds:
-        del limits  # What is asked for is no limit of the arm.
-        return np.array([least]), np.array([math.inf])
+        del limits  # The bound is a requirement, not a limit of the arm.
+        return np.array([minimum]), np.array([math.inf])
 
     return bounds
 
 
 CLEARANCE_CONDITIONS = clearance_conditions(STANDARD_DISTANCE)
-"""What a motion has to keep, and should keep, when nothing else is asked for."""
+"""Rows for the default distances."""

@@ -1,11 +1,11 @@
-"""Distances between links and from the floor, cycle by cycle, for the user's own programs: no controller does this."""
+"""Check of distances between links and from the floor, cycle by cycle, for user programs; no controller has it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from rcilab.conformance.clearance_conditions import clearance_conditions
-from rcilab.conformance.clearance_path import in_between
+from rcilab.conformance.clearance_path import sample_cycle
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit, LinkPair
@@ -13,17 +13,17 @@ from rcilab.model.robot_model import RobotModel
 
 
 class ClearanceMonitor:
-    """Checks one commanded position a cycle by the same rows as `check`, at the same points of the path.
+    """Checks one commanded position per cycle by the same rows as `check`, at the same points of the path.
 
-    Owned by the thread that runs the cycle. A step takes some 20 us.
+    Owned by the thread that runs the cycle. A step takes about 20 us.
 
     Attributes:
-        distance: The smallest one in the last step, [m].
-        links: Between which links it was.
+        distance: Smallest distance in the last step, [m].
+        links: The two links of that distance.
 
     Args:
         model: The arm.
-        distance: What to keep. The monitor starts at `model.home`; `reset` moves it.
+        distance: Required distances. The monitor starts at `model.home`; `reset` sets another position.
     """
 
     def __init__(self, model: RobotModel, distance: ClearanceLimit = STANDARD_DISTANCE) -> None:
@@ -36,7 +36,7 @@ class ClearanceMonitor:
         self.reset(model.home)
 
     def reset(self, q: Sequence[float] | JointVector) -> None:
-        """Restarts the history: the arm stands at `q`.
+        """Restarts the history at standstill at `q`.
 
         Args:
             q: Joint angles, n numbers, [rad].
@@ -45,10 +45,10 @@ class ClearanceMonitor:
             InvalidValueError: Not n finite numbers.
         """
         self._q: JointVector = as_vector(q, self._n, "q", "rad")
-        self._look()
+        self._measure()
 
     def step(self, q_c: Sequence[float] | JointVector) -> bool:
-        """Takes the commanded angles of this cycle and returns whether every necessary distance is kept.
+        """Checks the commanded angles of this cycle and returns whether every necessary condition holds.
 
         Args:
             q_c: Commanded joint angles, n numbers, [rad].
@@ -57,23 +57,23 @@ class ClearanceMonitor:
             InvalidValueError: Not n finite numbers.
         """
         before, self._q = self._q, as_vector(q_c, self._n, "q_c", "rad")
-        self._look(before)
-        return not any(row.necessity == "necessary" for row, *_ in self.broken())
+        self._measure(before)
+        return not any(row.necessity == "necessary" for row, *_ in self.violations())
 
-    def broken(self) -> list[LimitViolation]:
-        """Returns what the last step broke, recommendations too."""
+    def violations(self) -> list[LimitViolation]:
+        """Returns the violations of the last step, also of recommended rows."""
         found: list[LimitViolation] = []
-        for row, least in self._rows:
+        for row, minimum in self._rows:
             distance, links = self._found[row.signal]
-            if not least < distance:
-                found.append(LimitViolation(row, 0, distance, least, links))
+            if not minimum < distance:
+                found.append(LimitViolation(row, 0, distance, minimum, links))
         return found
 
-    def _look(self, before: JointVector | None = None) -> None:
+    def _measure(self, before: JointVector | None = None) -> None:
         start = self._q if before is None else before
-        places = in_between(start, self._q, self._levers)
+        samples = sample_cycle(start, self._q, self._levers)
         self._found: dict[str, tuple[float, LinkPair]] = {
-            "link_distance": min(self._query.links(q) for q in places),
-            "floor_distance": min(self._query.floor(q) for q in places),
+            "link_distance": min(self._query.links(q) for q in samples),
+            "floor_distance": min(self._query.floor(q) for q in samples),
         }
         self.distance, self.links = min(self._found.values())

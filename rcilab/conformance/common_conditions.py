@@ -1,15 +1,15 @@
-"""Conditions that the interfaces of several makers have in common, without the fault and the source of any maker.
+"""Conditions common to the interfaces of several makers, without the fault and the source of a maker.
 
 A condition is a quantity strictly between two bounds: `lower < value < upper`. Necessary conditions are checked on
-backward differences at 1 ms, as a controller does it; recommended ones ask for a motion that starts and ends at
-standstill and for torques that the arm can give. A maker's table takes these rows and adds its own faults and sources.
+backward differences at 1 ms, as by a controller; recommended ones require a motion that starts and ends at standstill,
+and torques within the arm's capacity. A maker's table contains these rows with its own faults and sources.
 
 Velocity, acceleration and jerk of the tool are norms of backward differences, in base axes. Rotation velocity is the
-rotation vector of the turn within one cycle, divided by the cycle time.
+rotation vector of one cycle, divided by the cycle time.
 
-Makers give no bounds for measured quantities. They are the commanded bounds with an allowance, because a servo
-overshoots and a compliant arm is pushed. Measured accelerations are differences of measured velocities over one cycle
-after a first-order low pass, because a bare difference of measurements is mostly noise.
+Makers publish no bounds for measured quantities. They are the commanded bounds with an allowance, because a servo
+overshoots and a compliant arm is pushed. Measured accelerations are low-pass filtered differences of measured
+velocities over one cycle, because the unfiltered difference is mostly noise.
 """
 
 from __future__ import annotations
@@ -36,49 +36,49 @@ from rcilab.core.limits import Limits
 from rcilab.robots.description import RobotDescription
 
 START_POSITION_TOLERANCE = 1e-9  # [rad]
-"""How far from the arm a motion may start, in [m] too. A step of 1 nrad is a jerk of 2 rad/s^3: inside the planner's
-margin."""
-REST_VELOCITY_TOLERANCE = 1e-4  # [rad/s] or [m/s]
-"""What counts as zero velocity: it covers rounding and changes nothing that a joint can feel."""
-REST_ACCELERATION_TOLERANCE = 1e-2  # [rad/s^2] or [m/s^2]
-"""What counts as zero acceleration: a thousandth of the smallest acceleration limit."""
+"""Largest distance of a motion's start from the arm, also in [m]. A step of 1 nrad is a jerk of 2 rad/s^3, within the
+planner's margin."""
+STANDSTILL_VELOCITY = 1e-4  # [rad/s] or [m/s]
+"""A smaller velocity counts as zero: more than rounding, and without effect on a joint."""
+STANDSTILL_ACCELERATION = 1e-2  # [rad/s^2] or [m/s^2]
+"""A smaller acceleration counts as zero: a thousandth of the smallest acceleration limit."""
 BOX_TOLERANCE = 1e-9  # [m]
-"""How far outside the safety box a tool still counts as inside, so that a tool on the wall does not stop the arm."""
+"""A smaller distance outside the safety box counts as inside, so that a tool on its face does not stop the arm."""
 ARM_ANGLE_TOLERANCE = 1e-9  # [rad]
-"""How far past pi an arm angle may be written: pi itself is an arm angle, and written digits are rounded."""
+"""Tolerance of an arm angle beyond pi: pi itself is valid, and its decimal form is rounded."""
 
-ANGLE_ALLOWANCE = math.radians(1.0)  # [rad] What a servo may overshoot at the end of a joint's range.
-BOX_ALLOWANCE = 0.01  # [m] About what `ANGLE_ALLOWANCE` is at the tool, and what a soft spring gives.
-VELOCITY_ALLOWANCE = 1.1  # On the commanded bound: servo overshoot.
+ANGLE_ALLOWANCE = math.radians(1.0)  # [rad] Overshoot of a servo at the end of a joint's range.
+BOX_ALLOWANCE = 0.01  # [m] About `ANGLE_ALLOWANCE` at the tool, and the deflection under soft impedance.
+VELOCITY_ALLOWANCE = 1.1  # Factor on the commanded bound: servo overshoot.
 ACCELERATION_ALLOWANCE = 3.0
 """Factor on the commanded bound: servo overshoot and filtered noise. A real xMatePro3 that followed commands with
 pauses reached 2.65 without a fault (recorded identification motions, low-passed at 20 to 30 Hz)."""
-ACCELERATION_CUTOFF = 30.0  # [Hz] Below the first resonances of arms of this size, above any motion of theirs.
-YIELDING_ALLOWANCE = 4.0
-"""Further factor on the acceleration bounds of a compliant arm. The light last joints of an arm that is pushed with
-30 N, or commanded a torque of a few N m, accelerate harder than any position command could ask for."""
-LOST_IN_ROW = 20  # [cycles] The largest threshold that the makers' manuals give.
+ACCELERATION_CUTOFF = 30.0  # [Hz] Below the first resonances of arms of this size, above their motions.
+COMPLIANT_ALLOWANCE = 4.0
+"""Further factor on the acceleration bounds of a compliant arm. Its light last joints, pushed with 30 N or commanded a
+torque of some N m, accelerate faster than any position command allows."""
+LOST_COMMANDS_THRESHOLD = 20  # [cycles] The largest threshold in the makers' manuals.
 
 _NAMES = ("position", "velocity", "acceleration", "jerk")
 _UNITS = {"translation": "m", "rotation": "rad", "arm_angle": "rad"}
 
 
-def yielding_limits(limits: Limits) -> Limits:
-    """Returns the bounds of an arm that forces move, as under impedance: more acceleration, the rest unchanged."""
+def compliant_limits(limits: Limits) -> Limits:
+    """Returns the bounds of a compliant arm, as under impedance control: more acceleration, the rest unchanged."""
     joint, cartesian = limits.joint, limits.cartesian
     return replace(
         limits,
-        joint=replace(joint, acceleration=readonly_copy(YIELDING_ALLOWANCE * joint.acceleration)),
+        joint=replace(joint, acceleration=readonly_copy(COMPLIANT_ALLOWANCE * joint.acceleration)),
         cartesian=replace(
             cartesian,
-            translation_acceleration=YIELDING_ALLOWANCE * cartesian.translation_acceleration,
-            rotation_acceleration=YIELDING_ALLOWANCE * cartesian.rotation_acceleration,
+            translation_acceleration=COMPLIANT_ALLOWANCE * cartesian.translation_acceleration,
+            rotation_acceleration=COMPLIANT_ALLOWANCE * cartesian.rotation_acceleration,
         ),
     )
 
 
 def _symmetric(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
-    """Returns the function for the bounds of a joint quantity, such as "velocity"."""
+    """Returns the bounds function of a joint quantity, such as "velocity"."""
 
     def bounds(limits: AnyLimits) -> Bounds:
         bound: JointVector = getattr(joint_limits(limits), name)
@@ -100,7 +100,7 @@ def _measured_range(limits: AnyLimits) -> Bounds:
 
 
 def _tool_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
-    """Returns the function for the bounds of a norm of the tool, such as "translation_velocity"."""
+    """Returns the bounds function of a norm of the tool, such as "translation_velocity"."""
 
     def bounds(limits: AnyLimits) -> Bounds:
         return symmetric_bounds(factor * getattr(all_limits(limits).cartesian, name))
@@ -109,7 +109,7 @@ def _tool_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds
 
 
 def _arm_angle_bounds(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
-    """Returns the function for the bounds of a derivative of the arm angle; an arm without one has no bound."""
+    """Returns the bounds function of a derivative of the arm angle; without an arm angle there is no bound."""
 
     def bounds(limits: AnyLimits) -> Bounds:
         arm_angle = all_limits(limits).arm_angle
@@ -133,7 +133,7 @@ def _joint(order: int) -> Condition:
 
 
 def _motion_torque(quantity: str, limit: str, order: int) -> Condition:
-    """Returns a recommended row on torques; gravity, which the arm compensates by itself, is not in them."""
+    """Returns a recommended row on torques without gravity, which the controller compensates."""
     dots = "d" * order
     return Condition(
         id=f"joint.{limit}",
@@ -158,7 +158,7 @@ def _joint_end(stage: Literal["start", "end"], order: int) -> Condition:
         unit=("rad", "rad/s", "rad/s^2")[order],
         stage=stage,
         order=order,
-        bounds=joint_tolerance((START_POSITION_TOLERANCE, REST_VELOCITY_TOLERANCE, REST_ACCELERATION_TOLERANCE)[order]),
+        bounds=joint_tolerance((START_POSITION_TOLERANCE, STANDSTILL_VELOCITY, STANDSTILL_ACCELERATION)[order]),
     )
 
 
@@ -200,7 +200,7 @@ def _arm_angle(order: int) -> Condition:
 
 def _tool_end(stage: Literal["start", "end"], signal: Literal["translation", "rotation"], order: int) -> Condition:
     kind = {"translation": "translational", "rotation": "rotational"}[signal]
-    limit = REST_VELOCITY_TOLERANCE if order == 1 else REST_ACCELERATION_TOLERANCE
+    limit = STANDSTILL_VELOCITY if order == 1 else STANDSTILL_ACCELERATION
     return Condition(
         id=f"{stage}.cartesian.{_NAMES[order]}.{signal}",
         quantity=f"{kind} {_NAMES[order]} at the {stage}",
@@ -248,20 +248,20 @@ def _measured_tool(signal: Literal["translation", "rotation"], order: int) -> Co
 
 
 JOINT_CONDITIONS: tuple[Condition, ...] = tuple(_joint(order) for order in range(4))
-"""On commanded joint angles in every cycle: position, velocity, acceleration, jerk."""
+"""Conditions on commanded joint angles in every cycle: position, velocity, acceleration, jerk."""
 JOINT_POSITION, JOINT_VELOCITY, JOINT_ACCELERATION, JOINT_JERK = JOINT_CONDITIONS
 
 MOTION_TORQUE_CONDITIONS: tuple[Condition, ...] = (
     _motion_torque("torque", "torque", 0),
     _motion_torque("torque rate", "torque_rate", 1),
 )
-"""On the torques that a motion in angles or poses needs."""
+"""Conditions on the torques of a motion commanded in angles or poses."""
 
 JOINT_END_CONDITIONS: tuple[Condition, ...] = (
     *(_joint_end("start", order) for order in range(3)),
     *(_joint_end("end", order) for order in (1, 2)),
 )
-"""On the start and the end of a joint motion."""
+"""Conditions on the start and the end of a joint motion."""
 
 CARTESIAN_POSITION = Condition(
     id="cartesian.position",
@@ -274,7 +274,7 @@ CARTESIAN_POSITION = Condition(
     order=0,
     bounds=lambda limits: (np.array([-math.inf]), np.array([BOX_TOLERANCE])),
 )
-"""How far the tool is outside its safety box, [m]; any depth inside is allowed."""
+"""Condition on the distance of the tool outside its safety box, [m]; any depth inside is allowed."""
 
 TOOL_CONDITIONS: tuple[Condition, ...] = (
     CARTESIAN_POSITION,
@@ -286,7 +286,7 @@ TOOL_CONDITIONS: tuple[Condition, ...] = (
     _tool("translation", 3),
     _tool("rotation", 3),
 )
-"""On commanded tool poses in every cycle, in the order of the values of `CartesianMonitor`."""
+"""Conditions on commanded tool poses in every cycle, in the order of the values of `CartesianMonitor`."""
 
 CARTESIAN_FRAME = Condition(
     id="cartesian.frame",
@@ -299,7 +299,7 @@ CARTESIAN_FRAME = Condition(
     order=0,
     bounds=lambda limits: symmetric_bounds(1.0),
 )
-"""How near the arm is to a singularity: 1 is what counts as on it. Infinite for what is no pose or out of reach."""
+"""Condition on the closeness to a singularity: singular from 1. Infinite for an invalid pose or one out of reach."""
 
 START_POSE = Condition(
     id="start.cartesian.position",
@@ -323,7 +323,7 @@ TOOL_STANDSTILL_CONDITIONS: tuple[Condition, ...] = (
     _tool_end("end", "translation", 2),
     _tool_end("end", "rotation", 2),
 )
-"""On the tool's velocity and acceleration at the start and the end."""
+"""Conditions on the tool's velocity and acceleration at the start and the end."""
 
 TORQUE_RATE = Condition(
     id="torque.rate",
@@ -348,7 +348,7 @@ TORQUE_RANGE = Condition(
     bounds=_symmetric("torque"),
 )
 TORQUE_CONDITIONS: tuple[Condition, ...] = (TORQUE_RATE, TORQUE_RANGE)
-"""On commanded torques in every cycle, in the order of the values of `TorqueMonitor`."""
+"""Conditions on commanded torques in every cycle, in the order of the values of `TorqueMonitor`."""
 
 MEASURED_CONDITIONS: tuple[Condition, ...] = (
     _measured_joint(0),
@@ -381,7 +381,7 @@ MEASURED_CONDITIONS: tuple[Condition, ...] = (
     _measured_tool("translation", 2),
     _measured_tool("rotation", 2),
 )
-"""On the moving arm in every cycle, in the order of the values of `MeasuredMonitor`."""
+"""Conditions on measured values in every cycle, in the order of the values of `MeasuredMonitor`."""
 
 EXTERNAL_TORQUE = Condition(
     id="external.torque",
@@ -404,7 +404,7 @@ LOST_COMMANDS = Condition(
     stage="throughout",
     signal="lost_commands",
     order=0,
-    bounds=lambda limits: symmetric_bounds(LOST_IN_ROW),
+    bounds=lambda limits: symmetric_bounds(LOST_COMMANDS_THRESHOLD),
 )
 
 COMMON_CONDITIONS = ConditionTable(
@@ -435,9 +435,9 @@ COMMON_CONDITIONS = ConditionTable(
         LOST_COMMANDS,
     ),
 )
-"""What an arm without a maker is checked by."""
+"""Conditions for an arm without a maker."""
 
 
 def condition_table(description: RobotDescription) -> ConditionTable:
-    """Returns the conditions on the motions of an arm: those of its maker's interface."""
+    """Returns the conditions for an arm: those of its maker's interface, or the common ones."""
     return COMMON_CONDITIONS if description.conditions is None else description.conditions()

@@ -1,4 +1,4 @@
-"""The conditions on commanded joint angles, cycle by cycle, in plain floats."""
+"""Check of commanded joint angles, cycle by cycle, in plain floats."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from operator import sub
 
 from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.common_conditions import JOINT_CONDITIONS
-from rcilab.conformance.divided_differences import EVEN, spans
+from rcilab.conformance.divided_differences import EVEN_TIMES, difference_times
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
@@ -15,23 +15,23 @@ from rcilab.core.limits import JointLimits
 
 
 class JointMonitor:
-    """Checks one commanded position a cycle by the same rows as `check`, with the same arithmetic.
+    """Checks one commanded position per cycle by the same rows as `check`, with the same arithmetic.
 
     Owned by the thread that runs the cycle. It allocates four short lists.
 
-    Behind a gap in the commands the differences are Newton's divided ones, over the cycles that really passed. Those
-    are weighted means of the differences that the full row of commands would have had, so a motion that keeps its
-    bounds never breaks them for a gap, whatever it was that is missing.
+    After a gap in the commands the differences are Newton's divided differences over the actual number of cycles. They
+    are weighted means of the differences of the complete sequence, so a conforming motion never violates a bound
+    because of a gap, whichever commands are missing.
 
     Attributes:
         q: Last commanded joint angles, [rad].
         dq: Their first backward difference over one cycle, [rad/s].
         ddq: The second, [rad/s^2].
         jerk: The third, [rad/s^3].
-        is_even: Whether the last differences are over single cycles, with no gap in their reach.
+        is_even: Whether the last differences are over single cycles, without a gap.
 
     Args:
-        limits: Bounds of the joints. The monitor starts at standstill at zero; `reset` moves it.
+        limits: Bounds of the joints. The monitor starts at standstill at zero; `reset` sets another state.
         rows: The conditions on position, velocity, acceleration and jerk. The common ones raise no fault; those of a
             maker's table do, see `faults_of`.
     """
@@ -42,7 +42,7 @@ class JointMonitor:
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
-        """Restarts the history: the arm stands at `q`, or moves with the given backward differences.
+        """Restarts the history at `q`, at standstill or with the given backward differences.
 
         Args:
             q: Joint angles, n numbers, [rad].
@@ -60,17 +60,16 @@ class JointMonitor:
         self._spacing = (1, 1)
 
     def step(self, q_c: Sequence[float], cycles: int = 1) -> list[LimitViolation]:
-        """Takes the commanded angles of this cycle and returns what they break, in the order of the rows.
+        """Checks the commanded angles of this cycle and returns their violations, in the order of the rows.
 
-        A value that is not a number breaks every condition. The history advances in any case; after a violation the
-        caller has to `reset`.
+        NaN violates every condition. The history advances in any case; after a violation the caller must `reset`.
 
         Args:
-            q_c: Commanded joint angles, at least n numbers (a 6-axis arm ignores the wire's seventh), [rad].
+            q_c: Commanded joint angles, at least n numbers, [rad]; a 6-axis arm ignores the protocol's seventh.
             cycles: Cycles since the last step, 1 or more.
         """
-        first, second, third = times = spans(cycles, self._spacing)
-        self.is_even = times is EVEN
+        first, second, third = times = difference_times(cycles, self._spacing)
+        self.is_even = times is EVEN_TIMES
         self._spacing = (cycles, self._spacing[0])
         q = list(q_c[: self._n])
         dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
@@ -79,11 +78,11 @@ class JointMonitor:
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
         return self._rows.evaluate([*q, *dq, *ddq, *jerk])
 
-    def broken(self) -> list[LimitViolation]:
-        """Returns what the last step broke."""
-        return self._rows.broken((*self.q, *self.dq, *self.ddq, *self.jerk))
+    def violations(self) -> list[LimitViolation]:
+        """Returns the violations of the last step."""
+        return self._rows.violations((*self.q, *self.dq, *self.ddq, *self.jerk))
 
     def _numbers(self, values: Sequence[float], name: str) -> list[float]:
         if len(values) != self._n:
-            raise InvalidValueError(name, values, f"needs {self._n} numbers")
+            raise InvalidValueError(name, values, f"must be {self._n} numbers")
         return [float(value) for value in values]

@@ -1,4 +1,4 @@
-"""How much of its limits a motion uses, cycle by cycle: the colours of a drawn path."""
+"""Utilisation of the limits by a motion, cycle by cycle: the colours of a drawn path."""
 
 from __future__ import annotations
 
@@ -11,45 +11,45 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.condition import Condition
 
-FREE = 0.8
-"""Part of a joint's range, or of the distance to a face of the safety box, that counts as unused, so that
-most of a path has one colour."""
+UNUSED_PART = 0.8
+"""Part of a joint's range, or of the distance to a face of the safety box, that counts as unused. Reason: most of a
+path then has one colour."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Usage:
-    """The worst necessary condition of every cycle."""
+    """The worst necessary condition in every cycle."""
 
     ratio: Array
-    """How much of its bound is used, of a range only its outer part, shape (N,); from 1 on it is broken."""
+    """Used part of its bound, of a range only of its outer part, shape (N,); violated from 1 on."""
     row: NDArray[np.intp]
-    """Which condition, as a place in `conditions`, shape (N,)."""
+    """Index of the condition in `conditions`, shape (N,)."""
     conditions: tuple[Condition, ...]
-    """Those that hold throughout a motion and were evaluated."""
+    """The evaluated conditions."""
 
     def at_most(self, rows: Iterable[int]) -> Array:
-        """Returns the largest ratio from each of these rows up to the next: what few points can show of many.
+        """Returns the largest ratio from each of these rows up to the next, to draw many rows as few points.
 
         Args:
-            rows: Rows in rising order, each of them once or more; the last one stands for the rest.
+            rows: Indices in ascending order; the last one includes the rest.
         """
         starts = np.asarray(list(rows), dtype=np.intp)
         return np.maximum.reduceat(self.ratio, starts)
 
 
 def near_bound(ratio: Array) -> Array:
-    """Returns what a place in a range uses of it: nothing up to `FREE`, 1 at its ends, more beyond.
+    """Returns the used part of a range: 0 up to `UNUSED_PART`, 1 at its ends, more beyond.
 
-    A joint that stands at three quarters of its range is no nearer to a fault than one in the middle.
+    A joint at three quarters of its range is no closer to a fault than one in the middle.
     """
-    return np.maximum((ratio - FREE) / (1.0 - FREE), 0.0)
+    return np.maximum((ratio - UNUSED_PART) / (1.0 - UNUSED_PART), 0.0)
 
 
 def worst_of(tables: Iterable[tuple[Condition, Array]]) -> Usage:
     """Returns the worst of several conditions in every cycle.
 
     Args:
-        tables: Conditions, each with how much it uses of its bounds, shape (N,) or longer.
+        tables: Conditions, each with the used part of its bound, shape (N,) or longer.
     """
     conditions: list[Condition] = []
     ratios: list[Array] = []

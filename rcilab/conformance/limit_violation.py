@@ -1,4 +1,4 @@
-"""One broken condition in one cycle, with its numbers."""
+"""A violation of one condition in one cycle."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from rcilab.i18n.translator import Remark
 
 
 class LimitViolation(NamedTuple):
-    """What a monitor's last step broke."""
+    """A violation in a monitor's last step."""
 
     condition: Condition
     axis: int
-    """The joint, from 1; 0 for a norm, an arm angle or anything else that has no axis."""
+    """The joint, from 1; 0 for quantities without an axis, such as a norm or the arm angle."""
     value: float
-    """In the condition's unit."""
+    """Value, in the condition's unit."""
     bound: float
-    """The bound that it passed."""
+    """The violated bound."""
     links: LinkPair | None = None
     """The two links of a distance."""
 
     @property
     def text(self) -> str:
-        """The fact in words: "joint 2: commanded velocity 2.3 rad/s passes 2.175 rad/s"."""
+        """The violation as text: "joint 2: commanded velocity 2.3 rad/s passes 2.175 rad/s"."""
         row = self.condition
         if row.is_clearance:
             return f"{self.links}: {row.quantity} {self.value:.4g} m is not above {self.bound:g} m"
@@ -42,7 +42,7 @@ class LimitViolation(NamedTuple):
 
     @property
     def remark(self) -> Remark:
-        """The same as a code with values, for user interfaces with texts of their own."""
+        """The violation as a code with values, for translated user interfaces."""
         row = self.condition
         if row.is_clearance:
             return Remark(self.text)
@@ -62,5 +62,5 @@ class LimitViolation(NamedTuple):
 
 
 def faults_of(violations: Iterable[LimitViolation]) -> tuple[FaultCode, ...]:
-    """Returns the faults that they raise, by number and once each."""
+    """Returns the faults that the violations raise, sorted by number, once each."""
     return tuple(sorted({row.fault for row, *_ in violations if row.fault is not None}))

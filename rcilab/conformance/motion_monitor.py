@@ -1,4 +1,4 @@
-"""One cycle checked in any mode, for any arm: the per-cycle monitors combined by the arm's own table."""
+"""Check of one cycle in any mode, for any arm: combines the per-cycle monitors by the arm's own table."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 
 
 class Monitor:
-    """Checks one command a cycle by the rows that `check` uses for a whole motion, in the same mode.
+    """Checks one command per cycle by the rows that `check` uses for a whole motion, in the same mode.
 
-    Owned by the thread that runs the cycle. It is used alike for every arm, with the table of the arm's maker.
-    Standstill at the ends of a motion is checked with the first commands and with the last one, which is `finished`.
+    Owned by the thread that runs the cycle. The rows are those of the table of the arm's maker. Standstill at both ends
+    of a motion is checked with the first commands and with the last one, which has `finished` set.
 
     Args:
         model: The arm with its tool and load.
-        mode: How it is commanded, as in `control`.
-        box: Where the tool shall stay; None, or one that is not active, is not checked.
-        distance: How far links shall stay from each other and from the floor; None is not checked.
+        mode: Mode of the commands, as in `control`.
+        box: The safety box; None, or an inactive box, is not checked.
+        distance: Required distances of the links from each other and from the floor; None is not checked.
 
     Raises:
-        InvalidValueError: The model is not a RobotModel, or there is no such mode.
+        InvalidValueError: The model is not a RobotModel, or the mode is unknown.
     """
 
     def __init__(
@@ -70,8 +70,10 @@ class Monitor:
         if self.mode == "torque":
             self._torques = torques
         else:
-            self._joint_rows, self._needed = _throughout(rows, "joint"), torques
-            self._rest = StandstillMonitor(limits, [row for row in rows if row.stage != "throughout" and row.order > 0])
+            self._joint_rows, self._motion_torques = _throughout(rows, "joint"), torques
+            self._standstill = StandstillMonitor(
+                limits, [row for row in rows if row.stage != "throughout" and row.order > 0]
+            )
         self._is_cartesian = self.mode.startswith("cartesian")
         if self._is_cartesian:
             self._tool_rows = (table.box, *_throughout(table.cartesian, "arm_angle", "translation", "rotation"))
@@ -83,26 +85,26 @@ class Monitor:
         self.reset(model.home)
 
     def reset(self, start: ArrayLike | StartState) -> None:
-        """Restarts the history: the arm stands somewhere, or moves.
+        """Restarts the history at a state.
 
         Args:
-            start: Commanded joint angles of the standing arm, shape (n,), [rad]; a StartState for a moving one.
+            start: Commanded joint angles of a stationary arm, shape (n,), [rad]; a StartState for a moving one.
 
         Raises:
-            InvalidValueError: It is no state of this arm.
-            SingularError: The arm angle, which tool poses come with, has no meaning there.
+            InvalidValueError: It is not a valid state of this arm.
+            SingularError: In a Cartesian mode, the arm angle has no meaning there.
         """
         model = self._model
         state = as_start(start, model.n)
         self._start, self._is_first = state, not state.moving
         self._q = state.q.tolist()
-        self._open_from(state.q)
+        self._build_monitors(state.q)
         self._measured.reset(state.q.tolist())
         tau = model.rigid_body.motion_torque(state.q, state.dq, state.ddq).tolist() if state.moving else [0.0] * model.n
         if self._joints is not None:
             self._joints.reset(state.q.tolist(), state.dq.tolist(), state.ddq.tolist())
-            self._needed.reset(tau)
-            self._rest.reset(state.moving)
+            self._motion_torques.reset(tau)
+            self._standstill.reset(state.moving)
         if self._torques is not None:
             self._torques.reset(tau)
         if self._clearance is not None:
@@ -117,8 +119,8 @@ class Monitor:
         if "elbow_sign" in self._pose_rows:
             self._start_side = model.elbow(state.q)[1]
 
-    def _open_from(self, q: JointVector) -> None:
-        """Makes the monitors of what bounds a motion from here: outside its range or box, the path inwards is open."""
+    def _build_monitors(self, q: JointVector) -> None:
+        """Builds the monitors for a motion from `q`; from outside a range or the box, the motion inwards is allowed."""
         joint = range_from(self._model.limits.joint, q, RECOVERY_RANGE)
         limits = replace(self._model.limits, joint=joint)
         position = self._model.forward(q).parts[1]
@@ -129,20 +131,19 @@ class Monitor:
         self._box = BoxMonitor(None if self._is_cartesian or self.mode == "torque" else box, self._box_row)
 
     def step(self, command: Command, cycles: int = 1, side: int | None = None) -> tuple[LimitViolation, ...]:
-        """Takes the command of this cycle and returns what it breaks, recommendations too; nothing when all is well.
+        """Checks the command of this cycle and returns its violations, also of recommended rows.
 
-        NaN breaks every condition on it. After a violation of a necessary condition a controller stops; here the
-        history advances, and the caller has to `reset`. A pose for which there are no joint angles
-        leaves the joints where they were.
+        NaN violates every condition on it. After a violation of a necessary condition a controller stops; here the
+        history advances, and the caller must `reset`. A pose without joint angles does not change the joints.
 
         Args:
-            command: As the mode asks for; without an arm angle the elbow stays.
+            command: Command of the mode; without an arm angle the last one is used.
             cycles: Cycles since the last command, 1 or more.
-            side: Side of the elbow, +1 or -1 as `model.elbow` counts it, for interfaces that command it with every
-                pose; None keeps the last.
+            side: Side of the elbow, +1 or -1 as by `model.elbow`, for interfaces that command it with every pose; None
+                is the last one.
 
         Raises:
-            InvalidValueError: The command is of another kind than the mode's, or for another number of joints.
+            InvalidValueError: The command does not belong to the mode, or is for another number of joints.
         """
         if self._torques is not None:
             found = self._step_torques(self._torques, command, cycles)
@@ -154,7 +155,7 @@ class Monitor:
         return tuple(found)
 
     def observe(self, q: Sequence[float] | Array, dq: Sequence[float] | Array) -> tuple[LimitViolation, ...]:
-        """Takes what the sensors measure in this cycle and returns what the arm itself breaks.
+        """Checks the measured values of this cycle and returns their violations.
 
         Args:
             q: Joint angles, shape (n,), [rad].
@@ -168,88 +169,88 @@ class Monitor:
         twist = model.velocity(angles, speeds).tolist() if self._is_cartesian else None
         psi = self._arm_angle(angles) if self._is_cartesian else None
         self._measured.step(angles.tolist(), speeds.tolist(), model.forward(angles).parts[1], twist, psi)
-        found = self._own(self._measured.broken())
+        found = self._with_own_rows(self._measured.violations())
         if self._torques is not None:
-            found += self._distances(angles)
+            found += self._check_clearance(angles)
         return tuple(found)
 
     def _step_torques(self, monitor: TorqueMonitor, command: Command, cycles: int) -> list[LimitViolation]:
         tau = self._numbers(command.tau if isinstance(command, JointTorque) else None, "tau", command)
         monitor.step(tau, cycles)
-        return self._at_start({"torque": tau}) + monitor.broken()
+        return self._check_start({"torque": tau}) + monitor.violations()
 
     def _step_joints(self, command: Command, cycles: int) -> list[LimitViolation]:
         q = self._numbers(command.q if isinstance(command, JointPosition) else None, "q", command)
-        away = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
-        found = self._at_start({"joint": away}) + self._judge_joints(q, cycles)
-        return found + self._rest.step(self._difference, cycles, is_last=command.finished)
+        offset = [new - old for new, old in zip(q, self._start.q.tolist(), strict=True)]
+        found = self._check_start({"joint": offset}) + self._check_joints(q, cycles)
+        return found + self._standstill.step(self._last_difference, cycles, is_last=command.finished)
 
     def _step_pose(
         self, monitor: CartesianMonitor, command: Command, cycles: int, side: int | None
     ) -> list[LimitViolation]:
         if not isinstance(command, CartesianPosition):
-            raise self._wrong(command)
+            raise self._kind_error(command)
         numbers = np.asarray(command.T_base_tool, dtype=np.float64).ravel().tolist()
         if len(numbers) != 16 or find_frame_error(numbers) is not None:
-            return [self._improper(math.inf)]
+            return [self._pose_violation(math.inf)]
         pose = Pose.from_row_major(numbers)
         if self._has_elbow and command.psi is not None:
             self._psi = float(command.psi)
         monitor.step(pose, self._psi, cycles)
-        way = math.dist(pose.parts[1], self._start_pose.parts[1])
+        distance = math.dist(pose.parts[1], self._start_pose.parts[1])
         turn = 0.0 if self._psi is None else self._psi - (self._start_psi or 0.0)
-        found = self._at_start({"translation": [way], "arm_angle": [math.remainder(turn, math.tau)]})
-        found += monitor.broken()
+        found = self._check_start({"translation": [distance], "arm_angle": [math.remainder(turn, math.tau)]})
+        found += monitor.violations()
         flange = pose @ self._T_tool_flange if self._has_tool else pose
-        q = self._inverse.solve_near(flange, self._psi or 0.0, self._on_side(side))
+        q = self._inverse.solve_near(flange, self._psi or 0.0, self._joints_on_side(side))
         if q is None:
-            return [*found, self._improper(math.inf)]
+            return [*found, self._pose_violation(math.inf)]
         self._q = q
         if self._inverse.is_singular(q):
-            found.append(self._improper(float(self._inverse.singularity_path(np.array([q]))[0])))
-        found += self._judge_elbow(q) + self._judge_joints(q, cycles)
-        return found + self._rest.step(self._difference, cycles, is_last=command.finished)
+            found.append(self._pose_violation(float(self._inverse.singularity_path(np.array([q]))[0])))
+        found += self._check_elbow(q) + self._check_joints(q, cycles)
+        return found + self._standstill.step(self._last_difference, cycles, is_last=command.finished)
 
-    def _judge_joints(self, q: list[float], cycles: int) -> list[LimitViolation]:
+    def _check_joints(self, q: list[float], cycles: int) -> list[LimitViolation]:
         assert self._joints is not None
         self._joints.step(q, cycles)
-        found = self._joints.broken()
+        found = self._joints.violations()
         if not math.isfinite(sum(q)):
             return found
         state = self._joints
-        self._needed.step(
+        self._motion_torques.step(
             self._model.rigid_body.motion_torque(*map(np.array, (q, state.dq, state.ddq))).tolist(), cycles
         )
-        found += self._needed.broken()
+        found += self._motion_torques.violations()
         if self._box.is_active:
             self._box.step(self._model.forward(q).parts[1])
-            found += self._box.broken()
-        return found + self._distances(q)
+            found += self._box.violations()
+        return found + self._check_clearance(q)
 
-    def _difference(self, row: Condition) -> Sequence[float]:
-        """Returns the last velocities or accelerations for a row: the joints', or the tool's norm."""
+    def _last_difference(self, row: Condition) -> Sequence[float]:
+        """Returns the last velocities or accelerations for a row, of the joints or as a norm of the tool."""
         if row.is_per_joint:
             assert self._joints is not None
             return self._joints.dq if row.order == 1 else self._joints.ddq
         assert self._tool is not None
-        moved = self._tool.twist if row.order == 1 else self._tool.acceleration
-        return [math.hypot(*(moved[:3] if row.signal == "translation" else moved[3:]))]
+        tool_difference = self._tool.twist if row.order == 1 else self._tool.acceleration
+        return [math.hypot(*(tool_difference[:3] if row.signal == "translation" else tool_difference[3:]))]
 
-    def _on_side(self, side: int | None) -> list[float]:
-        """Returns the last joint angles, mirrored at the elbow's flip where the other side is asked for."""
+    def _joints_on_side(self, side: int | None) -> list[float]:
+        """Returns the last joint angles, mirrored at the elbow's flip if `side` is the other side."""
         flip = self._model.description.elbow_flip
         if flip is None or side is None or self._model.elbow(self._q)[1] == side:
             return self._q
         return [*self._q[:3], 2.0 * flip - self._q[3], *self._q[4:]]
 
-    def _judge_elbow(self, q: list[float]) -> list[LimitViolation]:
+    def _check_elbow(self, q: list[float]) -> list[LimitViolation]:
         row = self._pose_rows.get("elbow_sign")
         if row is None or self._model.elbow(q)[1] == self._start_side:
             return []
         return [LimitViolation(row, 0, -1.0, 0.0)]
 
-    def _at_start(self, values: dict[str, list[float]]) -> list[LimitViolation]:
-        """Returns what the first command of a standing arm breaks for being elsewhere than the arm is."""
+    def _check_start(self, values: dict[str, list[float]]) -> list[LimitViolation]:
+        """Returns the violations of the first command from standstill that is not at the arm's position."""
         if not self._is_first:
             return []
         found: list[LimitViolation] = []
@@ -262,14 +263,14 @@ class Monitor:
                     )
         return found
 
-    def _distances(self, q: Sequence[float] | Array) -> list[LimitViolation]:
+    def _check_clearance(self, q: Sequence[float] | Array) -> list[LimitViolation]:
         if self._clearance is None:
             return []
         self._clearance.step(q)
-        return self._clearance.broken()
+        return self._clearance.violations()
 
-    def _own(self, violations: list[LimitViolation]) -> list[LimitViolation]:
-        """Returns violations of common rows as those of the arm's own table, without those that it has no row for."""
+    def _with_own_rows(self, violations: list[LimitViolation]) -> list[LimitViolation]:
+        """Returns violations of common rows with the rows of the arm's table, without those that it does not have."""
         own = self._own_rows
         return [
             violation._replace(condition=own[row.id])
@@ -277,23 +278,23 @@ class Monitor:
             if (row := violation.condition).id in own
         ]
 
-    def _improper(self, nearness: float) -> LimitViolation:
-        return LimitViolation(self._pose_rows["frame"], 0, nearness, 1.0)
+    def _pose_violation(self, closeness: float) -> LimitViolation:
+        return LimitViolation(self._pose_rows["frame"], 0, closeness, 1.0)
 
     def _arm_angle(self, q: Array) -> float | None:
         return self._model.arm_angle(q) if self._has_elbow else None
 
     def _numbers(self, values: Array | None, name: str, command: Command) -> list[float]:
         if values is None:
-            raise self._wrong(command)
+            raise self._kind_error(command)
         numbers = np.asarray(values, dtype=np.float64).ravel().tolist()
         if len(numbers) != self._model.n:
-            raise InvalidValueError(name, values, f"needs {self._model.n} numbers")
+            raise InvalidValueError(name, values, f"must be {self._model.n} numbers")
         return numbers
 
-    def _wrong(self, command: object) -> InvalidValueError:
+    def _kind_error(self, command: object) -> InvalidValueError:
         kind = "JointTorque" if self._torques is not None else "CartesianPosition" if self._tool else "JointPosition"
-        return InvalidValueError("command", described(command), f"is no {kind}, which the mode {self.mode} asks for")
+        return InvalidValueError("command", described(command), f"must be a {kind} in the mode {self.mode}")
 
 
 def _throughout(rows: Sequence[Condition], *signals: str) -> list[Condition]:

@@ -1,4 +1,4 @@
-"""What a check found: one row a condition, one sentence a violation."""
+"""The report of a check: one row per condition, one sentence per violation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from rcilab.conformance.advice import share, with_degrees
 from rcilab.conformance.catalogue import Language, Phrase
 from rcilab.conformance.certificate import Certificate
-from rcilab.conformance.explain import LISTED, explain_report, explain_violation
+from rcilab.conformance.explain import MAX_LISTED, explain_report, explain_violation
 from rcilab.conformance.html import report_html
 from rcilab.conformance.limit_utilisation import Usage
 from rcilab.conformance.start import StartState
@@ -25,26 +25,27 @@ from rcilab.motion.motion import Motion
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ConditionResult:
-    """One condition, and how near the motion comes to its bound."""
+    """One condition, and the motion's worst value of it."""
 
     condition: Condition
-    """What is demanded: its quantity, its formula and its source."""
+    """The condition, with quantity, formula and source."""
     value: float
     """The worst value, in the condition's unit."""
     bound: float
-    """The bound on that side."""
+    """The bound on the side of the worst value."""
     ratio: float
-    """How much of the way from the middle of the allowed range to the bound is used; 1 is the bound."""
+    """Distance of the worst value from the middle of the allowed range, relative to that of the bound."""
     joint: int
     """Joint with the worst value, from 1; 0 for the tool."""
     time: float
-    """When, [s] since the start of the motion."""
+    """Time of the worst value, [s] since the start of the motion."""
     broken: int
-    """Number of samples that break the condition, over all joints."""
+    """Number of samples that violate the condition, over all joints."""
     links: LinkPair | None = None
     """The two links of the worst distance; None for other conditions."""
-    led_in: float = 0.0
-    """How far outside the safety box the tool starts, to be led in, [m]; 0 inside, and in all other rows."""
+    start_excess: float = 0.0
+    """Distance of the tool outside the safety box at the start, from where it may move inwards, [m]; 0 inside, and in
+    all other rows."""
 
     @property
     def ok(self) -> bool:
@@ -58,7 +59,7 @@ class ConditionResult:
 
     @property
     def source(self) -> str:
-        """Where condition and bound come from."""
+        """Source of condition and bound."""
         return self.condition.source
 
     @property
@@ -68,7 +69,7 @@ class ConditionResult:
 
     @property
     def fault(self) -> FaultCode | None:
-        """What the controller raises when it is broken; None for what it only recommends, or does not check."""
+        """Fault that the controller raises for a violation; None if it does not check the condition."""
         return self.condition.fault
 
     @property
@@ -77,41 +78,41 @@ class ConditionResult:
         return self.condition.unit
 
     @property
-    def place(self) -> str:
-        """Whose value it is: "joint 2", "tool", or "base and link 5"."""
+    def location(self) -> str:
+        """Axis or part of the value: "joint 2", "tool", or "base and link 5"."""
         return str(self.links) if self.links else self.condition.location(self.joint)
 
     @property
-    def shown(self) -> tuple[float, float]:
-        """Worst value and bound as people read them: one that only allows for rounding is 0, and what keeps it."""
+    def displayed(self) -> tuple[float, float]:
+        """Worst value and bound for display; a bound that is only a tolerance is 0, and so is a value within it."""
         condition = self.condition
         if condition.is_measured or (condition.signal != "position" and condition.stage == "throughout"):
             return self.value, self.bound
-        if self.ok and self.led_in:
-            return self.led_in, 0.0
+        if self.ok and self.start_excess:
+            return self.start_excess, 0.0
         return 0.0 if self.ok and abs(self.value) <= abs(self.bound) else self.value, 0.0
 
     @property
     def has_share(self) -> bool:
-        """Whether `ratio` is a part of the bound: not of 0, nor of a distance, which is to stay above its bound."""
+        """Whether `ratio` is a share of the bound: not of the bound 0, nor of a distance, whose bound is a minimum."""
         condition = self.condition
         if condition.is_clearance:
             return False
-        return self.ok and not self.led_in if condition.signal == "position" else condition.stage == "throughout"
+        return self.ok and not self.start_excess if condition.signal == "position" else condition.stage == "throughout"
 
     @property
     def texts(self) -> tuple[str, str, str]:
-        """Worst value, bound and used part as text; what is to be zero at an end, and is, reads 0."""
+        """Worst value, bound and used part as text; a value at an end within its tolerance of 0 is 0."""
         used = share(self.ratio) if self.has_share else ""
         if self.condition.signal == "position":
-            return f"{self.shown[0]:.4g}", "0", used
+            return f"{self.displayed[0]:.4g}", "0", used
         if self.condition.stage == "throughout":
             return *format_pair(self.value, self.bound), used
         return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
 
     @property
     def verdict(self) -> str:
-        """One word: ok, advice (a recommended condition is broken) or violated."""
+        """The result: ok, advice (a recommended condition is violated) or violated."""
         if self.ok:
             return "ok"
         return "violated" if self.necessity == "necessary" else "advice"
@@ -119,57 +120,57 @@ class ConditionResult:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Violation:
-    """Consecutive samples of one joint that break one condition; `str` returns a sentence.
+    """Consecutive samples of one joint that violate one condition; `str` returns a sentence.
 
     Attributes:
-        condition: What is broken.
-        joint: From 1; 0 for the tool.
-        time: The first of the samples, [s] since the start of the motion.
-        count: How many samples in a row, at 1 ms each.
-        value: The worst of them, in the condition's unit.
-        worst_time: When it is worst, [s].
-        bound: The bound it passes.
-        ratio: As in ConditionResult; 1 is the bound.
-        advice: What to do about it.
+        condition: The violated condition.
+        joint: Number of the joint, from 1; 0 for the tool.
+        time: Time of the first sample, [s] since the start of the motion.
+        count: Number of consecutive samples, 1 ms each.
+        value: Worst value, in the condition's unit.
+        worst_time: Time of the worst value, [s].
+        bound: The violated bound.
+        ratio: As in `ConditionResult`; 1 is the bound.
+        advice: Remedy.
         links: The two links of the worst distance; None for other conditions.
     """
 
     condition: Condition
-    """What is broken."""
+    """The violated condition."""
     joint: int
-    """From 1; 0 for the tool."""
+    """Number of the joint, from 1; 0 for the tool."""
     time: float
-    """The first of the samples, [s] since the start of the motion."""
+    """Time of the first sample, [s] since the start of the motion."""
     count: int
-    """How many samples in a row, at 1 ms each."""
+    """Number of consecutive samples, 1 ms each."""
     value: float
-    """The worst of them, in the condition's unit."""
+    """Worst value, in the condition's unit."""
     worst_time: float
-    """When it is worst, [s]."""
+    """Time of the worst value, [s]."""
     bound: float
-    """The bound it passes."""
+    """The violated bound."""
     ratio: float
-    """As in ConditionResult; 1 is the bound."""
+    """As in `ConditionResult`; 1 is the bound."""
     advice: str
-    """What to do about it."""
+    """Remedy."""
     links: LinkPair | None = None
     """The two links of the worst distance; None for other conditions."""
 
     @property
     def fault(self) -> FaultCode | None:
-        """What the controller raises; None for what it only recommends, or does not check."""
+        """Fault that the controller raises; None if it does not check the condition."""
         return self.condition.fault
 
     @property
-    def place(self) -> str:
-        """Whose value it is: "joint 2", "tool", or "base and link 5"."""
+    def location(self) -> str:
+        """Axis or part of the value: "joint 2", "tool", or "base and link 5"."""
         return str(self.links) if self.links else self.condition.location(self.joint)
 
     def explain(self, language: Language = "en", units: Units | None = None) -> str:
-        """Returns it in sentences: the fact, the fault, the remedy. Arguments as of `Report.explain`.
+        """Returns the violation in sentences: value, fault and remedy. Arguments as of `Report.explain`.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is unknown.
         """
         return explain_violation(self, language, units)
 
@@ -182,10 +183,9 @@ class Violation:
         when = f" at t = {self.time:.3f} s{lasting}" if row.stage == "throughout" else ""
         is_advice = row.necessity == "recommended" and row.fault is None
         passes = ": the controller does not stop for it" if is_advice else ""
-        return f"{self.place}: {self._what()}{when} ({row.necessity} condition{passes}); {self.advice}"
+        return f"{self.location}: {self._describe_value()}{when} ({row.necessity} condition{passes}); {self.advice}"
 
-    def _what(self) -> str:
-        """Returns quantity, value and bound in words."""
+    def _describe_value(self) -> str:
         row = self.condition
         value, bound = format_pair(self.value, self.bound)
         if row.stage != "throughout":
@@ -206,31 +206,31 @@ class Violation:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Report:
-    """The verdict on one motion; `print` shows it as a table with a sentence for each violation.
+    """The result of the check of one motion; `print` shows a table and a sentence per violation.
 
     Attributes:
         ok: Whether every necessary condition holds.
-        certificate: The proof that `execute` asks for; None when the report is not ok.
-        title: Which motion on which arm, in words.
-        rows: One ConditionResult a condition, in the manual's order: worst value, bound, joint and time.
-        worst: The row of the necessary condition nearest to, or farthest past, its bound.
-        violations: Necessary conditions that are broken, worst first: the robot would stop, or hit itself or the floor.
-        warnings: Recommended conditions that are broken, worst first.
+        certificate: The certificate that `execute` requires; None if the report is not ok.
+        title: Arm and motion, as text.
+        rows: One `ConditionResult` per condition, in the manual's order: worst value, bound, joint and time.
+        worst: The row of the necessary condition closest to, or farthest beyond, its bound.
+        violations: Violations of necessary conditions, worst first: the robot would stop, or hit itself or the floor.
+        warnings: Violations of recommended conditions, worst first.
         motion: The motion that was checked.
         start: The state of the arm at the start of the check.
         measure: Evaluates every cycle, for `usage`.
-        issue: Makes the certificate, for `certificate`.
+        issue: Issues the certificate, for `certificate`.
         check_again: Checks another motion by some of the rows, for the same arm, start, safety box and mode.
     """
 
     title: Phrase
-    """Which motion on which arm, in words."""
+    """Arm and motion, as text."""
     rows: tuple[ConditionResult, ...]
-    """One a condition, in the manual's order."""
+    """One per condition, in the manual's order."""
     violations: tuple[Violation, ...]
-    """Necessary conditions that are broken, worst first: the robot would stop, or hit itself or the floor."""
+    """Violations of necessary conditions, worst first: the robot would stop, or hit itself or the floor."""
     warnings: tuple[Violation, ...]
-    """Recommended conditions that are broken, worst first."""
+    """Violations of recommended conditions, worst first."""
     motion: Motion
     """The motion that was checked."""
     start: StartState
@@ -238,7 +238,7 @@ class Report:
     measure: Callable[[], Usage] = field(repr=False)
     """Evaluates every cycle, for `usage`."""
     issue: Callable[[], Certificate] = field(repr=False)
-    """Makes the certificate, for `certificate`."""
+    """Issues the certificate, for `certificate`."""
     check_again: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
     """Checks another motion by some of the rows, for the same arm, start, safety box and mode."""
 
@@ -249,23 +249,23 @@ class Report:
 
     @property
     def worst(self) -> ConditionResult:
-        """The necessary condition nearest to, or farthest past, its bound."""
+        """The necessary condition closest to, or farthest beyond, its bound."""
         return max((row for row in self.rows if row.necessity == "necessary"), key=lambda row: (not row.ok, row.ratio))
 
     @property
     def certificate(self) -> Certificate | None:
-        """The proof for a hand-off; a report that is not ok has none."""
+        """The certificate for `execute`; None if the report is not ok."""
         return self.issue() if self.ok else None
 
     def usage(self) -> Usage:
-        """Returns which necessary condition is worst in every cycle, and how much of its bound is used there."""
+        """Returns the worst necessary condition in every cycle, and the used part of its bound."""
         return self.measure()
 
     def require(self) -> Report:
         """Returns this report if it is ok.
 
         Raises:
-            ConformanceError: A necessary condition is broken; `.violations` has them all.
+            ConformanceError: A necessary condition is violated; `.violations` has all violations.
         """
         if self.ok:
             return self
@@ -280,42 +280,42 @@ class Report:
         at_most: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> SlowDown:
-        """Returns the least slow-down of the motion that passes, or why none does.
+        """Returns the smallest slow-down with which the motion conforms, or why none exists.
 
-        The curve stays the same and runs slower as a whole. The factor is found to 0.1 % and checked: the motion comes
-        with its own report. It does not help a path that leaves its range or the box, nor a start that is elsewhere.
-        Rows from elsewhere (`Motion.from_cycles`) jump a little in acceleration from row to row, and that shows at one
-        factor and not at the next: with them a smaller factor may pass by chance.
+        The path does not change; the whole motion becomes slower. The factor is found to 0.1 % and the slowed motion is
+        checked; it has its own report. A path outside a range or the box, or a start away from the arm, cannot be
+        corrected. Accelerations of given rows (`Motion.from_cycles`) jump slightly from row to row, which matters at
+        some factors and not at others; for them a smaller factor may conform by chance.
 
         Args:
-            recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
+            recommended: Whether to satisfy the recommended conditions too, as far as a slow-down can.
             at_most: Largest factor to try, 1 or more; None is 20, or less for a motion that would then last more than
                 ten minutes.
-            progress: Called after every try with the part of the work that is done, 0 to 1, as far as that can be
-                known; what it raises ends the search.
+            progress: Called after every attempt with the estimated progress, 0 to 1; an exception raised by it cancels
+                the search.
 
         Raises:
-            InvalidValueError: `at_most` is no number of at least 1.
+            InvalidValueError: `at_most` is not a number of at least 1.
         """
         return find_slow_down(self, recommended=recommended, at_most=at_most, progress=progress)
 
     @property
     def broken_conditions(self) -> int:
-        """How many conditions the violations are of: one may be broken more than once, and by more than one joint."""
+        """Number of violated conditions; one may have violations at several times and of several joints."""
         return len({violation.condition.id for violation in self.violations})
 
     def explain(self, language: Language = "en", units: Units | None = None, *, slowed: SlowDown | None = None) -> str:
-        """Returns in whole sentences what is wrong, where, when and by how much, what it raises and what to do.
+        """Returns the report in sentences: values, joints, times, faults and remedies.
 
-        It ends with what `slow_down` finds, and so takes as long, unless that is given.
+        It ends with the result of `slow_down`, and takes as long unless that is passed.
 
         Args:
             language: "en" is English, "zh" Chinese.
             units: Units of angles and lengths; None is SI, with degrees next to radians.
-            slowed: What `slow_down` has found already.
+            slowed: Result of `slow_down`, if known.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is unknown.
         """
         return explain_report(self, language, units, slowed)
 
@@ -324,14 +324,14 @@ class Report:
         width = max(len(row.id) for row in self.rows)
         for row in self.rows:
             value, bound, used = row.texts
-            place = f"{row.place}, t = {row.time:.3f} s"
+            place = f"{row.location}, t = {row.time:.3f} s"
             relation = " >" if row.condition.is_clearance else "of"
             size = f"{value:>9} {relation} {bound:>10} {row.unit:7} {used:>7}"
             lines.append(f"  {row.verdict:8}  {row.id:{width}}  {size}  {place}  [{row.source}]")
         found = (*self.violations, *self.warnings)
-        lines += [f"- {violation}" for violation in found[:LISTED]]
-        if len(found) > LISTED:
-            lines.append(f"- ... and {len(found) - LISTED} more")
+        lines += [f"- {violation}" for violation in found[:MAX_LISTED]]
+        if len(found) > MAX_LISTED:
+            lines.append(f"- ... and {len(found) - MAX_LISTED} more")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -343,11 +343,11 @@ class Report:
     def _verdict(self) -> str:
         worst = self.worst
         if self.ok:
-            near = f"{worst.condition.quantity} of {worst.place}, {share(worst.ratio)} of its bound"
+            nearest = f"{worst.condition.quantity} of {worst.location}, {share(worst.ratio)} of its bound"
             if worst.condition.is_clearance:
-                near = f"{worst.place}, {worst.value:.4g} m apart"
+                nearest = f"{worst.location}, {worst.value:.4g} m apart"
             advice = f"; {_plural(len(self.warnings), 'recommendation')} not met" if self.warnings else ""
-            return f"conforms{advice}; nearest necessary bound: {near}"
+            return f"conforms{advice}; nearest necessary bound: {nearest}"
         broken = [row for row in self.rows if not row.ok and row.necessity == "necessary"]
         names = ", ".join(dict.fromkeys(row.fault.manual_name for row in broken if row.fault is not None))
         outcome = f"the robot would stop with {names}" if names else "the robot would not notice before it hits"

@@ -1,4 +1,4 @@
-"""The values of a motion that the conditions are on, as tables with a row for each cycle of the controller."""
+"""The quantities of a motion that conditions bound, as tables with one row per controller cycle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.standstill import beyond_a_cycle
+from rcilab.conformance.standstill import above_resolution
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array
@@ -23,30 +23,30 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
 
 HOLD_SAMPLES = 3
-"""Cycles checked after the last row, in which the controller repeats it: a third difference reaches back that far."""
+"""Number of checked cycles after the last row, which the controller repeats: the reach of a third difference."""
 
 _SMOOTH_JERK = 0.01
 """Part of the jerk limits below which torques change smoothly, at speeds within the limits: a tenth of what the torque
-rate allows."""
+rate limit allows."""
 _SMOOTH_STEP = 16
-"""[cycles] How far apart torques are computed where they change smoothly; straight lines between them, exact to 2 % of
-the bounds (tests/conformance/test_signals.py)."""
+"""[cycles] Spacing of computed torques where they change smoothly; between them they are interpolated linearly,
+accurate to 2 % of the bounds (tests/conformance/test_signals.py)."""
 
 
-_SURE = 0.8
-"""Part of a bound on torques up to which straight lines are enough; rows beyond it are computed."""
+_INTERPOLATED_PART = 0.8
+"""Part of a torque bound up to which interpolation is sufficient; rows beyond it are computed."""
 
 
 class MotionSignals:
-    """One motion's signals, each a table with a row a cycle.
+    """The signals of one motion, each a table with one row per cycle.
 
     Args:
         motion: The motion.
         model: The arm, with its tool and load.
-        start: Where the arm comes from.
-        box: Where the tool shall stay, or None.
-        distance: How far links shall stay from each other and from the floor, or None.
-        mode: How it is commanded. Commanded torques are exact in every row, as the controller checks each.
+        start: The state of the arm at the start.
+        box: The safety box, or None.
+        distance: Required distances of the links from each other and from the floor, or None.
+        mode: Mode of the motion. Commanded torques are computed in every row, as the controller checks each.
     """
 
     def __init__(
@@ -68,12 +68,12 @@ class MotionSignals:
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
     def table(self, condition: Condition) -> tuple[Array, float]:
-        """Returns the values for a condition, shape (rows, n) or (rows, 1), and the first row's time, [s]."""
+        """Returns the values for a condition, shape (rows, n) or (rows, 1), and the time of the first row, [s]."""
         if condition.stage == "throughout":
             return self._throughout(condition), 0.0
         if condition.stage == "end":
-            return self._rest(condition), self._motion.duration
-        return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._rest(condition), 0.0
+            return self._end_values(condition), self._motion.duration
+        return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._end_values(condition), 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns the two links of the distance in a row of a table; None for other conditions."""
@@ -94,25 +94,25 @@ class MotionSignals:
             return self._tool.elbow_side
         if condition.signal == "position":
             assert self._box is not None
-            return self._excess(self._box)[:, np.newaxis]
+            return self._box_excess(self._box)[:, np.newaxis]
         return self._differences[condition.order]
 
-    def _excess(self, box: SafetyBox) -> Array:
-        way = self._model.position_path(self._differences[0])
+    def _box_excess(self, box: SafetyBox) -> Array:
+        positions = self._model.position_path(self._differences[0])
         entry = box_for_start(box, self._model.forward(self._start.q).parts[1])
         if isinstance(entry, EntryBox):
-            return np.array([entry.excess(position) for position in way.tolist()])
-        return box.excess_path(way)
+            return np.array([entry.excess(position) for position in positions.tolist()])
+        return box.excess_path(positions)
 
     @property
-    def start_outside(self) -> float:
-        """How far outside the safety box the tool starts, [m]; 0 inside it, or without one."""
+    def start_excess(self) -> float:
+        """Distance of the tool outside the safety box at the start, [m]; 0 inside, or without a box."""
         if self._box is None:
             return 0.0
         return max(0.0, self._box.excess(self._model.forward(self._start.q).parts[1]))
 
     def _at_start(self, condition: Condition) -> Array:
-        """Returns how far the first command is from what the arm has, shape (n,) or (1,)."""
+        """Returns the difference of the first command from the state of the arm, shape (n,) or (1,)."""
         if condition.signal == "translation":
             return np.array([self._tool.start_distance])
         if condition.signal == "arm_angle":
@@ -127,71 +127,73 @@ class MotionSignals:
 
     @cached_property
     def _clearance(self) -> dict[str, ClearancePath]:
-        """The smallest distance between links, and that from the floor, by signal."""
+        """The smallest distance between links, and from the floor, by signal."""
         from rcilab.model.kinematics.collision import ClearanceQuery
 
         assert self._distance is not None
         geometry = self._model.collision_geometry(self._distance)
         query, path = ClearanceQuery(geometry), self._differences[0]
-        asks = {"link_distance": query.links, "floor_distance": query.floor}
+        queries = {"link_distance": query.links, "floor_distance": query.floor}
         bounds: dict[str, list[float]] = {}
         for row in clearance_conditions(self._distance):
             bounds.setdefault(row.signal, []).append(float(row.bounds(self._model.limits)[0][0]))
         return {
-            signal: clearance_path(asks[signal], path, self._start.q, geometry.levers, wanted)
-            for signal, wanted in bounds.items()
+            signal: clearance_path(queries[signal], path, self._start.q, geometry.levers, minima)
+            for signal, minima in bounds.items()
         }
 
     @cached_property
     def _torques(self) -> tuple[Array, Array]:
-        """Torques without gravity and their backward differences over a cycle, each of shape (N + 3, n)."""
+        """Torques without gravity and their backward differences over one cycle, each of shape (N + 3, n)."""
         _, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_JERK
-        is_eventful = (np.abs(jerk) > smooth * joint.jerk) | (np.abs(dq) > joint.velocity)
-        chosen = _eventful_rows(np.asarray(is_eventful.any(axis=1), dtype=np.bool_))
+        is_rough = (np.abs(jerk) > smooth * joint.jerk) | (np.abs(dq) > joint.velocity)
+        chosen = _rows_to_compute(np.asarray(is_rough.any(axis=1), dtype=np.bool_))
         tau, rate = self._torques_at(chosen)
-        is_near = (np.abs(tau) > _SURE * joint.torque) | (np.abs(rate) > _SURE * joint.torque_rate)
-        more = chosen | _with_rows_before(np.asarray(is_near.any(axis=1), dtype=np.bool_))
-        return (tau, rate) if (more == chosen).all() else self._torques_at(more)
+        is_near = (np.abs(tau) > _INTERPOLATED_PART * joint.torque) | (
+            np.abs(rate) > _INTERPOLATED_PART * joint.torque_rate
+        )
+        refined = chosen | _with_previous_rows(np.asarray(is_near.any(axis=1), dtype=np.bool_))
+        return (tau, rate) if (refined == chosen).all() else self._torques_at(refined)
 
     def _torques_at(self, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Returns torques computed in some rows, straight lines between them, and their differences over a cycle."""
+        """Returns torques, computed in some rows and interpolated in others, and their differences over one cycle."""
         q, dq, ddq, _ = self._differences
         rows = np.flatnonzero(chosen)
-        known = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
-        every = np.arange(len(q))
+        computed = np.ascontiguousarray(self._model.rigid_body.motion_torques(q[rows], dq[rows], ddq[rows]).T)
+        all_rows = np.arange(len(q))
         tau = np.empty(q.T.shape)
-        for joint, values in enumerate(known):
-            tau[joint] = np.interp(every, rows, values)
+        for joint, values in enumerate(computed):
+            tau[joint] = np.interp(all_rows, rows, values)
         before = tau[:, :1] if self._start.moving else np.zeros_like(tau[:, :1])
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
-    def _rest(self, condition: Condition) -> Array:
-        """Returns what is left of velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
+    def _end_values(self, condition: Condition) -> Array:
+        """Returns velocity or acceleration at an end of the motion, above the resolution, shape (1, n) or (1, 1)."""
         values = self._throughout(condition)
         row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
-        return beyond_a_cycle(values[row : row + 1], condition, self._model.limits)
+        return above_resolution(values[row : row + 1], condition, self._model.limits)
 
 
-def _eventful_rows(is_eventful: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Returns the rows between which torques run straight: all on either side of an event, and some in between."""
-    chosen = _with_rows_before(is_eventful)
+def _rows_to_compute(is_rough: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Returns the rows to compute: all where torques do not change smoothly, and some in between."""
+    chosen = _with_previous_rows(is_rough)
     chosen[::_SMOOTH_STEP] = True
     chosen[-1] = True
     return chosen
 
 
-def _with_rows_before(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _with_previous_rows(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     found = rows.copy()
     found[:-1] |= rows[1:]
     return found
 
 
 def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:
-    """Returns angles, velocity, acceleration and jerk in every cycle, hold included, each of shape (N + 3, n).
+    """Returns angles, velocity, acceleration and jerk in every cycle, with the hold, each of shape (N + 3, n).
 
-    Divisions by the cycle time one after the other, as the monitor does it: equal to the last bit. In memory a joint's
-    values lie side by side, which makes everything that is done joint by joint several times faster.
+    Successive divisions by the cycle time, as in the monitor, give results equal to the last bit. The values of a joint
+    are contiguous in memory, which makes operations per joint several times faster.
     """
     commands = (q[1:] if start.moving else q).T
     hold = np.repeat(q[-1:].T, HOLD_SAMPLES, axis=1)

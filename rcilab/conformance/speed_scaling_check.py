@@ -1,4 +1,4 @@
-"""The check of a change of the speed override: the new rows, by the conditions of the mode they run in."""
+"""Check of a change of the speed override: the new rows, by the conditions of their mode."""
 
 from __future__ import annotations
 
@@ -20,81 +20,80 @@ from rcilab.motion.speed_scaling import (
     start_with_override,
 )
 
-_ATTEMPTS = 12  # Candidates that are checked in full, which bounds the time of a change.
-_PAST = 3  # Rows that the differences of a row reach back to.
+_ATTEMPTS = 12  # Number of candidates that are fully checked; it bounds the computing time.
+_PREVIOUS_ROWS = 3  # Number of previous rows that enter the differences of a row.
 
 
-def plan_start(motion: Motion, speed_override: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
-    """Returns a motion that runs with a speed override from its first row on, checked by the conditions of its mode.
+def plan_start_with_override(motion: Motion, speed_override: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
+    """Returns a motion with a speed override from its first row on, checked by the conditions of its mode.
 
-    The path is the one that was checked, so safety box and distances need no other check; at 1 nothing does.
+    The path is already checked, so safety box and distances need no new check; at an override of 1 nothing does.
 
     Args:
         motion: The motion, checked as planned.
-        speed_override: `MIN_SPEED_OVERRIDE` to 1.
+        speed_override: From `MIN_SPEED_OVERRIDE` to 1.
         model: The arm, with its tool and load.
-        mode: How it is commanded.
+        mode: Mode of the motion.
 
     Raises:
         InvalidValueError: The override is out of range.
-        PlanningError: At this speed it breaks a condition that it keeps as planned, as torques that hold the arm may.
+        PlanningError: With this override it violates a condition that it satisfies as planned, such as a torque limit.
     """
-    paced = start_with_override(motion, require_speed_override(speed_override))
-    if not paced.changed:
-        return paced
-    broken = _violations(paced, model, mode)
-    if broken:
+    scaled = start_with_override(motion, require_speed_override(speed_override))
+    if not scaled.changed:
+        return scaled
+    violations = _violations(scaled, model, mode)
+    if violations:
         raise PlanningError(
-            f"at {100 * speed_override:.0f} % of its speed this motion would break a condition "
-            f"({broken[0].condition.id} at "
-            f"t = {broken[0].time:.3f} s) that it keeps as planned; choose another speed override"
+            f"at {100 * speed_override:.0f} % of its speed this motion would violate a condition "
+            f"({violations[0].condition.id} at "
+            f"t = {violations[0].time:.3f} s) that it satisfies as planned; use another speed override"
         ).coded(
             "pace_breaks",
             speed_override=f"{100 * speed_override:.0f}",
-            id=broken[0].condition.id,
-            time=f"{broken[0].time:.3f}",
+            id=violations[0].condition.id,
+            time=f"{violations[0].time:.3f}",
         )
-    return paced
+    return scaled
 
 
 def plan_speed_override(
-    paced: SpeedScaledMotion, cycle: int, speed_override: float, model: RobotModel, mode: Mode
+    scaled: SpeedScaledMotion, cycle: int, speed_override: float, model: RobotModel, mode: Mode
 ) -> SpeedScaledMotion:
-    """Returns the motion that continues with another speed override from a cycle on, once all conditions allow it.
+    """Returns the motion with another speed override, from the first cycle on at which all conditions allow it.
 
-    The path stays the one that was checked, so safety box and distances need no other check. The override that it has
-    already changes nothing.
+    The path is already checked, so safety box and distances need no new check. The current override has no effect.
 
     Args:
-        paced: The motion as it runs so far.
-        cycle: The first row that may differ.
-        speed_override: From 0, to be held, to 1.
+        scaled: The current motion.
+        cycle: Index of the first row that may change.
+        speed_override: From 0 (held) to 1.
         model: The arm, with its tool and load.
-        mode: How it is commanded.
+        mode: Mode of the motion.
 
     Raises:
-        PlanningError: There is no such change from there: the motion arrives before, or uses all of a limit until then.
+        PlanningError: No change is possible: the motion ends before, or uses a limit in full until then.
     """
     for _, candidate in zip(
-        range(_ATTEMPTS), change_speed_override(paced, cycle, speed_override, model.limits.joint), strict=False
+        range(_ATTEMPTS), change_speed_override(scaled, cycle, speed_override, model.limits.joint), strict=False
     ):
         if not _violations(candidate, model, mode):
             return candidate
     raise PlanningError(
-        f"at t = {paced.plan_time_at(cycle):.2f} s of {paced.motion.duration:.2f} s of the plan no change to "
+        f"at t = {scaled.plan_time_at(cycle):.2f} s of {scaled.motion.duration:.2f} s of the plan no change to "
         f"{100 * speed_override:.0f} % of its speed is possible within the limits; the motion continues "
         "unchanged, and stop() always works"
     ).coded("no_way_to_pace", speed_override=f"{100 * speed_override:.0f}")
 
 
 def _violations(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:
-    """Returns what the rows from the change on would break."""
+    """Returns the violations in the rows from the change on."""
     first = candidate.changed - 1
     rows = candidate.q[first:]
-    if first < _PAST:
+    if first < _PREVIOUS_ROWS:
         rows, start = candidate.q, None
     else:
-        start = _state(candidate.q[first - _PAST : first + 1])
+        start = _state(candidate.q[first - _PREVIOUS_ROWS : first + 1])
     report = check(Motion.from_cycles(rows), model, start=start, distance=None, mode=mode)
     return list(report.violations)
 

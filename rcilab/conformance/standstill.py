@@ -1,4 +1,4 @@
-"""What counts as standstill at the ends of a motion: what is below the resolution of one cycle."""
+"""Standstill at the ends of a motion, within the resolution of one cycle."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import AnyLimits, Condition, all_limits, joint_limits
 
 
-def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
-    """Returns how large a difference of commands can be in the first cycle after standstill, within the jerk limit.
+def resolution(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
+    """Returns the largest difference of commands in the first cycle after standstill within the jerk limit.
 
-    A motion that starts as fast as it may has moved by the time of its second command. So the controller, which has
-    only the commands, cannot distinguish less than this from standstill, and no row of the table asks for more.
+    A motion that starts as fast as allowed has already moved at its second command. The controller, which only has the
+    commands, cannot distinguish a smaller difference from standstill, so no condition requires one.
 
     Args:
         condition: A row on the velocity or acceleration at the start or the end.
-        limits: Of the arm.
-        cycles: Over how many cycles the difference is taken, 1 or more.
+        limits: Limits of the arm.
+        cycles: Number of cycles of the difference, 1 or more.
 
     Returns:
         Shape (n,), or (1,) for a row on the tool, in the condition's unit.
@@ -31,13 +31,13 @@ def unresolved(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Arra
     return jerk * (cycles * CYCLE_TIME) ** (3 - condition.order)
 
 
-def beyond_a_cycle(value: Array, condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
-    """Returns what is left of velocities or accelerations without what one cycle cannot resolve.
+def above_resolution(value: Array, condition: Condition, limits: AnyLimits, cycles: int = 1) -> Array:
+    """Returns the part of velocities or accelerations above the resolution of one cycle.
 
     Args:
-        value: Differences of commands, shape (..., n), or (..., 1) for norms of the tool's.
+        value: Differences of commands, shape (..., n), or (..., 1) for norms of the tool.
         condition: The row on them.
-        limits: Of the arm.
-        cycles: Over how many cycles the differences are taken.
+        limits: Limits of the arm.
+        cycles: Number of cycles of the differences.
     """
-    return np.sign(value) * np.maximum(np.abs(value) - unresolved(condition, limits, cycles), 0.0)
+    return np.sign(value) * np.maximum(np.abs(value) - resolution(condition, limits, cycles), 0.0)

@@ -1,4 +1,4 @@
-"""Standstill at both ends of a motion, cycle by cycle: the recommended rows of `check`."""
+"""Check of standstill at both ends of a motion, cycle by cycle, by the recommended rows of `check`."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.standstill import beyond_a_cycle
+from rcilab.conformance.standstill import above_resolution
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 
 
 class StandstillMonitor:
-    """Checks that a motion starts and ends at standstill, from the differences that other monitors took.
+    """Checks that a motion starts and ends at standstill, with the differences of other monitors.
 
-    Owned by the thread that runs the cycle. A velocity needs two commands, an acceleration three, so those at the start
-    are checked with the second and the third command, and those at the end with the last one.
+    Owned by the thread that runs the cycle. A velocity needs two commands, an acceleration three, so at the start they
+    are checked with the second and the third command, and at the end with the last one.
 
     Args:
         limits: Bounds of the arm.
@@ -32,17 +32,17 @@ class StandstillMonitor:
         """Restarts the history.
 
         Args:
-            is_moving: Whether the arm moves already: then it has its first command.
+            is_moving: Whether the arm is moving and thus already has its first command.
         """
         self._passed = 0 if is_moving else -1
 
     def step(
         self, differences: Callable[[Condition], Sequence[float]], cycles: int, *, is_last: bool
     ) -> list[LimitViolation]:
-        """Takes the differences of this cycle and returns what they break at an end of the motion.
+        """Checks the differences of this cycle and returns their violations at an end of the motion.
 
         Args:
-            differences: Returns the velocities or accelerations for a row, one a joint, or a norm of the tool's.
+            differences: Returns the velocities or accelerations for a row, one per joint, or one norm of the tool.
             cycles: Cycles since the last command, 1 or more.
             is_last: Whether this command ends the motion.
         """
@@ -52,7 +52,7 @@ class StandstillMonitor:
         for row, lower, upper in self._rows:
             if not (is_last if row.stage == "end" else before < row.order <= self._passed):
                 continue
-            values = beyond_a_cycle(np.array(differences(row)), row, self._limits, cycles)
+            values = above_resolution(np.array(differences(row)), row, self._limits, cycles)
             for axis, (value, low, high) in enumerate(
                 zip(values.tolist(), lower.tolist(), upper.tolist(), strict=True), 1
             ):

@@ -1,4 +1,4 @@
-"""The state that a motion starts from: what the controller holds before the first command."""
+"""The state of the arm at the start of a motion, as the controller has it before the first command."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class StartState:
 
 
 def as_start(start: ArrayLike | StartState, n: int) -> StartState:
-    """Returns a checked start state; bare joint angles mean an arm that stands there.
+    """Returns a checked start state; plain joint angles are a stationary arm.
 
     Raises:
         InvalidValueError: Not n finite numbers.

@@ -1,4 +1,4 @@
-"""The least slow-down that makes a motion conform, found from ratios and proven by checks."""
+"""The smallest slow-down with which a motion conforms, estimated from ratios and verified by checks."""
 
 from __future__ import annotations
 
@@ -22,56 +22,55 @@ from rcilab.motion.motion import Motion
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
 
-AT_MOST = 20.0
-"""Largest factor that is tried: a motion that needs more does not run too fast, it jumps."""
-LONGEST = 600.0  # [s]
-"""How long a slowed motion may last: 600 000 rows. The factor 2 is tried in any case."""
+MAX_FACTOR = 20.0
+"""Largest factor to try. Reason: a motion that needs more is not too fast but has jumps."""
+MAX_DURATION = 600.0  # [s]
+"""Longest duration of a slowed motion, 600 000 rows. The factor 2 is tried in any case."""
 PRECISION = 1e-3
-"""Part by which the factor may be larger than the least one."""
+"""Relative tolerance of the factor."""
 
-_USUAL_TRIES = 6  # Measured searches took 2 to 13; for the progress estimate only.
-_LOOK_BACK = 3  # [cycles] How long a third difference sees the start.
-_JUMP = 4.0
-"""Times more than a smooth motion would have left at the largest factor: then it jumps."""
+_TYPICAL_ATTEMPTS = 6  # Measured: 2 to 13. For the progress estimate.
+_START_CYCLES = 3  # [cycles] Reach of a third difference from the start.
+_JUMP_RATIO = 4.0
+"""A motion jumps if its ratio at the largest factor exceeds that of a smooth motion by this factor. Tuning value."""
 
 Obstacle: TypeAlias = Literal["position", "elsewhere", "moving_start", "jump", "too_fast"]
-"""Why no slow-down helps: the path itself leaves its range or the box; it starts elsewhere than the arm is; the arm
-moves at the start, and the slowed motion does not continue that; it jumps somewhere; it is too fast for the
-largest factor tried."""
+"""Why no slow-down conforms: the path leaves a range or the box; it does not start at the arm; the arm is moving at the
+start, and the slowed motion does not match its velocity; the motion jumps; it is too fast for the largest factor."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SlowDown:
-    """The least slow-down of a motion that passes, or why no slow-down passes; `str` returns a sentence."""
+    """The smallest slow-down with which a motion conforms, or why none exists; `str` returns a sentence."""
 
     before: Motion
-    """The motion as it was."""
+    """The original motion."""
     factor: float | None = None
-    """Times slower, 1 or more; None when no slow-down passes."""
+    """Factor on the duration, 1 or more; None if no slow-down conforms."""
     motion: Motion | None = None
-    """The slowed motion; the one of the report when the factor is 1, None when no slow-down passes."""
+    """The slowed motion; the original one if the factor is 1, None if no slow-down conforms."""
     report: Report | None = None
-    """Its own report, with the certificate; None when no slow-down passes."""
+    """Report of the slowed motion, with the certificate; None if no slow-down conforms."""
     decisive: ConditionResult | None = None
-    """What decides the factor, as the slowed motion has it; or what stays broken at the largest factor tried. None when
-    the motion passes as it is."""
+    """The result that determines the factor, for the slowed motion; or one that is violated at the largest factor. None
+    if the original motion conforms."""
     obstacle: Obstacle | None = None
-    """Why no slow-down passes; None when one does."""
+    """Why no slow-down conforms; None if one does."""
     unmet: tuple[Condition, ...] = ()
-    """Recommended conditions that were asked for and that no slow-down meets."""
+    """Requested recommended conditions that no slow-down satisfies."""
     at_most: float
     """The largest factor tried."""
 
     @property
     def ok(self) -> bool:
-        """Whether there is a slow-down that passes."""
+        """Whether a slow-down conforms."""
         return self.factor is not None
 
     def explain(self, language: Language = "en") -> str:
-        """Returns it in a sentence.
+        """Returns the result in a sentence.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is unknown.
         """
         return explain_slow_down(self, language)
 
@@ -89,122 +88,120 @@ def find_slow_down(
     at_most: float | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> SlowDown:
-    """Returns the least slow-down of a report's motion that passes, or why none does.
+    """Returns the smallest slow-down with which a report's motion conforms, or why none exists.
 
     Args:
-        report: On the motion as it is.
-        recommended: Whether to meet the recommended conditions too, those that some slow-down meets.
-        at_most: Largest factor to try, 1 or more; None is `AT_MOST`, or what makes the motion last `LONGEST`.
-        progress: Called after every try with the part of the work that is done, 0 to 1: an estimate, as the
-            number of tries is not known. What it raises ends the search.
+        report: Report on the original motion.
+        recommended: Whether to satisfy the recommended conditions too, as far as a slow-down can.
+        at_most: Largest factor to try, 1 or more; None is `MAX_FACTOR`, or what makes the motion last `MAX_DURATION`.
+        progress: Called after every attempt with the estimated progress, 0 to 1; an exception raised by it cancels the
+            search.
 
     Raises:
-        InvalidValueError: `at_most` is no number of at least 1.
+        InvalidValueError: `at_most` is not a number of at least 1.
     """
-    return _Search(report, _largest(report.motion, at_most), progress or (lambda part: None)).run(recommended)
+    return _Search(report, _max_factor(report.motion, at_most), progress or (lambda part: None)).run(recommended)
 
 
 class _Search:
-    """One search, with the report it starts from and the largest factor it may try."""
+    """One search, with the original report and the largest factor."""
 
     def __init__(self, report: Report, at_most: float, progress: Callable[[float], None]) -> None:
         self._report = report
         self._motion = report.motion
         self._at_most = at_most
-        self._nothing = SlowDown(before=report.motion, at_most=at_most)
-        self._progress, self._tries = progress, 0
+        self._template = SlowDown(before=report.motion, at_most=at_most)
+        self._progress, self._attempts = progress, 0
 
     def run(self, recommended: bool) -> SlowDown:
-        """Returns the least slow-down that keeps the necessary conditions, and on demand the recommended ones."""
         broken = _broken(self._report)
         for row in broken:
             if row.necessity == "necessary" and _power(row.condition) == 0:
                 obstacle = "elsewhere" if row.condition.stage == "start" else "position"
-                return replace(self._nothing, decisive=row, obstacle=obstacle)
+                return replace(self._template, decisive=row, obstacle=obstacle)
         rows = tuple(row.condition for row in self._report.rows if _power(row.condition) > 0)
         necessary = tuple(row for row in rows if row.necessity == "necessary")
         if not recommended:
-            return self._least(necessary, ())
-        advised = tuple(row.condition for row in broken if row.necessity == "recommended")
-        stubborn = {row.id for row in self._at(self._at_most, advised)}
-        unmet = tuple(row for row in advised if row.id in stubborn)
-        both = self._least(tuple(row for row in rows if row not in unmet), unmet)
-        return both if both.ok else self._least(necessary, advised)
+            return self._find_least(necessary, ())
+        recommended_rows = tuple(row.condition for row in broken if row.necessity == "recommended")
+        unmet_ids = {row.id for row in self._broken_at(self._at_most, recommended_rows)}
+        unmet = tuple(row for row in recommended_rows if row.id in unmet_ids)
+        both = self._find_least(tuple(row for row in rows if row not in unmet), unmet)
+        return both if both.ok else self._find_least(necessary, recommended_rows)
 
-    def _least(self, rows: tuple[Condition, ...], unmet: tuple[Condition, ...]) -> SlowDown:
-        """Returns the least slow-down that keeps these rows."""
-        wanted = {row.id for row in rows}
-        broken = [row for row in _broken(self._report) if row.id in wanted]
+    def _find_least(self, rows: tuple[Condition, ...], unmet: tuple[Condition, ...]) -> SlowDown:
+        """Returns the smallest slow-down that satisfies these rows."""
+        ids = {row.id for row in rows}
+        broken = [row for row in _broken(self._report) if row.id in ids]
         if not broken:
-            return replace(self._nothing, factor=1.0, motion=self._motion, report=self._report, unmet=unmet)
-        low, spare = 1.0, PRECISION / 2.0
-        need = max(row.ratio ** (1.0 / _power(row.condition)) for row in broken)
+            return replace(self._template, factor=1.0, motion=self._motion, report=self._report, unmet=unmet)
+        low, margin = 1.0, PRECISION / 2.0
+        ratio = max(row.ratio ** (1.0 / _power(row.condition)) for row in broken)
         while True:
-            high = min(low * need * (1.0 + spare), self._at_most)
-            found = self._at(high, rows)
+            high = min(low * ratio * (1.0 + margin), self._at_most)
+            found = self._broken_at(high, rows)
             if not found:
                 break
             if high >= self._at_most:
-                return replace(self._nothing, decisive=found[0], obstacle=self._obstacle(found[0]))
-            # Not smooth, then: a step in velocity shrinks with the factor alone.
-            low, broken, spare, need = high, found, 20.0 * spare, max(row.ratio for row in found)
-        probe = max(low, high / (1.0 + PRECISION))
+                return replace(self._template, decisive=found[0], obstacle=self._obstacle(found[0]))
+            # Not smooth: a step in velocity decreases only linearly with the factor.
+            low, broken, margin, ratio = high, found, 20.0 * margin, max(row.ratio for row in found)
+        factor = max(low, high / (1.0 + PRECISION))
         while high > low * (1.0 + PRECISION) + 1e-12:
-            found = self._at(probe, rows)
+            found = self._broken_at(factor, rows)
             if found:
-                low, broken = probe, found
+                low, broken = factor, found
             else:
-                high = probe
-            probe = sqrt(low * high)
-        return self._proven(high, broken[0].id, unmet)
+                high = factor
+            factor = sqrt(low * high)
+        return self._verified(high, broken[0].id, unmet)
 
-    def _at(self, factor: float, rows: tuple[Condition, ...]) -> list[ConditionResult]:
-        """Returns those of the rows that are broken at a factor."""
+    def _broken_at(self, factor: float, rows: tuple[Condition, ...]) -> list[ConditionResult]:
+        """Returns the rows that are violated at a factor."""
         if not rows:
             return []
         found = _broken(self._report.check_again(self._motion.slowed(factor), rows))
-        self._tries += 1
-        self._progress(self._tries / (self._tries + _USUAL_TRIES))
+        self._attempts += 1
+        self._progress(self._attempts / (self._attempts + _TYPICAL_ATTEMPTS))
         return found
 
     def _obstacle(self, row: ConditionResult) -> Obstacle:
-        """Returns why a row is still broken at the largest factor."""
+        """Returns why a row is still violated at the largest factor."""
         start = self._report.start
-        if row.time < (_LOOK_BACK + 0.5) * CYCLE_TIME:
+        if row.time < (_START_CYCLES + 0.5) * CYCLE_TIME:
             if np.abs(self._motion.start - start.q).max() > START_POSITION_TOLERANCE:
                 return "elsewhere"
             if start.moving:
                 return "moving_start"
-        before = next(was for was in self._report.rows if was.id == row.id)
+        before = next(result for result in self._report.rows if result.id == row.id)
         smooth = max(before.ratio, 1.0) / self._at_most ** _power(row.condition)
-        return "jump" if row.ratio > _JUMP * smooth else "too_fast"
+        return "jump" if row.ratio > _JUMP_RATIO * smooth else "too_fast"
 
-    def _proven(self, factor: float, name: str, unmet: tuple[Condition, ...]) -> SlowDown:
+    def _verified(self, factor: float, name: str, unmet: tuple[Condition, ...]) -> SlowDown:
         motion = self._motion.slowed(factor)
         report = self._report.check_again(motion, tuple(row.condition for row in self._report.rows))
-        if not report.ok:  # More rows of the same path: one of them is past a bound that those before just kept.
-            return replace(self._nothing, decisive=_broken(report)[0], obstacle="position")
+        if not report.ok:  # The slowed motion has more rows on the same path; one may exceed a bound of position.
+            return replace(self._template, decisive=_broken(report)[0], obstacle="position")
         decisive = next(row for row in report.rows if row.id == name)
-        return replace(self._nothing, factor=factor, motion=motion, report=report, decisive=decisive, unmet=unmet)
+        return replace(self._template, factor=factor, motion=motion, report=report, decisive=decisive, unmet=unmet)
 
 
 def _broken(report: Report) -> list[ConditionResult]:
-    """Returns the rows that are broken, necessary ones first, the worst of each kind first."""
+    """Returns the violated rows, necessary ones first, the worst of each kind first."""
     return sorted((row for row in report.rows if not row.ok), key=lambda row: (row.necessity, -row.ratio))
 
 
 def _power(condition: Condition) -> int:
-    """Returns with which power of the factor a condition's values shrink; 0 for those that stay."""
+    """Returns the power of the factor by which a condition's values decrease; 0 if they do not change."""
     if condition.signal == "torque":  # Without gravity: accelerations, and products of velocities.
         return condition.order + 2
     return condition.order
 
 
-def _largest(motion: Motion, at_most: float | None) -> float:
-    """Returns the largest factor to try."""
+def _max_factor(motion: Motion, at_most: float | None) -> float:
     if at_most is None:
-        return AT_MOST if motion.duration == 0.0 else min(AT_MOST, max(2.0, LONGEST / motion.duration))
+        return MAX_FACTOR if motion.duration == 0.0 else min(MAX_FACTOR, max(2.0, MAX_DURATION / motion.duration))
     number = as_number(at_most, "at_most")
     if not 1.0 <= number < math.inf:
-        raise InvalidValueError("at_most", number, "must be 1 or more, and finite: how many times slower to try")
+        raise InvalidValueError("at_most", number, "must be 1 or more, and finite: the largest factor to try")
     return number

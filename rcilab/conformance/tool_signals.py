@@ -1,4 +1,4 @@
-"""The signals of the tool and the elbow as tables with a row for each cycle: `CartesianMonitor` for all rows."""
+"""Signals of the tool and the elbow as tables with one row per cycle, as `CartesianMonitor` computes them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import Rotation9, rotation_between
 from rcilab.model.robot_model import RobotModel
 
-BEFORE = 3
-"""Commands before the first that is checked: a third difference reaches back that far."""
+PREVIOUS_COMMANDS = 3
+"""Number of commands before the first checked one: the reach of a third difference."""
 
 Differences: TypeAlias = tuple[Array, Array, Array, Array]
-"""A signal and its first, second and third backward difference, a row a cycle."""
+"""A signal and its first, second and third backward difference, one row per cycle."""
 
-_FLIPPING = 3  # From 0: the elbow flips with joint 4.
-_EXACT = 1e-8  # Sine of a turn up to which the sine is the angle; as in `rotation_between`.
+_ELBOW_JOINT = 3  # Index, from 0: the elbow flips with joint 4.
+_EXACT = 1e-8  # Sine of an angle up to which the sine equals the angle; as in `rotation_between`.
 
 
 class ToolSignals:
@@ -29,21 +29,21 @@ class ToolSignals:
 
     Args:
         model: The arm with its tool.
-        start: Where the arm comes from.
+        start: State of the arm at the start.
         path: Joint angles in every checked cycle, shape (N, n), [rad].
     """
 
     def __init__(self, model: RobotModel, start: StartState, path: JointPath) -> None:
         self._model = model
         self._is_moving = start.moving
-        # A moving arm has had its first row already.
+        # A moving arm already has its first row.
         self._rows = np.concatenate((commands_before(start), path[1:] if start.moving else path))
         self._inverse = model.solver
 
     def differences(self, signal: str) -> Differences:
-        """Returns the norms of "translation" or "rotation" with their differences, or the "arm_angle" and its own.
+        """Returns "arm_angle" with its differences, or the norms of the differences of "translation" or "rotation".
 
-        Each of shape (N, 1). Position and orientation themselves have no bound on a norm: zeros stand for them.
+        Each of shape (N, 1). Position and orientation themselves have no bound on a norm and are zero.
         """
         if signal == "arm_angle":
             return self._arm_angle
@@ -51,31 +51,31 @@ class ToolSignals:
 
     @cached_property
     def singularity(self) -> Array:
-        """How near the arm is to a singularity, shape (N, 1): from 1 on it counts as on it."""
+        """Closeness to a singularity, shape (N, 1); singular from 1 on."""
         return self._inverse.singularity_path(self._rows[self._first :])[:, np.newaxis]
 
     @cached_property
     def elbow_side(self) -> Array:
-        """+1 where joint 4 is on the side of the elbow's flip on which it starts, -1 beyond, shape (N, 1)."""
+        """+1 if joint 4 is on the same side of the elbow's flip as at the start, -1 on the other, shape (N, 1)."""
         flip = self._model.description.elbow_flip
         assert flip is not None
-        sides = np.where(self._rows[:, _FLIPPING] > flip, 1.0, -1.0)
-        return (sides[self._first :] * sides[BEFORE - 1])[:, np.newaxis]
+        sides = np.where(self._rows[:, _ELBOW_JOINT] > flip, 1.0, -1.0)
+        return (sides[self._first :] * sides[PREVIOUS_COMMANDS - 1])[:, np.newaxis]
 
     @cached_property
     def start_distance(self) -> float:
-        """How far the first commanded position of the tool is from the arm's, [m]."""
-        return float(np.linalg.norm(self._poses[self._first, :3, 3] - self._poses[BEFORE - 1, :3, 3]))
+        """Distance of the first commanded position of the tool from the arm's, [m]."""
+        return float(np.linalg.norm(self._poses[self._first, :3, 3] - self._poses[PREVIOUS_COMMANDS - 1, :3, 3]))
 
     @cached_property
     def start_turn(self) -> float:
-        """How far the first commanded arm angle is from the arm's, [rad]."""
-        psi = self._inverse.arm_angle_path(self._rows[[BEFORE - 1, self._first]])
-        return float(_short_way(np.diff(psi))[0])
+        """Difference of the first commanded arm angle from the arm's, [rad]."""
+        psi = self._inverse.arm_angle_path(self._rows[[PREVIOUS_COMMANDS - 1, self._first]])
+        return float(_wrapped(np.diff(psi))[0])
 
     @property
     def _first(self) -> int:
-        return BEFORE - 1 if self._is_moving else BEFORE
+        return PREVIOUS_COMMANDS - 1 if self._is_moving else PREVIOUS_COMMANDS
 
     @cached_property
     def _poses(self) -> Array:
@@ -87,19 +87,21 @@ class ToolSignals:
 
     @cached_property
     def _rotation(self) -> Differences:
-        return self._norms(turns(self._poses[:, :3, :3]))
+        return self._norms(rotation_steps(self._poses[:, :3, :3]))
 
     @cached_property
     def _arm_angle(self) -> Differences:
         psi = self._inverse.arm_angle_path(self._rows)
-        first, second, third = self._judged(_short_way(np.diff(psi))[:, np.newaxis])
+        first, second, third = self._derivatives(_wrapped(np.diff(psi))[:, np.newaxis])
         return psi[self._first :, np.newaxis], first, second, third
 
     def _norms(self, steps: Array) -> Differences:
-        first, second, third = (np.sqrt((values * values).sum(axis=1))[:, np.newaxis] for values in self._judged(steps))
+        first, second, third = (
+            np.sqrt((values * values).sum(axis=1))[:, np.newaxis] for values in self._derivatives(steps)
+        )
         return np.zeros_like(first), first, second, third
 
-    def _judged(self, steps: Array) -> tuple[Array, Array, Array]:
+    def _derivatives(self, steps: Array) -> tuple[Array, Array, Array]:
         """Returns velocity, acceleration and jerk of the checked cycles from the steps between all rows."""
         first = steps / CYCLE_TIME
         second = np.diff(first, axis=0) / CYCLE_TIME
@@ -110,13 +112,13 @@ class ToolSignals:
 
 
 def commands_before(start: StartState) -> JointPath:
-    """Returns the three commands that leave an arm in a state, the oldest first, shape (3, n), [rad]."""
+    """Returns the three commands that lead to a state, the oldest first, shape (3, n), [rad]."""
     last = start.q - CYCLE_TIME * start.dq
     oldest = last - CYCLE_TIME * (start.dq - CYCLE_TIME * start.ddq)
     return np.stack((oldest, last, start.q))
 
 
-def turns(rotations: Array) -> Array:
+def rotation_steps(rotations: Array) -> Array:
     """Returns the rotation vectors from each orientation to the next, of any angle, in base axes.
 
     Args:
@@ -132,7 +134,7 @@ def turns(rotations: Array) -> Array:
     is_large = sine > _EXACT
     scale = np.where(is_large, np.arctan2(sine, cosine) / np.where(is_large, sine, 1.0), 1.0)
     found = sines * scale[:, np.newaxis]
-    for row in np.flatnonzero(~is_large & (cosine < 0.0)).tolist():  # Half a turn: only its axis is to be found.
+    for row in np.flatnonzero(~is_large & (cosine < 0.0)).tolist():  # Half a turn: only the axis is unknown.
         found[row] = rotation_between(_nine(rotations[row]), _nine(rotations[row + 1]))
     return found
 
@@ -142,6 +144,6 @@ def _nine(rotation: Array) -> Rotation9:
     return a, b, c, d, e, f, g, h, i
 
 
-def _short_way(steps: Array) -> Array:
-    """Returns steps of an angle the short way round, [rad]."""
+def _wrapped(steps: Array) -> Array:
+    """Returns steps of an angle wrapped to -pi to pi, [rad]."""
     return np.where(np.abs(steps) <= math.pi, steps, np.remainder(steps + math.pi, math.tau) - math.pi)

@@ -1,4 +1,4 @@
-"""The conditions on commanded torques, cycle by cycle, in plain floats."""
+"""Check of commanded torques, cycle by cycle, in plain floats."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from rcilab.core.limits import JointLimits
 
 
 class TorqueMonitor:
-    """Checks one commanded torque a cycle: its range, and its backward difference over one cycle.
+    """Checks one commanded torque per cycle: its range, and its backward difference.
 
-    Owned by the thread that runs the cycle. Commanded torques come on top of gravity and friction, which the
-    controller compensates.
+    Owned by the thread that runs the cycle. Commanded torques are added to gravity and friction, which the controller
+    compensates.
 
     Attributes:
         tau: Last commanded torques, [N m].
         dtau: Their backward difference, [N m/s].
 
     Args:
-        limits: Bounds of the joints. The monitor starts from no torque.
+        limits: Bounds of the joints. The monitor starts at zero torque.
         rows: The conditions, rate before range; see `JointMonitor`.
     """
 
@@ -34,7 +34,7 @@ class TorqueMonitor:
         self.reset([0.0] * self._n)
 
     def reset(self, tau: Sequence[float]) -> None:
-        """Restarts the history: these torques have been commanded before.
+        """Restarts the history at these commanded torques.
 
         Args:
             tau: Joint torques, n numbers, [N m].
@@ -43,18 +43,18 @@ class TorqueMonitor:
             InvalidValueError: Not n numbers.
         """
         if len(tau) != self._n:
-            raise InvalidValueError("tau", tau, f"needs {self._n} numbers [N m]")
+            raise InvalidValueError("tau", tau, f"must be {self._n} numbers [N m]")
         self.tau = [float(value) for value in tau]
         self.dtau = [0.0] * self._n
 
     def step(self, tau: Sequence[float], cycles: int = 1) -> list[LimitViolation]:
-        """Takes the commanded torques of this cycle and returns what they break, in the order of the rows.
+        """Checks the commanded torques of this cycle and returns their violations, in the order of the rows.
 
-        A value that is not a number breaks both conditions. The history advances in any case.
+        NaN violates both conditions. The history advances in any case.
 
         Args:
-            tau: Joint torques, at least n numbers (a 6-axis arm ignores the wire's seventh), [N m].
-            cycles: Cycles since the last step, 1 or more; the rate is that over all of them.
+            tau: Joint torques, at least n numbers, [N m]; a 6-axis arm ignores the protocol's seventh.
+            cycles: Cycles since the last step, 1 or more; the rate is the mean over them.
         """
         h = cycles * CYCLE_TIME
         new = list(tau[: self._n])
@@ -62,6 +62,6 @@ class TorqueMonitor:
         self.tau = new
         return self._rows.evaluate([*self.dtau, *new])
 
-    def broken(self) -> list[LimitViolation]:
-        """Returns what the last step broke."""
-        return self._rows.broken((*self.dtau, *self.tau))
+    def violations(self) -> list[LimitViolation]:
+        """Returns the violations of the last step."""
+        return self._rows.violations((*self.dtau, *self.tau))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
-from rcilab.conformance.speed_scaling_check import plan_start
+from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.core.arrays import as_number, described
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
@@ -405,7 +405,7 @@ class RobotSession(Closeable):
                 self._require_allowed(motion, state, mode)
             else:
                 certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
-            scaled = plan_start(motion, speed_override, self.model, mode)
+            scaled = plan_start_with_override(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
             stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))
             override = SpeedOverride(StreamRows(stream))

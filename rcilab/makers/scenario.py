@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from rcilab.conformance.common_conditions import yielding_limits
+from rcilab.conformance.common_conditions import compliant_limits
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.command import Command
 from rcilab.core.fault import FaultCode
@@ -82,7 +82,7 @@ class Scene:
 
     def yielding(self) -> Scene:
         """Returns the scene with the wider bounds on accelerations of a compliant arm."""
-        return replace(self, limits=yielding_limits(self.limits))
+        return replace(self, limits=compliant_limits(self.limits))
 
 
 def _as_it_is(scene: Scene) -> Scene:

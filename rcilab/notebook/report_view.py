@@ -62,12 +62,12 @@ class ReportView(Part):
     def _card(self, row: ConditionResult) -> str:
         text, condition = self.text, row.condition
         tone: Tone = "good" if row.ok and row.ratio <= _TIGHT else "warn"
-        word = "check.kept" if tone == "good" or row.led_in else "check.tight" if row.ok else "check.exceeded"
+        word = "check.kept" if tone == "good" or row.start_excess else "check.tight" if row.ok else "check.exceeded"
         if not row.ok and condition.necessity == "necessary":
             tone, word = "bad", "check.broken"
-        facts = [value_against_bound(*row.shown, condition.unit, text)]
+        facts = [value_against_bound(*row.displayed, condition.unit, text)]
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
-        facts += [text("check.led_in")] if row.led_in else []
+        facts += [text("check.led_in")] if row.start_excess else []
         facts += [explain_place(row, text.language)] if row.links is not None else []
         facts.append(f"t = {row.time:.3f} s")
         share = f"{100.0 * row.ratio:.1f} %" if row.has_share else ""

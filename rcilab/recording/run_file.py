@@ -283,7 +283,7 @@ def report_facts(report: Report) -> list[dict[str, Any]]:
             "value": row.value,
             "bound": row.bound,
             "unit": row.unit,
-            "place": row.place,
+            "place": row.location,
             "time": row.time,
             "source": row.source,
         }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import gt
 
-from rcilab.conformance.common_conditions import yielding_limits
+from rcilab.conformance.common_conditions import compliant_limits
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
@@ -71,7 +71,7 @@ class MeasuredStateMonitor:
             checks_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
             is_compliant: Whether forces move the arm, and not its commands alone.
         """
-        self._monitor = MeasuredMonitor(yielding_limits(limits) if is_compliant else limits, box)
+        self._monitor = MeasuredMonitor(compliant_limits(limits) if is_compliant else limits, box)
         self._monitor.reset(self.measured.q.tolist())
         self._thresholds = thresholds
         self._checks_tool = checks_tool

@@ -81,8 +81,8 @@ def test_a_jerk_raises_the_acceleration_bit_because_there_is_none_of_its_own():
     monitor = CartesianMonitor(LIMITS, rows=RCI_TOOL_CONDITIONS)
     monitor.reset(Pose())
     assert faults_of(monitor.step(Pose((6e-6, 0.0, 0.0)))) == (ACCELERATION,)
-    assert [violation.condition.id for violation in monitor.broken()] == ["cartesian.jerk.translation"]
-    assert monitor.broken()[0].text == "tool: commanded translational jerk 6000 m/s^3 passes 5000 m/s^3"
+    assert [violation.condition.id for violation in monitor.violations()] == ["cartesian.jerk.translation"]
+    assert monitor.violations()[0].text == "tool: commanded translational jerk 6000 m/s^3 passes 5000 m/s^3"
 
 
 def test_a_jump_raises_what_it_breaks_once_each_in_wire_order():
@@ -90,8 +90,10 @@ def test_a_jump_raises_what_it_breaks_once_each_in_wire_order():
     monitor = CartesianMonitor(LIMITS, box, RCI_TOOL_CONDITIONS)
     monitor.reset(Pose(), 0.0)
     assert faults_of(monitor.step(Pose((2.0, 0.0, 0.0)), 4.0)) == (BOX, ELBOW, VELOCITY, ACCELERATION)
-    assert monitor.broken()[0].text == "tool: commanded position is 1.5 m outside the safety box"
-    assert "elbow: commanded arm angle 4 rad passes 3.14159 rad" in [violation.text for violation in monitor.broken()]
+    assert monitor.violations()[0].text == "tool: commanded position is 1.5 m outside the safety box"
+    assert "elbow: commanded arm angle 4 rad passes 3.14159 rad" in [
+        violation.text for violation in monitor.violations()
+    ]
 
 
 def test_an_arm_angle_may_pass_pi_the_short_way_and_stand_there():
@@ -133,5 +135,5 @@ def test_the_wall_itself_is_inside_and_a_box_that_is_not_active_bounds_nothing()
         assert faults_of(monitor.step(wall.tolist())) == ()
         out = (T_base_box @ Pose((0.501, 0.1, -0.2))).position.tolist()
         assert faults_of(monitor.step(out)) == ((BOX,) if active else ())
-        assert [violation.value for violation in monitor.broken()] == pytest.approx([0.001] if active else [])
+        assert [violation.value for violation in monitor.violations()] == pytest.approx([0.001] if active else [])
     assert not BoxMonitor(None).is_active

@@ -78,7 +78,7 @@ def test_a_motion_that_ends_moving_is_flagged_in_the_cycle_after_its_last_row():
     cut = Motion.from_cycles(MOTION.q[: len(MOTION) // 2])
     report = check(cut, MODEL)
     assert {round(v.time / CYCLE_TIME) for v in report.violations} == {len(cut)}
-    assert "let it end at rest" in str(report.violations[0])
+    assert "end it at standstill" in str(report.violations[0])
     assert "end.velocity" in {v.condition.id for v in report.warnings}
 
 

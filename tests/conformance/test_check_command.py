@@ -52,7 +52,7 @@ def test_a_motion_that_is_too_fast_is_written_slowed_down_and_the_new_one_passes
     assert run(tmp_path / "a.npz", "--model", "xMate3") == 1
     assert run(tmp_path / "a.npz", "--model", "xMate3", "--slow-down", tmp_path / "b.npz") == 0
     said = capsys.readouterr().out
-    assert "slow-down: It passes" in said
+    assert "slow-down: It conforms" in said
     assert f"written: {tmp_path / 'b.npz'}" in said
     assert run(tmp_path / "b.npz", "--model", "xMate3") == 0
     assert Motion.load(tmp_path / "b.npz").duration > 1.2 * fast.duration
@@ -61,7 +61,7 @@ def test_a_motion_that_is_too_fast_is_written_slowed_down_and_the_new_one_passes
 def test_a_motion_that_no_slow_down_mends_is_not_written(tmp_path, capsys):
     Motion.from_cycles(np.repeat([MODEL.limits.joint.upper], 3, axis=0)).save(tmp_path / "a.npz")
     assert run(tmp_path / "a.npz", "--model", "xMate3", "--slow-down", tmp_path / "b.npz") == 1
-    assert "slow-down: No slow-down mends it" in capsys.readouterr().out
+    assert "slow-down: No slow-down corrects it" in capsys.readouterr().out
     assert not (tmp_path / "b.npz").exists()
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_monitor import ClearanceMonitor
-from rcilab.conformance.clearance_path import LONGEST_STEP, MOST_TRAVEL, clearance_path, in_between
+from rcilab.conformance.clearance_path import MAX_STEP, MAX_TRAVEL, clearance_path, sample_cycle
 from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.core.clearance import FLOOR, ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
@@ -44,7 +44,7 @@ def low_motion(model, seed: int, speed: float = 1.0, part: float = 0.3) -> Motio
 
 def looked_at(q, levers) -> list[np.ndarray]:
     """The places that each cycle is judged by, its end the last."""
-    return [in_between(before, after, levers) for before, after in zip([q[0], *q[:-1]], q, strict=True)]
+    return [sample_cycle(before, after, levers) for before, after in zip([q[0], *q[:-1]], q, strict=True)]
 
 
 def cycles_of(report, id_: str, rows: int):
@@ -69,7 +69,7 @@ def test_every_cycle_is_judged_by_its_own_distance_although_few_are_looked_at(mo
         found = clearance_path(ask, q, q[0], geometry.levers, bounds)
         for bound in bounds:
             assert ((found.distance > bound) == (exact > bound)).all()
-        assert exact.min() <= found.distance.min() <= exact.min() + MOST_TRAVEL / 2.0 + 1e-6
+        assert exact.min() <= found.distance.min() <= exact.min() + MAX_TRAVEL / 2.0 + 1e-6
         worst = int(found.distance.argmin())
         assert found.distance[worst] == exact[worst]
         assert LinkPair(*found.links[worst].tolist()) == smallest[worst][1]
@@ -94,12 +94,12 @@ def test_between_two_looks_no_point_moves_5_mm_or_as_far_as_the_room_that_was_fo
     order = sorted((places[row], distance) for row, distance in looks)
     assert (order[0][0], order[-1][0]) == (0, len(rows) - 1)
     tip = np.linalg.norm(np.diff(model.position_path(rows), axis=0), axis=1)
-    assert tip.max() <= MOST_TRAVEL
+    assert tip.max() <= MAX_TRAVEL
     for (a, before), (b, _) in pairwise(order):
-        assert tip[a:b].sum() <= max(MOST_TRAVEL, before - 0.02) + 1e-9
+        assert tip[a:b].sum() <= max(MAX_TRAVEL, before - 0.02) + 1e-9
     fine = np.linspace(rows[:-1], rows[1:], 4)[:-1].transpose(1, 0, 2).reshape(-1, model.n)  # Three times as dense.
     dense = [query.links(row)[0] for row in fine[:: max(1, len(fine) // 300)]]
-    assert min(dense) >= smallest - MOST_TRAVEL
+    assert min(dense) >= smallest - MAX_TRAVEL
 
 
 @settings(max_examples=60)
@@ -124,13 +124,13 @@ def test_a_cycle_that_goes_far_is_looked_at_on_the_way_and_one_that_no_arm_can_g
     start = np.array([0.3, 0.1])
     for travel, places in ((0.0, 1), (4e-3, 1), (6e-3, 2), (19e-3, 4), (21e-3, 1), (3.0, 1)):
         end = start + [travel / 2.0, travel]
-        rows = in_between(start, end, levers)
+        rows = sample_cycle(start, end, levers)
         assert len(rows) == places
         assert rows[-1].tolist() == end.tolist()
         assert np.abs(np.diff(np.vstack((start, rows)), axis=0) - (end - start) / places).max() < 1e-15
     for model in MODELS:  # Nothing that the joints' velocity limits allow is beyond it.
         levers = model.collision_geometry(ASKED).levers
-        assert levers @ model.limits.joint.velocity * CYCLE_TIME < LONGEST_STEP
+        assert levers @ model.limits.joint.velocity * CYCLE_TIME < MAX_STEP
 
 
 @settings(max_examples=15)
@@ -148,7 +148,7 @@ def test_check_and_monitors_give_the_same_verdict_in_every_cycle(model, seed, sp
     kept = True
     for row in [*q, *[q[-1]] * HOLD_SAMPLES]:
         kept = (joints.step(row.tolist()) == []) & monitor.step(row.tolist()) & kept
-        broken = {violation.condition.id for violation in monitor.broken()}
+        broken = {violation.condition.id for violation in monitor.violations()}
         for id_, flags in played.items():
             flags.append(id_ in broken)
     for row in report.rows:
@@ -220,7 +220,7 @@ def test_what_comes_near_is_advice_and_what_is_asked_for_is_a_bound():
     assert [v.condition.id for v in refused.violations] == ["clearance.links"]
     kept = check(motion, MODEL, distance=ClearanceLimit(links=nearest - 1e-6))
     row = next(row for row in kept.rows if row.id == "clearance.links")
-    assert (kept.ok, row.place, row.value) == (True, "base and link 2", pytest.approx(nearest, abs=MOST_TRAVEL / 2.0))
+    assert (kept.ok, row.location, row.value) == (True, "base and link 2", pytest.approx(nearest, abs=MAX_TRAVEL / 2.0))
     assert "clearance.links.advised" not in {row.id for row in kept.rows}  # What is asked for is more than that.
 
 
@@ -236,9 +236,9 @@ def test_a_monitor_tells_distance_and_links_and_refuses_what_is_no_configuration
     monitor = ClearanceMonitor(MODEL)
     assert monitor.step(MODEL.home.tolist())
     assert monitor.distance == MODEL.clearance(MODEL.home).distance
-    assert monitor.broken() == []
+    assert monitor.violations() == []
     assert not monitor.step(ON_THE_FLOOR.tolist())
     assert monitor.links == LinkPair(7, FLOOR)
-    assert monitor.broken()[0].text.startswith("link 7 and floor: distance from the floor -0.")
+    assert monitor.violations()[0].text.startswith("link 7 and floor: distance from the floor -0.")
     with pytest.raises(InvalidValueError, match="q_c"):
         monitor.step([float("nan")] * 7)

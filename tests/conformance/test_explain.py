@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.advice import advise
-from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, say
+from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, translate
 from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.html import report_html
@@ -53,7 +53,7 @@ def violation_of(row: Condition, count: int = 25, model: RobotModel = MODEL) -> 
         worst_time=0.412,
         bound=bound,
         ratio=1.1,
-        advice=advise(row, MOTION, row=400, count=count, ratio=1.1, off_start=False),
+        advice=advise(row, MOTION, row=400, count=count, ratio=1.1, is_off_start=False),
         links=LinkPair(0, 5) if row.is_clearance else None,
     )
 
@@ -103,7 +103,7 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
     words = load_catalogue(language)
     assert words[f"quantity.{row.id}"] in text
     assert violation.advice.text(language) in text
-    assert text.endswith(say(language, "remedy", advice=violation.advice.text(language)))
+    assert text.endswith(translate(language, "remedy", advice=violation.advice.text(language)))
     assert "{" not in text
     if row.fault is None:
         assert words["raises.nothing" if row.necessity == "recommended" else "raises.unnoticed"] in text
@@ -138,16 +138,16 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
         ("joint.velocity", "lower speed to 0.36 or less"),
         ("arm_angle.position", "keep the arm angle from -180° to 180°"),
         ("cartesian.position", "choose a path inside the safety box"),
-        ("clearance.links", "choose a way that keeps them farther apart"),
-        ("cartesian.frame", "command proper poses within reach"),
-        ("torque.rate", "let the commanded torque rise and fall over more cycles"),
+        ("clearance.links", "choose a path that keeps them farther apart"),
+        ("cartesian.frame", "command valid poses within reach"),
+        ("torque.rate", "change the commanded torque over more cycles"),
         ("torque.range", "command less torque"),
-        ("joint.torque_rate", "it spares the drives; law="),
-        ("measured.joint.velocity", "leave more room to the bound"),
-        ("external.torque", "look for contact"),
-        ("lost.commands", "look at the network"),
+        ("joint.torque_rate", "it protects the drives; law="),
+        ("measured.joint.velocity", "keep the commands farther from the bound"),
+        ("external.torque", "check for contact"),
+        ("lost.commands", "check the network"),
         ("start.position", "plan the motion from the arm's commanded position"),
-        ("end.velocity", "let the motion end at rest"),
+        ("end.velocity", "end the motion at standstill"),
     ],
 )
 def test_the_remedy_suits_the_condition(id_, advice):
@@ -161,7 +161,7 @@ def test_a_sentence_in_full_in_both_languages():
     assert explain_violation(violation) == (
         "joint 4: commanded velocity -2.31 rad/s passes the bound of -2.175 rad/s by 0.135 rad/s, which is 106.2 % of "
         "the bound, at t = 0.400 s. The controller would raise kCommandJointVelocityLimitsViolation: a commanded joint "
-        "velocity is too high. What to do: lower speed to 0.36 or less."
+        "velocity is too high. Remedy: lower speed to 0.36 or less."
     )
     assert explain_violation(violation, "zh") == (
         "关节 4：指令速度 -2.31 rad/s，超过限值 -2.175 rad/s，超出 0.135 rad/s，为限值的 106.2 %，t = 0.400 s。"
@@ -198,7 +198,7 @@ def test_a_tool_close_to_a_wall_is_told_with_its_distance():
     T_base_box = MODEL.forward(MODEL.home) @ Pose((0.499, 0.0, 0.0))
     still = plan_joint(MODEL, MODEL.home, MODEL.home)
     report = check(still, MODEL, box=SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=T_base_box))
-    assert "Nearest to a wall: the tool, 0.001 m inside the safety box" in report.explain()
+    assert "Nearest to a face of the safety box: the tool, 0.001 m inside" in report.explain()
     assert "0.001 m" in report.explain("zh")
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
-from rcilab.conformance.divided_differences import spans
+from rcilab.conformance.divided_differences import difference_times
 from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.limit_violation import faults_of
 from rcilab.conformance.torque_monitor import TorqueMonitor
@@ -40,7 +40,7 @@ def test_no_gap_makes_a_good_joint_motion_bad(seed: int, share: float) -> None:
     monitor = JointMonitor(MODEL.limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(SWING[0].tolist())
     for row, cycles in kept(seed, share, len(SWING)):
-        assert faults_of(monitor.step(SWING[row].tolist(), cycles)) == (), monitor.broken()
+        assert faults_of(monitor.step(SWING[row].tolist(), cycles)) == (), monitor.violations()
 
 
 @settings(max_examples=10, deadline=None)
@@ -51,7 +51,7 @@ def test_no_gap_makes_a_good_line_bad(seed: int, share: float) -> None:
     angles = [MODEL.arm_angle(q) for q in LINE.q]
     monitor.reset(poses[0], angles[0])
     for row, cycles in kept(seed, share, len(poses)):
-        assert faults_of(monitor.step(poses[row], angles[row], cycles)) == (), monitor.broken()
+        assert faults_of(monitor.step(poses[row], angles[row], cycles)) == (), monitor.violations()
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 7])
@@ -85,5 +85,5 @@ def test_torques_are_judged_by_their_rate_over_the_gap() -> None:
 
 
 def test_even_spacing_is_divided_by_the_cycle_time() -> None:
-    assert spans(1, (1, 1)) == (1e-3, 1e-3, 1e-3)
-    assert spans(2, (1, 3)) == pytest.approx((2e-3, 1.5e-3, 2e-3))
+    assert difference_times(1, (1, 1)) == (1e-3, 1e-3, 1e-3)
+    assert difference_times(2, (1, 3)) == pytest.approx((2e-3, 1.5e-3, 2e-3))

@@ -116,7 +116,7 @@ def test_its_signals_are_the_backward_differences():
 def test_what_was_broken_is_named_with_joint_value_and_bound():
     monitor = JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS)
     monitor.step([0.0, 0.0, 0.0, -2e-5, 0.0, 0.0, 0.0])
-    found = {violation.condition.id: (violation.axis, violation.bound) for violation in monitor.broken()}
+    found = {violation.condition.id: (violation.axis, violation.bound) for violation in monitor.violations()}
     assert found == {"joint.acceleration": (4, -10.0), "joint.jerk": (4, -5000.0)}
 
 
@@ -130,7 +130,7 @@ def test_reset_forgets_the_past():
 
 
 def test_a_reset_to_the_wrong_number_of_joints_is_refused():
-    with pytest.raises(InvalidValueError, match="needs 7 numbers"):
+    with pytest.raises(InvalidValueError, match="must be 7 numbers"):
         JointMonitor(MODELS[0].limits.joint, RCI_JOINT_CONDITIONS).reset([0.0] * 6)
 
 

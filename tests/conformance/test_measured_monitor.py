@@ -44,7 +44,7 @@ def test_an_angle_may_overshoot_its_range_by_a_degree(over, expected):
 def test_a_joint_may_be_a_tenth_faster_than_commanded(part, expected):
     judge = monitor()
     assert faults_of(judge.step(HOME, with_one(STILL, 4, -part * 2.61), CENTRE, None, None)) == expected
-    assert [(violation.axis, violation.bound) for violation in judge.broken()] == (
+    assert [(violation.axis, violation.bound) for violation in judge.violations()] == (
         [(5, pytest.approx(-2.871))] if expected else []
     )
 
@@ -69,7 +69,7 @@ def test_the_tools_speed_counts_when_it_is_given_and_in_joint_motion_it_is_not()
     judge = monitor()
     assert faults_of(judge.step(HOME, STILL, CENTRE, None, None)) == ()
     assert faults_of(judge.step(HOME, STILL, CENTRE, fast, None)) == (Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION,)
-    assert judge.broken()[0].text == "tool: measured translational velocity 1.13137 m/s passes 1.1 m/s"
+    assert judge.violations()[0].text == "tool: measured translational velocity 1.13137 m/s passes 1.1 m/s"
     turning = [0.0, 0.0, 0.0, 0.0, 2.0, 2.0]
     assert (
         faults_of(judge.step(HOME, STILL, CENTRE, turning, None))[0] is Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION

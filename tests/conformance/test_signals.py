@@ -114,7 +114,7 @@ def test_leaving_the_box_is_told_of_the_tool_in_metres_and_inside_it_the_row_sho
     assert sentence.endswith("(necessary condition); choose a path inside the safety box")
     assert "kCommandCartesianPositionLimitsViolation" in str(outside)
     row = next(row for row in inside.rows if row.id == "cartesian.position")
-    assert (row.ok, row.place, row.joint) == (True, "tool", 0)
+    assert (row.ok, row.location, row.joint) == (True, "tool", 0)
     assert row.ratio == pytest.approx(1.0 + row.value / 1.5, abs=1e-8)
     assert ">tool<" in inside._repr_html_()
 

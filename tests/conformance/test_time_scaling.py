@@ -101,7 +101,7 @@ def test_a_joint_out_of_its_range_is_not_mended():
     q[:, 1] += MODEL.limits.joint.upper[1]
     report = check(Motion.from_cycles(q), MODEL, distance=None)
     assert refused(report) == ("position", "joint.position")
-    assert "the way stays the same: joint 2, commanded position" in str(report.slow_down())
+    assert "the path stays the same: joint 2, commanded position" in str(report.slow_down())
 
 
 def test_a_tool_out_of_the_safety_box_is_not_mended():

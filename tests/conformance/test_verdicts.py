@@ -93,7 +93,7 @@ def played(rows: Array, direction: Array, axis: Array) -> dict[str, list[int]]:
         if cycle == 0:
             monitor.reset(pose, psi)
         faults = faults_of(monitor.step(pose, psi))
-        violations = monitor.broken()
+        violations = monitor.violations()
         assert set(faults) == {violation.condition.fault for violation in violations}
         for violation in violations:
             found.setdefault(violation.condition.id, []).append(cycle)
@@ -143,7 +143,7 @@ def torque_violations(tau: Array) -> dict[str, set[tuple[int, int]]]:
     found: dict[str, set[tuple[int, int]]] = {row.id: set() for row in TORQUE_CONDITIONS}
     for cycle, row in enumerate(tau.tolist()):
         faults = faults_of(monitor.step(row))
-        violations = monitor.broken()
+        violations = monitor.violations()
         assert set(faults) == {violation.condition.fault for violation in violations}
         for violation in violations:
             found[violation.condition.id].add((cycle, violation.axis))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
-from rcilab.conformance.speed_scaling_check import plan_start
+from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
 from rcilab.core.errors import (
@@ -131,7 +131,7 @@ def test_a_stop_without_a_motion_is_done_and_stops_nothing_later(supervisor):
 def test_a_stop_while_a_motion_is_judged_for_the_last_time_keeps_the_arm_where_it_is(supervisor, monkeypatch):
     def stopped_meanwhile(*args):
         supervisor.stop().wait(SOON)
-        return plan_start(*args)
+        return plan_start_with_override(*args)
 
     monkeypatch.setattr("rcilab.control_process.supervisor.plan_start", stopped_meanwhile)
     with pytest.raises(UsageError, match="a stop was requested before the arm had started to move"):

@@ -53,7 +53,7 @@ def require_allowed(model, motion, speed):
     monitor = CartesianMonitor(model.limits)
     monitor.reset(model.forward(motion.q[0]), angles(model, motion.q[0]))
     for q in [*motion.q, *[motion.q[-1]] * 3]:
-        assert monitor.step(model.forward(q), angles(model, q)) == [], monitor.broken()
+        assert monitor.step(model.forward(q), angles(model, q)) == [], monitor.violations()
     times = np.linspace(0.0, motion.duration, 7 * len(motion))
     joint = model.limits.joint
     for order, bound in ((1, speed * joint.velocity), (2, speed * joint.acceleration), (3, joint.jerk)):

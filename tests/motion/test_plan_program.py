@@ -156,7 +156,7 @@ def test_between_paths_of_the_tool_its_limits_and_the_arm_angles_are_kept_too(na
     monitor = CartesianMonitor(model.limits)
     monitor.reset(model.forward(motion.q[0]), angle_of(model, motion.q[0]))
     for q in [*motion.q, *[motion.q[-1]] * 3]:
-        assert monitor.step(model.forward(q), angle_of(model, q)) == [], monitor.broken()
+        assert monitor.step(model.forward(q), angle_of(model, q)) == [], monitor.violations()
 
 
 @settings(max_examples=8)

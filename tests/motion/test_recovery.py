@@ -148,7 +148,7 @@ def test_the_row_of_the_box_says_how_far_outside_the_tool_starts():
     report = check(motion, model, box=box)
     row = next(row for row in report.rows if row.condition.signal == "position")
     assert row.ok
-    assert row.led_in == pytest.approx(0.05)
+    assert row.start_excess == pytest.approx(0.05)
     assert row.texts == ("0.05", "0", "")
     assert not row.has_share
     assert box.excess(model.forward(motion.goal).position) == pytest.approx(-0.01, abs=1e-6)
@@ -157,5 +157,5 @@ def test_the_row_of_the_box_says_how_far_outside_the_tool_starts():
         for row in check(motion, model, box=SafetyBox(size=(2, 2, 2), T_base_box=Pose())).rows
         if row.condition.signal == "position"
     )
-    assert inside.led_in == 0.0
+    assert inside.start_excess == 0.0
     assert inside.has_share

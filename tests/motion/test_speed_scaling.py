@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
-from rcilab.conformance.speed_scaling_check import plan_speed_override, plan_start
+from rcilab.conformance.speed_scaling_check import plan_speed_override, plan_start_with_override
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.spatial import Pose
@@ -66,7 +66,9 @@ def test_a_change_in_the_middle_of_a_change_continues_it():
 @pytest.mark.parametrize("plan", [joint_motion, line])
 def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rate(plan):
     motion = plan(0.4)
-    held = plan_speed_override(plan_start(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position")
+    held = plan_speed_override(
+        plan_start_with_override(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position"
+    )
     paced = plan_speed_override(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
     run = paced.as_motion()
     assert np.array_equal(run.q, paced.q)
@@ -95,7 +97,7 @@ def test_what_has_arrived_has_no_pace():
 @pytest.mark.parametrize("speed_override", [0.1, 0.37, 0.9])
 def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, speed_override, mode):
     motion = plan(0.4)
-    slow = plan_start(motion, speed_override, MODEL, mode)
+    slow = plan_start_with_override(motion, speed_override, MODEL, mode)
     assert slow.duration == pytest.approx(motion.duration / speed_override, abs=CYCLE_TIME)
     rates = np.abs(np.diff(slow.q, axis=0)).max(axis=0) / CYCLE_TIME
     assert (rates <= 1.0001 * speed_override * np.abs(motion.dq).max(axis=0) + 1e-6).all()
@@ -111,14 +113,14 @@ def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, speed_ov
 
 def test_what_breaks_a_condition_at_its_pace_is_refused():
     with pytest.raises(PlanningError, match=r"torque\.rate at t = .* choose another speed override"):
-        plan_start(joint_motion(0.8), 0.9, MODEL, "torque")  # Nor would it be allowed as planned.
+        plan_start_with_override(joint_motion(0.8), 0.9, MODEL, "torque")  # Nor would it be allowed as planned.
 
 
 def test_nothing_asked_for_leaves_the_motion_itself():
     motion = joint_motion(0.5)
     paced = as_planned(motion)
     assert paced.as_motion() is motion
-    assert plan_start(motion, 1.0, MODEL, "joint_position").as_motion() is motion
+    assert plan_start_with_override(motion, 1.0, MODEL, "joint_position").as_motion() is motion
     assert paced.q is motion.q
     assert paced.plan_time_at(10) == pytest.approx(10 * CYCLE_TIME)
     assert not paced.is_held

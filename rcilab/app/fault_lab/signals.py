@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, condition_table
-from rcilab.conformance.tool_signals import turns
+from rcilab.conformance.tool_signals import rotation_steps
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -139,7 +139,7 @@ class Signals:
         if condition.signal not in ("translation", "rotation") or condition.order == 0:
             return None
         is_turn = condition.signal == "rotation"
-        steps = turns(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
+        steps = rotation_steps(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
         rates = np.diff(steps / CYCLE_TIME, condition.order - 1, axis=0) / CYCLE_TIME ** (condition.order - 1)
         return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
 

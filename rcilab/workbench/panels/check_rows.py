@@ -36,17 +36,17 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     condition, tone = row.condition, row_tone(row)
     word = text(
         "check.kept"
-        if tone == "good" or (row.ok and row.led_in)
+        if tone == "good" or (row.ok and row.start_excess)
         else "check.broken"
         if tone == "bad"
         else _AMBER[not row.ok]
     )
-    facts = [value_against_bound(*row.shown, condition.unit, text)]
+    facts = [value_against_bound(*row.displayed, condition.unit, text)]
     if row.links is not None:
         facts.append(explain_place(row, text.language))
     elif row.joint:
         facts.append(text("check.joint", joint=row.joint))
-    elif row.led_in:
+    elif row.start_excess:
         facts.append(text("check.led_in"))
     facts.append(f"t = {row.time:.3f} s")
     if condition.signal == "torque":
@@ -78,7 +78,7 @@ def row_tone(row: ConditionResult) -> str:
     """Returns good, warn (near a bound, or a recommendation that is not met) or bad."""
     if not row.ok:
         return "bad" if row.condition.necessity == "necessary" else "warn"
-    if row.led_in:
+    if row.start_excess:
         return "warn"
     return "warn" if row.ratio > TIGHT and row.condition.stage == "throughout" else "good"
 

@@ -171,7 +171,7 @@ def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, l
     monitor.reset(q[2].tolist(), dq[1].tolist(), ((dq[1] - dq[0]) / CYCLE_TIME).tolist())
     for place in range(_HISTORY, len(q)):
         monitor.step(q[place].tolist())
-        yield place, monitor.broken()
+        yield place, monitor.violations()
 
 
 def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
@@ -182,7 +182,7 @@ def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, li
     for place in range(1, len(poses)):
         monitor.step(poses[place], angles[place])
         if place >= _HISTORY:  # The first differences only fill the monitor's memory.
-            yield place, monitor.broken()
+            yield place, monitor.violations()
 
 
 def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
@@ -190,7 +190,7 @@ def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int
     monitor.reset(tau[0].tolist())
     for place in range(1, len(tau)):
         monitor.step(tau[place].tolist())
-        yield place, monitor.broken()
+        yield place, monitor.violations()
 
 
 def _describe_joints(q: Array) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.conformance.common_conditions import yielding_limits
+from rcilab.conformance.common_conditions import compliant_limits
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.measured_monitor import MeasuredMonitor
 from rcilab.core.arrays import Array, JointVector
@@ -126,7 +126,7 @@ def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box:
 
 def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
     monitor = MeasuredMonitor(
-        yielding_limits(limits) if mode in YIELDING_MODES else limits, rows=RCI_MEASURED_CONDITIONS
+        compliant_limits(limits) if mode in YIELDING_MODES else limits, rows=RCI_MEASURED_CONDITIONS
     )
     monitor.reset(record["q"][0].tolist())
     ddq, violations = np.zeros((len(record), model.n)), []
@@ -135,7 +135,7 @@ def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: Co
         if mode in _CARTESIAN:
             twist, psi = (model.jacobian(q) @ dq).tolist(), _arm_angle(model, q)
         if monitor.step(q.tolist(), dq.tolist(), (0.0, 0.0, 0.0), twist, psi):
-            violations += monitor.broken()
+            violations += monitor.violations()
         ddq[place] = monitor.acceleration
     return _Measured(violations, ddq)
 
