@@ -133,7 +133,7 @@ def test_a_stop_while_a_motion_is_judged_for_the_last_time_keeps_the_arm_where_i
         supervisor.stop().wait(SOON)
         return plan_start_with_override(*args)
 
-    monkeypatch.setattr("rcilab.control_process.supervisor.plan_start", stopped_meanwhile)
+    monkeypatch.setattr("rcilab.control_process.supervisor.plan_start_with_override", stopped_meanwhile)
     with pytest.raises(UsageError, match="a stop was requested before the arm had started to move"):
         begin(supervisor)
     monkeypatch.undo()
