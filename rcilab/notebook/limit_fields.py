@@ -12,10 +12,11 @@ import numpy as np
 
 from rcilab.app.arm_features import tell_lack
 from rcilab.app.run.world_actions import SetWiring, WorldActions
+from rcilab.app.setup.setup_fields import exact_end, joint_limits_between
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import RcilabError
 from rcilab.core.limits import JointLimits
-from rcilab.i18n.translator import Text, message
+from rcilab.i18n.translator import Message, Text
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.signal_fields import SendRequest
@@ -105,11 +106,11 @@ class LimitFields:
             write(self.said, soft(self._text("softlimits.taken")))
 
     def _propose(self, lower: list[float], upper: list[float]) -> None:
-        for low, high in zip(lower, upper, strict=True):
-            if not low < high:
-                write(self.said, problem(self._text.render(message("setup.joint_ends", low=low, high=high))))
-                return
-        self._asked = SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
+        joints = joint_limits_between(lower, upper)
+        if isinstance(joints, Message):
+            write(self.said, problem(self._text.render(joints)))
+            return
+        self._asked = joints
         now = self._state.now
         if now.is_virtual:
             self._give()
@@ -156,9 +157,8 @@ class LimitFields:
     def _field(self, end: str, joint: int, least: float, largest: float) -> NumberField:
         def take(degrees: float) -> None:
             own = describe_robot(self._state.model.name).limits.joint
-            bound = float(getattr(own, end)[joint])  # Where it stands in the field, rounded, it is meant.
-            angle = math.radians(degrees)
-            self._typed[0 if end == "lower" else 1][joint] = bound if abs(angle - bound) < 1e-5 else angle
+            angle = exact_end(own, end, joint, math.radians(degrees))
+            self._typed[0 if end == "lower" else 1][joint] = angle
 
         label = self._text(f"softlimits.{end}", joint=joint + 1)
         low, high = round(float(least), 6), round(float(largest), 6)

@@ -32,8 +32,10 @@ from rcilab.app.setup.setup_fields import (
     JOINT_ENDS,
     THINNEST,
     box_between,
+    exact_end,
     faces,
     field_range,
+    joint_limits_between,
     with_field,
     with_inertia,
     with_pose,
@@ -51,7 +53,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _UNDO_DEPTH = 100
-_ROUNDED = 1e-5  # [rad] Closer than what the page shows of an angle: the arm's own bound is meant.
 _HAND_GONE = 1.0  # [s] A drag that was not heard of for so long has ended, whatever became of its page.
 
 
@@ -191,15 +192,13 @@ class SetupActions:
             return
         now = soft_limits(self._store.state)
         bounds = {"lower": list(now.lower), "upper": list(now.upper)}
-        exact = {"lower": own.lower, "upper": own.upper}[end][joint]  # What is typed is rounded.
-        typed = math.radians(parsed.value)
-        bounds[end][joint] = float(exact) if abs(typed - exact) < _ROUNDED else typed
-        low, high = (float(bounds[name][joint]) for name in JOINT_ENDS)
-        if not low < high:
-            self._store.complain(request.field, message("setup.joint_ends", low=low, high=high))
+        bounds[end][joint] = exact_end(own, end, joint, math.radians(parsed.value))
+        joints = joint_limits_between(**bounds)
+        if isinstance(joints, Message):
+            self._store.complain(request.field, joints)
             return
         self._store.clear_problems(*(f"setup.joints.{name}.{joint}" for name in JOINT_ENDS))
-        self._limit_joints(SoftJointLimits(lower=tuple(bounds["lower"]), upper=tuple(bounds["upper"])))
+        self._limit_joints(joints)
 
     def _limit_joints(self, joints: SoftJointLimits) -> None:
         setup = self._store.state.setup

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, message
-from rcilab.makers.configuration import RobotConfiguration
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.model.dynamics.payload import LARGEST_INERTIA, Payload
 
 POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -26,6 +28,7 @@ FIELD_NAMES = {
 }
 JOINT_ENDS = ("lower", "upper")
 """Beside FIELD_NAMES: setup.joints.lower.0 and so on."""
+_ROUNDED = 1e-5  # [rad] Closer than what a field shows of an angle.
 THINNEST = 0.02  # [m] A box that the mouse cannot make thinner.
 FARTHEST_FACE = 5.0  # [m] No arm of ours reaches a third of it, so what is farther is a slip of units.
 
@@ -201,3 +204,24 @@ def _turned(pose: Pose, name: str, value: float) -> Pose:
     else:
         rpy[index - 3] = math.radians(value)
     return Pose.from_rpy(position, rpy)
+
+
+def exact_end(own: JointLimits, end: str, joint: int, angle: float) -> float:
+    """Returns a typed end of a soft joint limit, [rad]: the arm's own one, unrounded, if the field shows that.
+
+    Args:
+        own: Limits of the arm.
+        end: "lower" or "upper".
+        joint: Index of the joint.
+        angle: As typed, [rad].
+    """
+    exact = float(getattr(own, end)[joint])
+    return exact if abs(angle - exact) < _ROUNDED else angle
+
+
+def joint_limits_between(lower: Sequence[float], upper: Sequence[float]) -> SoftJointLimits | Message:
+    """Returns soft joint limits by their ends, [rad], or which ends have no room between them."""
+    for low, high in zip(lower, upper, strict=True):
+        if not low < high:
+            return message("setup.joint_ends", low=low, high=high)
+    return SoftJointLimits(lower=tuple(lower), upper=tuple(upper))
