@@ -1,4 +1,4 @@
-"""RobotModel: one arm with its tool and its load: geometry, kinematics and dynamics, read-only."""
+"""RobotModel: geometry, kinematics and dynamics of one arm with its tool and load, read-only."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = No
 
 
 def require_model(model: object) -> RobotModel:
-    """Returns `model` if it is a robot model and not, by mistake, its name.
+    """Returns `model` if it is a robot model; catches its name passed by mistake.
 
     Raises:
-        InvalidValueError: It is a name or something else; the message says what to write.
+        InvalidValueError: It is a name or something else; the message names the remedy.
     """
     if isinstance(model, RobotModel):
         return model
@@ -67,7 +67,7 @@ class RobotModel(ReachingArm):
     """An arm with a tool and a load. Immutable: `with_tool` and `with_load` return another one.
 
     All joint vectors have shape (n,) and are in [rad]; all poses are in the base frame, of the tool unless a frame is
-    named. Where its frames are and how they move is in `MovingArm`, the inverse and the arm angle in `ReachingArm`.
+    named. Forward and differential kinematics are in `MovingArm`, the inverse and the arm angle in `ReachingArm`.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class RobotModel(ReachingArm):
 
     @property
     def name(self) -> str:
-        """Name as the manual spells it."""
+        """Name, spelled as in the manual."""
         return self.description.name
 
     @property
@@ -161,9 +161,9 @@ class RobotModel(ReachingArm):
         return RobotModel(self.description, self.T_flange_tool, self.load, T_tool_stiffness)
 
     def elbow(self, q: ArrayLike) -> tuple[float, int]:
-        """Returns the elbow as Franka defines it: the angle of joint 3, [rad], and the side of its flip joint 4 is on.
+        """Returns the elbow as Franka defines it: angle of joint 3, [rad], and side of joint 4 relative to its flip.
 
-        The side is +1 above the angle at which the arm is stretched, and -1 below.
+        The side is +1 above the angle of the stretched arm, and -1 below.
 
         Raises:
             KinematicsError: The maker of this arm defines no flip.
@@ -183,12 +183,12 @@ class RobotModel(ReachingArm):
         return dexterity_path(self.jacobian(as_path(q, self.n, "q", "rad"), frame))
 
     def sample_workspace(self, count: int = 10_000, *, seed: int = 0, box: SafetyBox | None = None) -> Workspace:
-        """Returns where the tool is at joint angles that are uniformly random inside the limits.
+        """Returns tool positions at joint angles that are uniformly random inside the limits.
 
         Args:
             count: Number of configurations to try, up to 1 000 000.
             seed: The same seed gives the same samples.
-            box: Keeps only samples with the tool in it; all when absent.
+            box: Only samples with the tool inside are returned; all when absent.
 
         Returns:
             `.q`, shape (N, n); `.position`, shape (N, 3), [m] in base; `.dexterity` there.
@@ -213,7 +213,7 @@ class RobotModel(ReachingArm):
     ) -> TorqueTerms:
         """Returns the joint torques of the rigid arm with its load, and their terms (GetTau, GetTauNoFriction).
 
-        They do not include the rotors of the drives: they are the torques behind the gears.
+        They are the torques at the output of the gears, without the rotors of the drives.
 
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
@@ -251,7 +251,7 @@ class RobotModel(ReachingArm):
             distance: The floor and the tool's radius; its minimum distances have no effect here.
 
         Returns:
-            `.distance`, shape () or (N,), [m], below 0 where they overlap; `.links`, the numbers of the two.
+            `.distance`, shape () or (N,), [m], negative for an overlap; `.links`, the numbers of the two.
 
         Raises:
             InvalidValueError: q has another shape or is not finite.
@@ -278,7 +278,7 @@ class RobotModel(ReachingArm):
 
     @cached_property
     def fingerprint(self) -> Mapping[str, str]:
-        """Hashes of what a check depends on: model, limits, tool and load, each a SHA-256 in hex."""
+        """Hashes of the inputs of a check: model, limits, tool and load, each a SHA-256 in hex."""
         d = self.description
         joint, cartesian = d.limits.joint, d.limits.cartesian
         geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]

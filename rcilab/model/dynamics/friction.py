@@ -1,4 +1,4 @@
-"""Joint friction: that of the simulated arm, or with coefficients identified on a real one."""
+"""Joint friction, of the simulated arm or with coefficients identified on a real one."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class JointFriction:
         """Returns the friction torques, [N m], to add to those of the rigid arm, for dq of shape (..., n), [rad/s].
 
         Raises:
-            InvalidValueError: It is the friction of another number of joints.
+            InvalidValueError: The friction has another number of joints.
         """
         n = len(self.viscous)
         if dq.shape[-1] != n:
-            raise InvalidValueError("friction", repr(self), f"is that of {n} joints, the arm has {dq.shape[-1]}")
+            raise InvalidValueError("friction", repr(self), f"is for {n} joints, the arm has {dq.shape[-1]}")
         return self.viscous * dq + self.coulomb * np.sign(dq) + self.offset
 
     def __repr__(self) -> str:
@@ -54,8 +54,8 @@ class JointFriction:
 def simulated_friction(limits: JointLimits) -> JointFriction:
     """Returns the friction of the MuJoCo plant: viscous, in proportion to the size of the drive.
 
-    No table has coefficients of the real arms; these keep the simulated arm from ringing. A real arm sends its own in
-    the response to LoadRobotModel.
+    Coefficients of the real arms are not published; these prevent ringing of the simulated arm. A real arm sends its
+    own in the response to LoadRobotModel.
 
     Args:
         limits: Limits of the arm; the torque limits represent the size of the drives.

@@ -9,9 +9,9 @@ import numpy as np
 from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
-_HEAVIEST = 100.0  # [kg] Tuning value: more than ten times what an xMate can carry. Grams are above it.
-_FARTHEST = 5.0  # [m] Tuning value: from the flange; millimetres are above it.
-LARGEST_INERTIA = 100.0  # [kg m^2] Tuning value: a hundred times that of anything an xMate can carry.
+_MAX_MASS = 100.0  # [kg] Tuning value: more than ten times the payload of an xMate; a value in grams is above it.
+_MAX_DISTANCE = 5.0  # [m] From the flange. Tuning value: a value in millimetres is above it.
+LARGEST_INERTIA = 100.0  # [kg m^2] Tuning value: a hundred times that of any load of an xMate.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -23,17 +23,17 @@ class Payload:
     """
 
     mass: float = 0.0
-    """[kg]."""
+    """Mass, [kg]."""
     center_of_mass: Vector3 = field(default_factory=lambda: np.zeros(3))
-    """In the flange frame, shape (3,), [m]."""
+    """Centre of mass in the flange frame, shape (3,), [m]."""
     inertia: Matrix = field(default_factory=lambda: np.zeros((3, 3)))
-    """About the centre of mass, flange axes, shape (3, 3), [kg m^2]."""
+    """Inertia about the centre of mass, flange axes, shape (3, 3), [kg m^2]."""
 
     def __post_init__(self) -> None:
         """Checks the values and makes them read-only."""
         mass = as_number(self.mass, "load mass", "kg")
-        if not 0.0 <= mass <= _HEAVIEST:
-            raise InvalidValueError("load mass", mass, f"must be from 0 to {_HEAVIEST:g} [kg]")
+        if not 0.0 <= mass <= _MAX_MASS:
+            raise InvalidValueError("load mass", mass, f"must be from 0 to {_MAX_MASS:g} [kg]")
         try:
             moments = np.array(self.inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError, OverflowError):
@@ -43,12 +43,12 @@ class Payload:
             raise InvalidValueError("load inertia", inertia.tolist(), "must be zero: a load without mass has none")
         if np.abs(inertia - inertia.T).max() > 1e-9 * max(1.0, float(np.abs(inertia).max())):
             raise InvalidValueError("load inertia", inertia.tolist(), "must be symmetric")
-        inertia = _nearest_possible(0.5 * inertia + 0.5 * inertia.T)
+        inertia = _valid_inertia(0.5 * inertia + 0.5 * inertia.T)
         object.__setattr__(self, "mass", mass)
         center = as_vector(self.center_of_mass, 3, "load centre of mass", "m")
-        if np.abs(center).max() > _FARTHEST:
+        if np.abs(center).max() > _MAX_DISTANCE:
             raise InvalidValueError(
-                "load centre of mass", center.tolist(), f"is farther than {_FARTHEST:g} m; the unit is metres"
+                "load centre of mass", center.tolist(), f"is farther than {_MAX_DISTANCE:g} m; the unit is metres"
             )
         object.__setattr__(self, "center_of_mass", center)
         object.__setattr__(self, "inertia", readonly_copy(inertia))
@@ -59,10 +59,10 @@ class Payload:
         return f"<Payload of {self.mass:.4g} kg, centre of mass at {centre} m, moments of inertia {moments} kg m^2>"
 
 
-def _nearest_possible(inertia: Matrix) -> Matrix:
-    """Returns an inertia without negative moments caused by rounding.
+def _valid_inertia(inertia: Matrix) -> Matrix:
+    """Returns the inertia, without negative moments caused by rounding.
 
-    Every body's principal moments are positive or zero, and none exceeds the sum of the other two.
+    The principal moments of a body are not negative, and none exceeds the sum of the other two.
     """
     is_small = bool(np.abs(inertia).max() <= LARGEST_INERTIA)
     moments, axes = np.linalg.eigh(inertia) if is_small else (np.array((-1.0, 0.0, 0.0)), np.eye(3))

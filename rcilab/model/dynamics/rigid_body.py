@@ -1,7 +1,7 @@
 """Joint torques of the rigid arm, by pinocchio's recursive Newton-Euler algorithm."""
 
 # pyright: reportAttributeAccessIssue=false
-# pinocchio defines its names in compiled code at import, where pyright cannot see them.
+# pinocchio defines its names in compiled code at import; pyright does not know them.
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
 from rcilab.robots.upright import upright_flange, upright_joints
 
-GRAVITY = 9.81  # [m/s^2] along -z of the base; the figure the vendor's dynamics library computes with.
+GRAVITY = 9.81  # [m/s^2] along -z of the base; the value of the vendor's dynamics library.
 
 Twist: TypeAlias = tuple[float, float, float, float, float, float]
 """Linear and angular velocity, [m/s, rad/s]."""
@@ -35,7 +35,7 @@ class TorqueTerms:
     coriolis: JointVector
     """C(q, dq) dq: Coriolis and centrifugal torques."""
     gravity: JointVector
-    """g(q): the torques that hold the arm still."""
+    """g(q): the torques that hold the arm at standstill."""
     friction: JointVector
     """Friction torques; zeros unless requested."""
 
@@ -53,8 +53,8 @@ class TorqueTerms:
 class ToolTerms:
     """Pose, twist and Jacobian of the tool of an arm in one state; its arrays must not be written to.
 
-    All control laws of a cycle share one instance, so that everything that follows from angles and velocities is
-    computed once. Other terms are computed on first use, so an instance belongs to the thread of its `RigidBody`.
+    All control laws of a cycle share one instance, so that terms of the same angles and velocities are computed once.
+    Other terms are computed on first use, so an instance belongs to the thread of its `RigidBody`.
 
     Attributes:
         matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
@@ -62,9 +62,9 @@ class ToolTerms:
         jacobian: At the tool, linear rows first, base axes, shape (6, n).
 
     Args:
-        model: The arm as pinocchio has it.
-        data: Its working memory.
-        tool: Number of the tool's frame.
+        model: The arm as a pinocchio model.
+        data: Working memory of the model.
+        tool: Index of the tool's frame.
         q: Joint angles, shape (n,), [rad]; the array must not change afterwards.
         dq: Joint velocities, shape (n,), [rad/s]; likewise.
     """
@@ -80,7 +80,7 @@ class ToolTerms:
         self._mass_inverse: Matrix | None = None
 
     def is_at(self, q: JointVector, dq: JointVector) -> bool:
-        """Returns whether it was computed from these array objects."""
+        """Returns whether the terms were computed from these array objects."""
         return self._args[3] is q and self._args[4] is dq
 
     @property
@@ -115,7 +115,7 @@ class RigidBody:
     """The rigid-body model of an arm with a load and a tool at the flange. One instance serves one thread at a time.
 
     Attributes:
-        tool_solver: For equations in the six directions of the tool.
+        tool_solver: Solver for equations in the six directions of the tool.
 
     Args:
         description: The arm.
@@ -128,8 +128,8 @@ class RigidBody:
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         parent = 0
         for number, (joint, link) in enumerate(zip(upright_joints(description), description.links, strict=True), 1):
-            kind = _kind(joint.axis)
-            parent = model.addJoint(parent, kind, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
+            joint_type = _joint_type(joint.axis)
+            parent = model.addJoint(parent, joint_type, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
             model.appendBodyToJoint(parent, _inertia(link), pin.SE3.Identity())
         T_link_flange = upright_flange(description)
         if load.mass > 0.0:
@@ -156,7 +156,7 @@ class RigidBody:
         return _terms(full, bias, gravity)
 
     def torque_path(self, q: JointPath, dq: JointPath, ddq: JointPath) -> TorqueTerms:
-        """Returns the torques and their terms in every row, each of shape (N, n); arguments likewise."""
+        """Returns the torques and their terms for every row; arguments and results have shape (N, n)."""
         zeros, model = np.zeros(q.shape), self._model
         full, bias, gravity = (_newton_euler(model, q, *rest) for rest in ((dq, ddq), (dq, zeros), (zeros, zeros)))
         return _terms(full, bias, gravity)
@@ -247,9 +247,9 @@ class RigidBody:
         return ToolTerms(self._model, self._data, self._tool, q, dq)
 
     def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
-        """Returns the `tool_motion` of the present state, shared by all control laws of a cycle.
+        """Returns the `tool_motion` of the current state, shared by all control laws of a cycle.
 
-        The last result is kept and returned again for the same array objects.
+        The last result is cached for the same array objects.
 
         Args:
             q: Joint angles, shape (n,), [rad]; the array must not change afterwards.
@@ -266,8 +266,8 @@ def _pose(matrix: Matrix) -> Pose:
     return Pose.from_parts((a, b, c, d, e, f, g, h, i), (x, y, z))
 
 
-def _kind(axis: Vector3) -> pin.JointModel:
-    """Returns the fastest kind of joint about an axis."""
+def _joint_type(axis: Vector3) -> pin.JointModel:
+    """Returns the fastest joint type for an axis."""
     if axis[2] > 0.5:
         return pin.JointModelRZ()
     return pin.JointModelRY() if axis[1] > 0.5 else pin.JointModelRevoluteUnaligned(axis.copy())

@@ -1,11 +1,11 @@
 """Small symmetric systems of equations for the 1 kHz path, and the vibration modes of an arm on springs.
 
-eigenpy, which comes with pinocchio, binds Eigen's decompositions: on six equations they take a fifth of the time of
-numpy's general solver, whose checks cost more than its work, and on the modes of seven joints less than half.
+eigenpy, which comes with pinocchio, binds Eigen's decompositions: for six equations they take a fifth of the time of
+NumPy's general solver, whose checks dominate, and for the modes of seven joints less than half.
 """
 
 # pyright: reportAttributeAccessIssue=false
-# eigenpy defines its names in compiled code at import, where pyright cannot see them.
+# eigenpy defines its names in compiled code at import; pyright does not know them.
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class SymmetricSolver:
         self._decomposition = eigenpy.LLT(size)
 
     def solve(self, A: Matrix, b: Array) -> Array:
-        """Returns x, of the shape of `b`; without meaning where A is not positive-definite.
+        """Returns x, of the shape of `b`; undefined if A is not positive-definite.
 
         Args:
-            A: Shape (size, size); symmetric, of which the lower triangle counts.
+            A: Shape (size, size); symmetric; only the lower triangle is used.
             b: Shape (size,) or (size, columns).
         """
         return self._decomposition.compute(A).solve(b)
@@ -49,7 +49,7 @@ class VibrationModes(NamedTuple):
     """The vibration modes of an arm on springs, slowest first."""
 
     squares: Array
-    """Angular frequencies squared, w^2, shape (n,), [rad^2/s^2]; of modes without a spring zero, within rounding."""
+    """Angular frequencies squared, w^2, shape (n,), [rad^2/s^2]; zero within rounding for modes without a spring."""
     shapes: Matrix
     """A mode in each column, U with U^T M U = 1, shape (n, n)."""
     momenta: Matrix
@@ -60,7 +60,7 @@ def vibration_modes(mass_inverse: Matrix, stiffness: Matrix) -> VibrationModes:
     """Returns the modes of springs on an arm: the solutions of K u = w^2 M u.
 
     Args:
-        mass_inverse: M^-1 of the arm as it is now, symmetric, positive-definite, shape (n, n), [1/(kg m^2)].
+        mass_inverse: M^-1 of the arm in its current state, symmetric, positive-definite, shape (n, n), [1/(kg m^2)].
         stiffness: K of the springs, in joint space, symmetric, shape (n, n), [N m/rad].
     """
     solver = eigenpy.GeneralizedSelfAdjointEigenSolver(stiffness, mass_inverse, _MODES)

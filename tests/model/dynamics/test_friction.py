@@ -83,7 +83,7 @@ def test_identified_friction_is_a_line_for_each_direction_and_costs_power(seed):
     [
         (None, "friction must be True, False or a JointFriction, got None"),
         ("much", "must be True, False or a JointFriction"),
-        (JointFriction(viscous=[1.0] * 6, coulomb=[0.0] * 6, offset=[0.0] * 6), "is that of 6 joints, the arm has 7"),
+        (JointFriction(viscous=[1.0] * 6, coulomb=[0.0] * 6, offset=[0.0] * 6), "is for 6 joints, the arm has 7"),
     ],
 )
 def test_what_is_no_friction_of_the_arm_is_refused_in_words(friction, words):
