@@ -1,15 +1,16 @@
 """The control laws that turn a reference into the setpoint of the drives, once a cycle.
 
-    POSITION              the servo follows the commanded angles; also how an arm stops and stands still
+    POSITION              the servo follows the commanded angles, also for a stop and at standstill
     JOINT_IMPEDANCE       springs at the joints pull towards the commanded angles
-    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and press with the desired wrench;
-                          both along the force axes, at the tool's origin
+    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and the desired wrench is
+                          added; both along the force axes, at the tool's origin
     TORQUE                the commanded torques act, gravity and friction are compensated
-    GUIDE                 the arm is weightless and follows a hand
+    GUIDE                 the arm is weightless and is guided by hand
     BRAKED                the brakes hold
 
-With the virtual guide on and a safety box active, walls push the tool back into the box, as stiff as the Cartesian
-impedance, wherever the arm is compliant: under both impedances and while it is guided. The box is then not checked.
+With the virtual guide enabled and an active safety box, walls push the tool back into the box while the arm is
+compliant (both impedance laws and hand guiding), with the stiffness of the Cartesian impedance. The box is then not
+checked.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from rcilab.sim.plant import Drive, Measurement, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.tool_kinematics import ToolKinematics
 
-# In a cycle: so that the largest wrench there is, 60 N and 30 N m, is reached after 0.5 s. A tuning value.
+# Per cycle: the largest wrench, 60 N and 30 N m, is reached after 0.5 s. A tuning value.
 _WRENCH_STEP = (0.12,) * 3 + (0.06,) * 3
 _DRIVES = {"position": Drive.POSITION, "braked": Drive.BRAKED}
 
@@ -47,9 +48,9 @@ class ControlLaw(Enum):
 
     def __init__(self, words: str) -> None:
         self.is_compliant: Final = words not in ("position", "braked")
-        """Whether the arm may be off its reference, so that a stop has to begin from the measured position."""
+        """Whether the arm may deviate from its reference, so that a stop begins at the measured position."""
         self.drive: Final = _DRIVES.get(words, Drive.TORQUE)
-        """What the joints are driven with."""
+        """Mode of the drives."""
         self.is_force_driven: Final = words in ("torque", "guide")
         """Whether forces move the arm, and commanded angles follow the measured ones."""
 
@@ -59,17 +60,17 @@ class Actuator:
 
     Args:
         model: The arm with its tool and load.
-        parameters: What the client has configured.
+        parameters: The configuration from the client.
     """
 
     def __init__(self, model: RobotModel, parameters: ArmParameters) -> None:
         self._axes = ForceAxes(model, parameters)
-        self._wrench = (0.0,) * 6  # As it acts just now.
+        self._wrench = (0.0,) * 6  # The present one.
         self.configure(model, parameters)
         self._freedom = GuidedFreedom.ALL
 
     def configure(self, model: RobotModel, parameters: ArmParameters) -> None:
-        """Takes new parameters, and the model with their tool and load."""
+        """Sets new parameters, and the model with their tool and load."""
         self._law = ControlLaw.BRAKED
         self._damper = ModalDamping()
         self._axes.configure(model, parameters)
@@ -78,7 +79,7 @@ class Actuator:
         self._soft_limits = parameters.soft_limits(model.limits.joint)
 
     def begin_guiding(self, freedom: GuidedFreedom, measured: Measurement) -> None:
-        """Begins hand guiding; what is not free is held at the present pose."""
+        """Begins hand guiding; the directions that are not free are held at the present pose."""
         self._freedom = freedom
         self._T_held = self._model.forward(measured.q)
 
@@ -95,8 +96,8 @@ class Actuator:
         Args:
             law: The control law.
             commanded: The reference of the joints.
-            tool_c: The same for the tool, up to date.
-            measured: Where the arm is.
+            tool_c: The reference of the tool, already updated.
+            measured: The measurement.
             tau: Commanded torques, n plain floats, [N m], for TORQUE; None: none yet.
         """
         if law is not self._law:
@@ -140,10 +141,10 @@ class Actuator:
         return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits)
 
 
-def _approach(wrench: tuple[float, ...], wanted: tuple[float, ...]) -> tuple[float, ...]:
-    """Returns a wrench a cycle later on its way to the one that is wanted: a step would jolt the arm."""
-    if wrench == wanted:
-        return wanted
+def _approach(wrench: tuple[float, ...], desired: tuple[float, ...]) -> tuple[float, ...]:
+    """Returns the next wrench on a ramp to the desired one: a step would jerk the arm."""
+    if wrench == desired:
+        return desired
     return tuple(
-        now + min(max(goal - now, -step), step) for now, goal, step in zip(wrench, wanted, _WRENCH_STEP, strict=True)
+        now + min(max(goal - now, -step), step) for now, goal, step in zip(wrench, desired, _WRENCH_STEP, strict=True)
     )

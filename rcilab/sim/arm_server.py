@@ -1,14 +1,14 @@
-"""The running controller of any maker: its clock, at 1 kHz or in lock-step, and its sockets. One thread for all.
+"""The running controller of any maker: its clock, at 1 kHz or in lock-step, and its sockets, in one thread.
 
-Free-running, a state is due every millisecond on a fixed grid; its cycle is computed a little before, so that it leaves
-in time. A cycle that this process itself missed is left out and counted: the simulated time slips, and the client does
-not lose commands for which it had no state to answer (see `CycleTimer`). A client that went on meanwhile, as the
-vendor's does on its old state, has then sent more commands than cycles. Such cycles are made up for, one in each
-millisecond and without sending a state, or its commands would be played later and later.
+Free-running, a state is due every millisecond on a fixed grid; its cycle is computed slightly earlier, so that the
+state is sent in time. Cycles that this process missed are skipped and counted: the simulated time slips, and the client
+does not lose commands for which it had no state to answer (see `CycleTimer`). A client that continued meanwhile, as the
+vendor's does with its old state, has then sent more commands than cycles. Such cycles are caught up, one in each
+millisecond and without sending a state; otherwise the delay of its commands would grow.
 
-In lock-step a motion's next cycle is due when its command has come, however long that takes. When several commands
-wait, as after the vendor client's sleep, their cycles are computed without sending a state, and the state after the
-last one is the one to answer.
+In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
+commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
+client answers the state after the last one.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from rcilab.sim.maker_server import MakerServer
 from rcilab.sim.simulation_port import SimulationPort
 
-PRIORITY = 80  # Under SCHED_FIFO; above the client's process, whose clock this is.
-LEAD_TIME = 0.0005  # [s] Before its state is due a cycle begins: longer than nearly all of them take.
-RESEND_TIME = 0.02  # [s] In lock-step a state is sent again after this time until the first command has come.
+PRIORITY = 80  # Under SCHED_FIFO; above the client's process, which it clocks.
+LEAD_TIME = 0.0005  # [s] From the start of a cycle until its state is due; longer than almost any cycle takes.
+RESEND_TIME = 0.02  # [s] In lock-step a state is repeated after this time until the first command arrives.
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
-CORRUPTED_TIMEOUT = 0.05  # [s] The same where the network spoils datagrams on purpose: below any client's own.
-SLIP = 20  # [cycles] A motion that took so much longer than it should is worth a line.
-GRACE = 2.0  # [s] For the arm to stop when the controller shall end.
+CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
+SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
+GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
-_LOOK = 0.1  # [s] Between looks at whether the parent process still lives, or a stalled controller shall end.
+_CHECK_PERIOD = 0.1  # [s] Between checks for the end of the parent process, or for a requested end during a stall.
 
 
 class ArmServer:
@@ -62,12 +62,12 @@ class ArmServer:
 
     Attributes:
         controller: The controller without its wire; owned by the thread that runs.
-        bad_datagrams: Datagrams of the client's that are not well formed.
+        bad_datagrams: Number of malformed datagrams of the client.
 
     Args:
         server: The maker's part: channels, codec, behaviour.
-        config: How it is configured.
-        log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
+        config: The configuration.
+        log: Receives one line per unusual event, and must not block; None: a thread writes them to stderr.
 
     Raises:
         UsageError: An address or port cannot be used.
@@ -89,7 +89,7 @@ class ArmServer:
         self._clock = SystemClock()
         self._timer = CycleTimer(self._clock.now())
         self._is_ending = False
-        self._next_look = 0.0
+        self._next_check = 0.0
         self._cores = CpuLatencyLock()
         self._missed_before = 0
         self._logged_faults: tuple[FaultCode, ...] = ()
@@ -111,12 +111,12 @@ class ArmServer:
 
     @property
     def missed(self) -> int:
-        """Cycles that were left out because this process was not there for them, or put off; see `cycle_timer`."""
+        """Cycles that were skipped because this process was late, or postponed; see `cycle_timer`."""
         return self._timer.missed
 
     @property
     def url(self) -> str:
-        """Where clients connect to."""
+        """URL for clients."""
         return f"{self._server.scheme}://{self._endpoint.host}:{self._endpoint.port}{self._endpoint.options}"
 
     @property
@@ -127,14 +127,14 @@ class ArmServer:
 
     @property
     def world_address(self) -> str | None:
-        """Where the world port is, as ADDR:PORT; None: there is no such port."""
+        """Address of the simulation port, ADDR:PORT; None without one."""
         return None if self._simulation_port is None else "{}:{}".format(*self._simulation_port.address)
 
     def run(self, on_ready: Callable[[], None] = lambda: None) -> None:
         """Runs until `request_stop`, then stops the arm and closes every socket.
 
         Args:
-            on_ready: Called once, when the first state is out.
+            on_ready: Called once, after the first state was sent.
         """
         use_realtime = self.config.realtime and not self.config.lockstep
         if use_realtime:
@@ -155,11 +155,11 @@ class ArmServer:
                 self._lines.close()
 
     def request_stop(self) -> None:
-        """Asks for the end: one controlled stop if the arm moves, then `run` returns."""
+        """Requests the end: a controlled stop if the arm moves, then `run` returns."""
         self._is_ending = True
 
     def close(self) -> None:
-        """Closes the sockets of a server that does not run."""
+        """Closes the sockets of a server that is not running."""
         self._endpoint.close()
         if self._simulation_port is not None:
             self._simulation_port.close()
@@ -176,19 +176,19 @@ class ArmServer:
     def _loop(self, on_ready: Callable[[], None]) -> None:
         self._timer.restart(self._clock.now())
         self._stalls.replace(self.config.stalls, self._timer.deadline)
-        last_moment: float | None = None
+        end_deadline: float | None = None
         notice_left = 0
         is_ready = has_served = False
         while True:
             stall = self._stalls.take(self._clock.now())
             if stall > 0.0:
                 self._stall(stall)
-            if self._is_ending and last_moment is None:
-                last_moment = self._clock.now() + GRACE
+            if self._is_ending and end_deadline is None:
+                end_deadline = self._clock.now() + GRACE
                 notice_left = self._server.begin_shutdown()
-            if last_moment is not None:
+            if end_deadline is not None:
                 notice_left -= 1
-                if (not self.controller.is_moving and notice_left < 0) or self._clock.now() > last_moment:
+                if (not self.controller.is_moving and notice_left < 0) or self._clock.now() > end_deadline:
                     return
             if self.config.lockstep and self.controller.wants_commands:
                 self._await_command()
@@ -196,7 +196,7 @@ class ArmServer:
             else:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
-                    self._await(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
+                    self._serve_until(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
                 if self._timer.puts_off(self.controller.is_starved):
                     continue
             has_served = self._step(self._timer.deadline)
@@ -205,16 +205,18 @@ class ArmServer:
                 on_ready()
 
     def _stall(self, duration: float) -> None:
-        """Does nothing at all for so long, [s], as a controller whose clock stalls; an end asked for goes before."""
+        """Does nothing for a duration, [s], like a controller whose clock stalls; a requested end ends the stall."""
         until = self._clock.now() + duration
         while self._clock.now() < until and not self._is_ending:
-            self._clock.sleep_until(min(until, self._clock.now() + _LOOK))
+            self._clock.sleep_until(min(until, self._clock.now() + _CHECK_PERIOD))
 
     def _poll(self, timeout: float) -> None:
-        """Serves the sockets once; waits up to `timeout`, [s], for something to serve."""
-        self._take(self._network.poll(timeout, () if self._simulation_port is None else self._simulation_port.sockets))
+        """Serves the sockets once; waits up to `timeout`, [s], for data."""
+        self._handle_arrivals(
+            self._network.poll(timeout, () if self._simulation_port is None else self._simulation_port.sockets)
+        )
 
-    def _await(self, deadline: float) -> None:
+    def _serve_until(self, deadline: float) -> None:
         """Serves the sockets until the deadline, and at least once."""
         while True:
             self._poll(deadline - self._clock.now())
@@ -222,10 +224,10 @@ class ArmServer:
                 return
 
     def _await_command(self) -> None:
-        """Serves the sockets until a command is there or lost on its way, or the motion or the waiting time is over.
+        """Serves the sockets until a command arrives or is lost, the motion ends, or the timeout expires.
 
-        One that comes too late for its own cycle is not waited for any more, but shows that the client is back: it may
-        then catch up.
+        After a timeout, a command that is too late for its cycle shows that the client is active again: it may then
+        catch up.
         """
         controller = self.controller
         is_first = not controller.arm.playout.is_playing
@@ -233,7 +235,7 @@ class ArmServer:
         deadline = self._clock.now() + self._command_timeout
         resend = self._clock.now() + RESEND_TIME
         while True:
-            remaining = min(deadline - self._clock.now(), _LOOK)
+            remaining = min(deadline - self._clock.now(), _CHECK_PERIOD)
             remaining = resend - self._clock.now() if is_first else remaining
             self._poll(0.0 if len(controller.arm.playout) else remaining)
             self._check_parent()
@@ -245,7 +247,7 @@ class ArmServer:
             if self._has_timed_out and controller.arm.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
-            if is_first:  # Not at every datagram of a stranger's: states would fill the client's buffer.
+            if is_first:  # Not after every foreign datagram: the states would fill the client's buffer.
                 if self._clock.now() >= resend:
                     self._server.send_states()
                     resend = self._clock.now() + RESEND_TIME
@@ -255,7 +257,7 @@ class ArmServer:
 
     @property
     def _command_timeout(self) -> float:
-        """How long lock-step waits for the next command, [s]."""
+        """Timeout for the next command in lock-step, [s]."""
         if self._has_timed_out:
             return CYCLE_TIME
         if self.config.patience is not None:
@@ -264,24 +266,24 @@ class ArmServer:
 
     @property
     def _is_idle(self) -> bool:
-        """Whether a cycle may be computed early and sockets be served until its state is due: one wait, not two.
+        """Whether a cycle may be computed early, so that the sockets are served in one wait until its state is due.
 
-        A request may then show one state later, which does not matter to an arm at standstill.
+        A request may then take effect one state later, which is irrelevant for a stationary arm.
         """
         is_quiet = self._server.is_quiet and self._endpoint.has_client
         return is_quiet and not (self.controller.is_moving or self.config.lockstep)
 
     def _step(self, due: float) -> bool:
-        """Advances by a cycle and sends its state when it is due, or at once when that time is over.
+        """Advances by a cycle and sends its state when it is due, or at once if it is overdue.
 
-        Returns whether the sockets were served until then.
+        Returns whether the sockets were served meanwhile.
         """
         was_moving = self.controller.is_moving
         is_idle = self._is_idle
         self._catch_up()
         self._advance()
         if is_idle:
-            self._await(due)
+            self._serve_until(due)
         else:
             self._clock.sleep_until(due)
         self._server.send_states()
@@ -292,13 +294,13 @@ class ArmServer:
         return is_idle
 
     def _check_parent(self) -> None:
-        if self.config.parent_pid is not None and self._clock.now() >= self._next_look:
-            self._next_look = self._clock.now() + _LOOK
+        if self.config.parent_pid is not None and self._clock.now() >= self._next_check:
+            self._next_check = self._clock.now() + _CHECK_PERIOD
             if os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
     def _catch_up(self) -> None:
-        """Advances by cycles without sending their states, when more commands wait than should."""
+        """Advances by cycles without sending their states if too many commands are queued."""
         if not self.controller.wants_commands:
             return
         playout = self.controller.arm.playout
@@ -308,7 +310,7 @@ class ArmServer:
                 self._advance(is_seen=False)
 
     def _log_slip(self) -> None:
-        """Says how much longer than it should a motion took, when one has ended."""
+        """Logs by how much a motion took longer than planned, after its end."""
         if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
             self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
@@ -325,7 +327,7 @@ class ArmServer:
             self._log_faults(faults)
 
     def _log_faults(self, faults: tuple[FaultCode, ...]) -> None:
-        """Logs why error bits were set: by a condition, at the simulation port, by a request."""
+        """Logs the reason for new error bits."""
         self._logged_faults = faults
         if faults:
             self._log(f"{name_faults(faults)}: {self.controller.reason}; the arm stops")
@@ -334,7 +336,7 @@ class ArmServer:
                     "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
                 )
 
-    def _take(self, arrivals: list[Arrival]) -> None:
+    def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
             match arrival:
                 case DatagramArrived(datagram):
@@ -345,7 +347,7 @@ class ArmServer:
                     self._warn_of_other_target(peer.address)
                     self._server.connect(peer)
                 case ClientDisconnected(peer, reason):
-                    self._lose_client(peer, reason)
+                    self._handle_disconnect(peer, reason)
                 case ExtraSocketsReady(sockets):
                     if self._simulation_port is not None:
                         self._simulation_port.serve(sockets)
@@ -366,7 +368,7 @@ class ArmServer:
             )
             self._rare_lines.write("elsewhere", line, "connected")
 
-    def _lose_client(self, peer: Peer, reason: str) -> None:
+    def _handle_disconnect(self, peer: Peer, reason: str) -> None:
         if self._server.disconnect(peer):
             self._log(f"the client {reason} in mid-motion: the arm stops")
         elif reason != "closed the connection":

@@ -36,19 +36,19 @@ class DriveReport:
         self._last: Measurement | None = None
         self._filtered = np.zeros(2 * model.n)
 
-    def step(self, measured: Measurement, is_at_rest: bool) -> tuple[JointVector, ...]:
+    def step(self, measured: Measurement, is_stationary: bool) -> tuple[JointVector, ...]:
         """Returns theta, dtheta, motor_tau, and filtered both tau and motor_tau, each of shape (n,), in SI.
 
         Args:
             measured: What the sensors say; the very same object again means that nothing has changed.
-            is_at_rest: Whether the reference is stationary, so that the filter may settle.
+            is_stationary: Whether the reference is stationary, so that the filter may settle.
         """
         last = self._last or measured
         q, dq, tau = measured.q, measured.dq, measured.tau
         report = self._matrix.dot(np.concatenate((q, dq, tau, dq - last.dq, tau - last.tau, self._filtered)))
         n = len(q)
         true, filtered = report[2 * n : 4 * n], report[4 * n :]
-        self.is_settled = self._last is None or self._gain == 1.0 or (is_at_rest and _is_one(true, filtered))
+        self.is_settled = self._last is None or self._gain == 1.0 or (is_stationary and _is_one(true, filtered))
         self._last, self._filtered = measured, true if self.is_settled else filtered
         return report[:n], report[n : 2 * n], true[n:], self._filtered[:n], self._filtered[n:]
 

@@ -1,8 +1,8 @@
-"""First-order low passes on what a client commands, and on torques that are reported.
+"""First-order low-pass filters of commands and of reported torques.
 
     x += k (u - x),   k = dt / (dt + 1 / (2 pi f))
 
-The same filter that the vendor's client applies before it sends. At 1000 Hz, the largest frequency that can be set, a
+The vendor's client applies the same filter before it sends. At 1000 Hz, the largest frequency that can be set, a
 filter is off.
 """
 
@@ -19,7 +19,7 @@ SAMPLING_RATE = 1.0 / CYCLE_TIME  # [Hz] A filter with this cut-off frequency is
 
 
 def low_pass_gain(frequency: float) -> float:
-    """Returns the share of the difference that a low pass takes up in one cycle, 0 to 1.
+    """Returns the gain k of a low-pass filter, 0 to 1.
 
     Args:
         frequency: Cut-off frequency, 0.1 to 1000 Hz.
@@ -30,11 +30,11 @@ def low_pass_gain(frequency: float) -> float:
 
 
 class LowPass:
-    """A low pass on several numbers. Owned by the virtual arm.
+    """A low-pass filter of several numbers. Owned by the virtual arm.
 
     Args:
         frequency: Cut-off frequency, [Hz].
-        start: The numbers that it starts from.
+        start: Initial values.
     """
 
     def __init__(self, frequency: float, start: Sequence[float]) -> None:
@@ -42,7 +42,7 @@ class LowPass:
         self._values = list(start)
 
     def step(self, values: Sequence[float]) -> list[float]:
-        """Takes the numbers of this cycle and returns the filtered ones."""
+        """Returns the filtered values of this cycle."""
         gain = self._gain
         if gain == 1.0:
             return list(values)
@@ -51,14 +51,14 @@ class LowPass:
 
 
 class PoseLowPass:
-    """A low pass on a pose and an arm angle: the position on the line, the orientation by slerp, psi the short way.
+    """A low-pass filter of a pose and an arm angle: linear position, slerp, and the shorter direction of psi.
 
     Owned by the virtual arm.
 
     Args:
         frequency: Cut-off frequency, [Hz].
-        pose: The pose that it starts from.
-        psi: The arm angle that it starts from, [rad].
+        pose: Initial pose.
+        psi: Initial arm angle, [rad].
     """
 
     def __init__(self, frequency: float, pose: Pose, psi: float) -> None:
@@ -67,7 +67,7 @@ class PoseLowPass:
         self._psi = psi
 
     def step(self, pose: Pose, psi: float) -> tuple[Pose, float]:
-        """Takes pose and arm angle of this cycle and returns the filtered ones."""
+        """Returns the filtered pose and arm angle of this cycle."""
         gain = self._gain
         if gain == 1.0:
             return pose, psi

@@ -1,11 +1,11 @@
 """External forces on the arm, estimated from its own sensors and model: the generalised-momentum observer.
 
 The residual r of De Luca and Mattone (2003), dr/dt = K (tau_ext - r), needs no acceleration sensor. In discrete time
-it is a first-order low pass on what Newton and Euler cannot explain: M (dq - dq_before)/h + C dq + g - tau.
+it is a first-order low-pass filter of the unmodelled torque: M (dq - dq_before)/h + C dq + g - tau.
 
-Signs: tau_ext and the wrench are those that the surroundings exert on the arm. A hand that presses the tool down gives
-a negative z force. The wrench is the one at the tool that explains tau_ext best; when something presses on another
-link, tau_ext is right and the wrench is not.
+Signs: tau_ext and the wrench are exerted by the environment on the arm. A hand that presses the tool down gives a
+negative z force. The wrench is the one at the tool that explains tau_ext best; if the force acts on another link,
+tau_ext is correct and the wrench is not.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from rcilab.sim.plant import Measurement
 
 BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms
 _CYCLE = scalar(CYCLE_TIME)  # [s]
-_SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of what is new, in one cycle
+_SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of the difference, in one cycle
 _GAIN = scalar(_SHARE)
-_NOTHING = 1e-6  # [N m] A residual this small is rounding: it is called zero.
+_NOTHING = 1e-6  # [N m] A smaller residual is rounding and set to zero.
 _DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
 
 
 class MomentumObserver:
-    """Estimates outside torques cycle by cycle. Owned by the virtual arm.
+    """Estimates external torques cycle by cycle. Owned by the virtual arm.
 
     Args:
-        model: The arm as the controller knows it: a load that was not set shows as an outside torque.
+        model: The controller's model of the arm: a load that was not set appears as an external torque.
     """
 
     def __init__(self, model: RobotModel) -> None:
@@ -42,16 +42,16 @@ class MomentumObserver:
         self._raw = self._zeros
 
     def reset(self, measured: Measurement) -> None:
-        """Forgets the past; only when the arm was put somewhere at rest."""
+        """Resets the estimate for a stationary arm."""
         self._last, self._is_static = measured, True
         self._raw = self._unexplained(measured, self._zeros)
         self._answer = self._answered(self._raw, measured)
 
     def step(self, measured: Measurement) -> tuple[JointVector, Array]:
-        """Returns outside joint torques, shape (n,), [N m], and the wrench on the tool, base axes, shape (6,).
+        """Returns external joint torques, shape (n,), [N m], and the wrench on the tool, base axes, shape (6,).
 
-        The wrench is taken at the tool's origin, force first, [N, N m]. Both arrays are read-only; while nothing
-        changes they are the same ones again.
+        The wrench refers to the tool's origin, force first, [N, N m]. Both arrays are read-only; they are the same
+        objects as long as nothing changes.
         """
         last = self._last
         if last is None:

@@ -1,6 +1,6 @@
-"""Which user is at the other end of a connection inside this machine, from the kernel's socket diagnosis.
+"""The user at the other end of a connection inside this machine, from the kernel's socket diagnosis.
 
-sock_diag(7), struct inet_diag_req_v2 and struct inet_diag_msg; one question takes some 30 us.
+sock_diag(7), struct inet_diag_req_v2 and struct inet_diag_msg; one query takes about 30 us.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _ANY_STATE = 0xFFFFFFFF
 
 
 def is_ours(connection: socket.socket) -> bool:
-    """Returns whether the user of this process is at the other end of a TCP connection, or root, or who called sudo.
+    """Returns whether the peer of a TCP connection runs as this process's user, as root, or as the caller of sudo.
 
-    A peer that has gone already has no user: the kernel calls the user of a closed socket 0, which is root. Where the
-    kernel does not answer such questions at all, every user of this machine is accepted.
+    A closed peer is refused: the kernel reports user 0, root, for a closed socket. If the kernel does not support the
+    query, every user of this machine is accepted.
     """
     try:
         (host, port), (own_host, own_port) = connection.getpeername(), connection.getsockname()
@@ -34,7 +34,7 @@ def is_ours(connection: socket.socket) -> bool:
     asked = _ASKED.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, _ANY_STATE) + ends + _NO_COOKIE
     try:
         with socket.socket(socket.AF_NETLINK, socket.SOCK_DGRAM, _SOCK_DIAG) as kernel:
-            kernel.setblocking(False)  # It answers at once.
+            kernel.setblocking(False)  # The kernel responds at once.
             kernel.sendto(_HEADER.pack(_HEADER.size + len(asked), _BY_FAMILY, _REQUEST, 1, 0) + asked, (0, 0))
             answer = kernel.recv(4096)
     except OSError:

@@ -1,4 +1,4 @@
-"""The commanded motion of the arm: joint angles, their differences, and the one path on which it stops."""
+"""The commanded motion of the arm: joint angles, their differences, and the single stop path."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class ReferenceTrajectory:
         q: Commanded joint angles, n plain floats, [rad].
         dq: Their first backward difference, [rad/s].
         ddq: Their second, [rad/s^2].
-        is_at_rest: Whether nothing has moved for two cycles, so that both differences are exactly zero.
-        version: Rises with every change.
+        is_stationary: Whether nothing has moved for two cycles, so that both differences are exactly zero.
+        version: Incremented with every change.
 
     Args:
         limits: Bounds of the joints, for stopping.
@@ -48,7 +48,7 @@ class ReferenceTrajectory:
 
     @property
     def arrays(self) -> tuple[JointVector, JointVector, JointVector]:
-        """q, dq and ddq as read-only arrays, made once a cycle shared by all readers."""
+        """q, dq and ddq as read-only arrays, created once per cycle and shared by all readers."""
         if self._arrays is None or self._arrays_version != self.version:
             n = len(self.q)
             rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # numpy looks at each float of a list twice.
@@ -56,53 +56,53 @@ class ReferenceTrajectory:
         return self._arrays
 
     def place(self, q: Sequence[float]) -> None:
-        """Sets the commanded angles, stationary: while the brakes or a hand determine where the arm is."""
+        """Sets the commanded angles of a stationary arm."""
         self.q = list(q)
         self.dq = [0.0] * len(self.q)
         self.ddq = [0.0] * len(self.q)
-        self.is_at_rest = True
+        self.is_stationary = True
         self._stop: Iterator[list[float]] | None = None
         self.version += 1
 
     def move(self, q: list[float], differences: tuple[list[float], list[float]] | None = None) -> None:
-        """Takes the commanded angles of this cycle.
+        """Advances to the commanded angles of this cycle.
 
         Args:
             q: n plain floats, [rad].
-            differences: Their first and second backward difference, [rad/s], [rad/s^2], if they are known already.
+            differences: Their first and second backward differences, [rad/s], [rad/s^2], if already known.
         """
         self._stop = None
         self._advance(q, differences)
 
     def stop(self) -> None:
-        """Takes one cycle of the fastest stop inside the limits; planned at the first call, repeated calls play it.
+        """Advances by one cycle of the fastest stop inside the limits, which the first call plans.
 
-        When standing still at once is itself inside the limits, as at the end of any decent motion, it stands still.
+        If an immediate standstill is inside the limits, as at the end of a smooth motion, the arm stops at once.
         """
         if self._stop is None:
             self._stop = self._plan()
         self._advance(next(self._stop, self.q))
 
     def join(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> None:
-        """Puts the commanded angles on an arm that moves by itself, and moves along with it: before it stops.
+        """Sets the reference to the measured motion of a compliant arm, before a stop.
 
         Args:
             q: Measured joint angles, n plain floats, [rad].
             dq: Their velocities, [rad/s].
-            ddq: Their accelerations, [rad/s^2]; beyond the largest ones that a stop starts from, those are taken.
+            ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped.
         """
         velocity, acceleration = differences_from_derivatives(
             np.clip(dq, -self._fastest, self._fastest), np.clip(ddq, -self._hardest, self._hardest)
         )
         self.q, self.dq, self.ddq = list(q), velocity.tolist(), acceleration.tolist()
-        self.is_at_rest = not any(self.dq) and not any(self.ddq)
+        self.is_stationary = not any(self.dq) and not any(self.ddq)
         self._stop = None
         self.version += 1
 
     def _advance(self, q: list[float], differences: tuple[list[float], list[float]] | None = None) -> None:
         dq, ddq = differences or self._differences(q)
         self.q, self.dq, self.ddq = q, dq, ddq
-        self.is_at_rest = not any(dq) and not any(ddq)
+        self.is_stationary = not any(dq) and not any(ddq)
         self.version += 1
 
     def _differences(self, q: list[float]) -> tuple[list[float], list[float]]:
@@ -111,12 +111,12 @@ class ReferenceTrajectory:
         return dq, [change / h for change in map(sub, dq, self.dq)]
 
     def _plan(self) -> Iterator[list[float]]:
-        if self._may_stand_still():
+        if self._can_stop_at_once():
             return iter(())
         dq, ddq = derivatives_from_differences(self.dq, self.ddq)
         return iter(plan_stop(self._limits, self.q, dq, ddq).q[1:].tolist())
 
-    def _may_stand_still(self) -> bool:
+    def _can_stop_at_once(self) -> bool:
         h = CYCLE_TIME
         bounds = zip(self.dq, self.ddq, self._acceleration, self._jerk, strict=True)
         return all(

@@ -56,7 +56,7 @@ class ToolKinematics:
         return self.matrix[:3, 3].tolist()
 
     @property
-    def is_at_rest(self) -> bool:
+    def is_stationary(self) -> bool:
         """Whether nothing would change if the joints stayed where they are."""
         return not (any(self.twist) or any(self.acceleration) or self.dpsi or self.ddpsi)
 

@@ -131,12 +131,12 @@ class VirtualArm:
     @property
     def is_standstill(self) -> bool:
         """Whether its reference is stationary and its joints have stopped."""
-        return self.commanded.is_at_rest and (self._cycles_at_rest > SETTLE_LIMIT or self._is_slow())
+        return self.commanded.is_stationary and (self._cycles_at_rest > SETTLE_LIMIT or self._is_slow())
 
     @property
     def can_engage_brakes(self) -> bool:
         """Whether it stands still at its reference: servos settle, and a compliant arm may always move."""
-        may_rest = self.commanded.is_at_rest and not self._law.is_compliant
+        may_rest = self.commanded.is_stationary and not self._law.is_compliant
         return may_rest and (
             self._cycles_at_rest > SETTLE_LIMIT or self.measured_state.measured.q.tolist() == self.commanded.q
         )
@@ -299,7 +299,7 @@ class VirtualArm:
             commanded.join(last.q.tolist(), last.dq.tolist(), ddq)
         if has_moved and not law.is_compliant:
             self._last_compliance = None
-        if not (law.is_force_driven or commanded.is_at_rest or has_moved):
+        if not (law.is_force_driven or commanded.is_stationary or has_moved):
             commanded.stop()
         if not law.is_force_driven:
             self._move_tool()
@@ -318,7 +318,7 @@ class VirtualArm:
         self._law, self._dq_before = law, last.dq
         if law.is_compliant:
             self._last_compliance = law
-        self._cycles_at_rest = self._cycles_at_rest + 1 if commanded.is_at_rest else 0
+        self._cycles_at_rest = self._cycles_at_rest + 1 if commanded.is_stationary else 0
         self.measured_state.observe(measured, commanded, self.tool_c)
 
     def _is_slow(self) -> bool:
@@ -327,7 +327,7 @@ class VirtualArm:
 
     def _move_tool(self) -> None:
         commanded, tool = self.commanded, self.tool_c
-        if commanded.version != self._tool_version or not tool.is_at_rest:
+        if commanded.version != self._tool_version or not tool.is_stationary:
             q, dq, _ = commanded.arrays
             tool.update(commanded.q, self.model.rigid_body.tool_motion(q, dq))
             self._tool_version = commanded.version

@@ -29,9 +29,9 @@ def test_from_any_state_inside_the_limits_it_comes_to_rest_inside_acceleration_a
     for _ in range(3000):
         commanded.stop()
         rows.append(np.array(commanded.q))
-        if commanded.is_at_rest:
+        if commanded.is_stationary:
             break
-    assert commanded.is_at_rest
+    assert commanded.is_stationary
     ddq = np.diff(rows, 2, axis=0) * 1e6
     jerk = np.diff(rows, 3, axis=0) * 1e9
     assert (np.abs(ddq) < LIMITS.acceleration).all()
@@ -45,14 +45,14 @@ def test_the_end_of_a_decent_motion_is_rest_on_the_spot() -> None:
     for _ in range(3):
         commanded.stop()
         assert commanded.q == goal
-    assert commanded.is_at_rest
+    assert commanded.is_stationary
 
 
 def test_resting_it_stays_at_rest() -> None:
     commanded = ReferenceTrajectory(LIMITS, [0.5] * 7)
     for _ in range(3):
         commanded.stop()
-    assert commanded.is_at_rest
+    assert commanded.is_stationary
     assert commanded.q == [0.5] * 7
 
 
@@ -62,7 +62,7 @@ def test_joined_to_a_moving_arm_it_comes_to_rest_inside_acceleration_and_jerk(ve
     commanded = ReferenceTrajectory(LIMITS, [1.0] * 7)
     commanded.join(q.tolist(), dq.tolist(), ddq.tolist())
     rows = [q - 1e-3 * dq + 0.5e-6 * ddq, q]
-    while not commanded.is_at_rest:
+    while not commanded.is_stationary:
         commanded.stop()
         rows.append(np.array(commanded.q))
         assert len(rows) < 3000
@@ -75,4 +75,4 @@ def test_an_arm_that_was_thrown_beyond_reason_still_gets_a_stop() -> None:
     commanded.join([0.0] * 7, [500.0] * 7, [1e5] * 7)
     for _ in range(3000):
         commanded.stop()
-    assert commanded.is_at_rest
+    assert commanded.is_stationary

@@ -1,4 +1,4 @@
-"""Motion generators: one for each motion, from a client's commands to a reference that the arm can follow."""
+"""Motion generators: they convert a client's commands to a reference that the arm can follow."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def build_generator(mode: Mode, bounds: MotionLimits, q: list[float]) -> MotionG
     """Returns the generator of a motion that begins now.
 
     Args:
-        mode: What is commanded, under which control law.
+        mode: Type of command and control law.
         bounds: Filters and limits of the motion.
         q: Reference of the stationary arm, n plain floats, [rad].
     """

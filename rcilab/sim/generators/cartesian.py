@@ -1,11 +1,11 @@
 """Tool poses commanded one by one: Cartesian position and Cartesian impedance.
 
-A commanded pose passes the pose filter and the conditions on the tool, then the inverse kinematics on the branch that
-the arm is on, then the soft-limit governor if it is enabled, and then the conditions on joint angles too.
+A commanded pose passes the pose filter and the conditions of the tool, then the inverse kinematics on the present
+branch, then the soft-limit governor if enabled, and finally the conditions of the joint angles.
 
-The arm angle of a 7-axis arm is the commanded one when it is valid. Otherwise it stays what it was: as it was at the
-start of the motion, or as commanded last. The vendor's client cannot command an arm angle of exactly zero (it goes out
-as "not valid"); so on its way through zero an arm angle that is not valid is zero.
+The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is held: from the start of the motion,
+or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
+valid"); therefore an arm angle that is not valid counts as zero while the arm angle passes zero.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class CartesianGenerator:
 
     Args:
         bounds: Filters and limits of the motion.
-        q: Where the arm stands, n plain floats, [rad]; not at a singularity.
+        q: Joint angles of the stationary arm, n plain floats, [rad]; not at a singularity.
     """
 
     def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
@@ -71,11 +71,11 @@ class CartesianGenerator:
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
         if find_frame_error(command.T_base_tool) is not None:
-            return True  # It is refused when it is played.
+            return True  # `step` refuses it.
         return self._stream.is_next(self._read(command), steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
-        """Takes this cycle's pose, or bridges a cycle that has none."""
+        """Processes the pose of this cycle, or bridges a cycle without one."""
         command, is_lost = playback.command, playback.is_lost
         cycles = self._gap.step(playback)
         if command is None:
@@ -99,7 +99,7 @@ class CartesianGenerator:
         try:
             pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
             pose, psi = self._filter.step(pose, self._psi)
-        except InvalidValueError as error:  # Numbers so absurd that bridge or filter made no pose of them.
+        except InvalidValueError as error:  # Extreme numbers, from which bridge or filter gave no pose.
             return _invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
         return self._check(pose, psi, cycles)
 
@@ -117,20 +117,20 @@ class CartesianGenerator:
             return _invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
         if not self._reference_has_begun:
             self._reference_has_begun = True
-            self._reference.begin(q, None)  # Of the tool's, the tolerance has been looked at.
+            self._reference.begin(q, None)  # The tolerance of the tool was already checked.
         step = self._reference.step(q, cycles)
         if step.q is not None:
             self._q = q
         return step
 
     def _begin(self, values: list[float]) -> None:
-        """Takes the first command: where the motion begins at rest, or its first step from the reference."""
+        """Processes the first command: the start of the motion at standstill, or its first step from the reference."""
         self._has_begun = True
         x, y, z, *wxyz, psi = values
         try:
             pose = Pose.from_parts(rotation_from_wxyz(wxyz), (x, y, z))
         except InvalidValueError:
-            return  # It is refused like any other command that is no pose.
+            return  # `step` refuses it.
         rotation, position = self._pose.parts
         translation = dist(position, (x, y, z))
         turn = hypot(*rotation_between(rotation, pose.parts[0]))
@@ -166,7 +166,7 @@ class CartesianGenerator:
         return violations
 
     def _read(self, command: ArmCommand) -> list[float]:
-        """Returns position, quaternion and arm angle of a command, with sign and turn that continue the last one."""
+        """Returns position, quaternion and arm angle of a command, continuous with the last ones."""
         m = command.T_base_tool
         w, x, y, z = wxyz_from_rotation((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]))
         _, _, _, last_w, last_x, last_y, last_z, last_psi = self._stream.last
@@ -180,7 +180,7 @@ class CartesianGenerator:
             return 0.0
         if command.has_psi:
             return command.psi
-        # The vendor's client marks an arm angle of exactly zero as none: it is meant where one was commanded before.
+        # The vendor's client marks an arm angle of exactly zero as not valid.
         passes_zero = self._had_psi and command.psi == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
 

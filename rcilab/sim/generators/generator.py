@@ -1,4 +1,4 @@
-"""What a motion generator is: one for each motion, from the client's commands to a reference the arm can follow."""
+"""The protocol of motion generators, and the last stage of every motion of joint angles."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from rcilab.sim.reference_trajectory import JOIN_SHARE
 from rcilab.sim.soft_limit_governor import SoftLimitGovernor
 from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
-_REACH = 2  # [cycles] that a second difference reaches back, after a gap
+_REACH = 2  # [cycles] that a second difference includes after a gap
 
 
 class GeneratorOutput(NamedTuple):
     """The reference of one cycle."""
 
     q: list[float] | None = None
-    """Joint angles to be at, [rad]; None where torques are commanded."""
+    """Joint angles of the reference, [rad]; None if torques are commanded."""
     tau: list[float] | None = None
-    """Joint torques, [N m]; None where angles are commanded."""
+    """Joint torques, [N m]; None if angles are commanded."""
     violations: Violations = ()
-    """What the command violates; then nothing of this output is given to the arm."""
+    """Violations of the command; the arm must not follow an output with violations."""
     differences: tuple[list[float], list[float]] | None = None
-    """First and second backward difference of `q` over one cycle, [rad/s], [rad/s^2], where they are known already."""
+    """First and second backward differences of `q`, [rad/s], [rad/s^2], if already known."""
 
 
 class MotionGenerator(Protocol):
-    """Turns what the jitter buffer gives into a reference, and checks it. Built when a motion begins, at standstill."""
+    """Converts the output of the jitter buffer to a checked reference. Created when a motion begins, at standstill."""
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
         ...
 
     def step(self, playback: Playback) -> GeneratorOutput:
-        """Takes this cycle's command, or bridges a cycle that has none."""
+        """Processes the command of this cycle, or bridges a cycle without one."""
         ...
 
 
 class MissedCycles:
-    """Counts the cycles that commands are apart. Owned by a motion generator."""
+    """Counts the cycles between two commands. Owned by a motion generator."""
 
     def __init__(self) -> None:
         self._missing = 0
 
     def step(self, playback: Playback) -> int:
-        """Returns how many cycles after the last command this one is due; 0 in a cycle that has none."""
+        """Returns the number of cycles since the last command; 0 in a cycle without a command."""
         if playback.is_lost:
             self._missing += 1
             return 0
@@ -63,21 +63,21 @@ class MissedCycles:
 
 
 def lost_motion(reason: Remark) -> GeneratorOutput:
-    """Returns the output of a motion that cannot go on without the commands that were lost."""
+    """Returns the output of a motion that cannot continue without the lost commands."""
     remark = Remark(f"lost commands broke the motion: {reason}", "lost_motion", reason=reason)
     return GeneratorOutput(violations=(ArmViolation(ArmCondition.COMMANDS_ARRIVE, remark),))
 
 
 def with_jump(jump: Remark | None, violations: Sequence[LimitViolation]) -> Violations:
-    """Returns violations behind the jump at the start that explains them, if there was one."""
+    """Returns violations, preceded by a jump at the start that explains them, if there was one."""
     return (ArmViolation(ArmCondition.START_TOLERANCE, jump), *violations) if jump else tuple(violations)
 
 
 class JointReference:
     """The last stage of every motion of joint angles: the soft-limit governor, if enabled, then the joint conditions.
 
-    The conditions apply to the client's commands. What is played in place of a lost one is checked for two things only:
-    it may not need more than `JOIN_SHARE` times the acceleration limit, nor leave the joint's range.
+    The conditions apply to the client's commands. The replacement of a lost command is checked only for an acceleration
+    above `JOIN_SHARE` times the limit and for the range of the joint.
 
     Args:
         bounds: Filters and limits of the motion.
@@ -98,16 +98,16 @@ class JointReference:
         self._range = list(zip(joint.lower.tolist(), joint.upper.tolist(), strict=True))
         self._hardest: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
         self._last = self._before = q
-        self._cycles_to_watch = 0
+        self._cycles_to_check = 0
 
     def begin(self, q: list[float], tolerance: StartTolerance | None) -> bool:
-        """Takes the first commanded angles, before `step` does; returns whether the motion begins there, at rest.
+        """Processes the first commanded angles, before `step`; returns whether the motion starts there, at standstill.
 
-        Otherwise they are the first step of a motion from the reference: near it, or too far off to begin there.
+        Otherwise they are the first step of a motion from the reference, near it or too far from it.
 
         Args:
             q: n plain floats, [rad].
-            tolerance: How far they may be off the reference; None where that has been looked at already.
+            tolerance: Largest difference from the reference; None if it was already checked.
         """
         h3 = CYCLE_TIME**3
         offset = [here - angle for here, angle in zip(self._last, q, strict=True)]
@@ -126,11 +126,11 @@ class JointReference:
         return True
 
     def step(self, q: list[float], cycles: int) -> GeneratorOutput:
-        """Takes the joint angles of this cycle.
+        """Processes the joint angles of this cycle.
 
         Args:
             q: Finite numbers, [rad].
-            cycles: How many cycles the last command was before; 0 when these are no command but stand in for one.
+            cycles: Cycles since the last command; 0 if these angles replace a lost command.
         """
         if self._governor is not None:
             q = self._governor.step(q)
@@ -138,8 +138,8 @@ class JointReference:
         if self._offset is not None:
             reference = self._offset.step(q)
             if self._offset.is_absorbed:
-                self._offset, self._cycles_to_watch = None, 0
-        jolt = None if cycles == 1 and self._cycles_to_watch == 0 else self._find_jolt(reference, cycles)
+                self._offset, self._cycles_to_check = None, 0
+        jolt = None if cycles == 1 and self._cycles_to_check == 0 else self._find_jolt(reference, cycles)
         self._last, self._before = reference, self._last
         if jolt is not None:
             return lost_motion(jolt)
@@ -154,8 +154,8 @@ class JointReference:
         return monitor
 
     def _find_jolt(self, q: list[float], cycles: int) -> Remark | None:
-        """Returns which joint would be accelerated too hard or leave its range; as long as differences span a gap."""
-        self._cycles_to_watch = self._cycles_to_watch - 1 if cycles == 1 else _REACH
+        """Returns which joint would be accelerated too much or leave its range while differences span a gap."""
+        self._cycles_to_check = self._cycles_to_check - 1 if cycles == 1 else _REACH
         h2 = CYCLE_TIME * CYCLE_TIME
         columns = zip(q, self._last, self._before, self._hardest, self._range, strict=True)
         for number, (x, y, z, hardest, (lower, upper)) in enumerate(columns, 1):

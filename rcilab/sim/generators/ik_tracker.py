@@ -1,4 +1,4 @@
-"""From the commanded pose to joint angles: the branch the arm is on, followed without jumps."""
+"""Inverse kinematics of commanded poses on the present branch, without jumps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.model.robot_model import RobotModel
 class IkTracker:
     """The inverse of one arm with its tool, for poses that follow each other. Owned by a motion generator.
 
-    It stays on the branch that is nearest to the last angles, whatever the joint limits are: those are checked later.
+    It stays on the branch nearest to the last angles. Joint limits are checked later.
 
     Args:
         model: The arm with its tool.
@@ -32,13 +32,13 @@ class IkTracker:
             near: Last joint angles, n plain floats, [rad].
 
         Raises:
-            UnreachableError: The pose is out of reach, whatever the joint limits are.
-            SingularError: The arm is at a singularity there; the message says at which.
+            UnreachableError: The pose is out of reach, even without joint limits.
+            SingularError: The arm would be at a singularity; the message names it.
         """
         flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
         q = self._solver.solve_near(flange, psi, near)
         if q is None:
-            self._solver.at(flange, near).branches(psi)  # Raises the error that says by how much.
+            self._solver.at(flange, near).branches(psi)  # Raises an error with the distance.
             raise UnreachableError("no joint angles near the last ones put the tool there")
         singularity = self._solver.singularity(q)
         if singularity is not None:

@@ -1,8 +1,8 @@
 """Joint angles commanded one by one: joint position and joint impedance.
 
-The commanded angles pass the joint filter, then the soft-limit governor if it is enabled, and then the conditions on
-joint angles. A lost cycle goes on with the acceleration of the last commands; when a later command is known already, on
-the cubic that leads there. The conditions apply to the commands that came, over the cycles between.
+The commanded angles pass the joint filter, then the soft-limit governor if enabled, and then the conditions of joint
+angles. A lost cycle continues with the acceleration of the last commands, or, if a later command is already known, on
+the cubic to it. The conditions apply to the received commands, over the cycles between them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class JointGenerator:
 
     Args:
         bounds: Filters and limits of the motion.
-        q: Where the arm stands, n plain floats, [rad].
+        q: Joint angles of the stationary arm, n plain floats, [rad].
     """
 
     def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
@@ -41,7 +41,7 @@ class JointGenerator:
         return self._stream.is_next(command.q[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
-        """Takes this cycle's angles, or bridges a cycle that has none."""
+        """Processes the angles of this cycle, or bridges a cycle without any."""
         command = playback.command
         cycles = self._gap.step(playback)
         if command is None:
@@ -50,7 +50,7 @@ class JointGenerator:
             q = list(command.q[: self._n])
             if playback.is_lost:
                 q = self._stream.predict(1, q, playback.steps)
-        if not isfinite(sum(q)):  # Not a number is in no range; the derivatives say nothing then.
+        if not isfinite(sum(q)):  # A NaN would pass every comparison.
             reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
             return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
         if not self._has_begun:
@@ -59,7 +59,7 @@ class JointGenerator:
         return self._reference.step(self._filter.step(q), cycles)
 
     def _begin(self, q: list[float]) -> None:
-        """Takes the first command, which filter and prediction start from when the motion begins there."""
+        """Processes the first command; filter and prediction start there if the motion does."""
         self._has_begun = True
         if self._reference.begin(q, self._bounds.tolerance):
             self._stream = CommandExtrapolator(q)

@@ -19,16 +19,16 @@ _SPRINGS = (ControlLaw.JOINT_IMPEDANCE, ControlLaw.CARTESIAN_IMPEDANCE)
 
 
 class Mode(NamedTuple):
-    """What a client commands, and what the drives make of it."""
+    """Type of command and control law of a motion."""
 
     law: ControlLaw
     is_cartesian: bool
-    """Whether tool poses are commanded: the tool's motion is checked and a singular start is refused."""
+    """Whether tool poses are commanded: the motion of the tool is checked, and a singular start is refused."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MotionLimits:
-    """What a motion is filtered with and checked against."""
+    """Filters and bounds of a motion."""
 
     model: RobotModel
     """The arm with its tool and load."""
@@ -36,14 +36,14 @@ class MotionLimits:
     limits: Limits
     """With the soft limits as position bounds."""
     box: SafetyBox | None
-    """Where the tool must stay; None when nothing bounds it."""
+    """Safety box of the tool; None without one."""
     tolerance: StartTolerance
-    """How far the first command may be off the reference."""
+    """Largest difference of the first command from the reference."""
     starts: tuple[Pose, ...]
     """Poses of the tool in base where the motion begins: measured and commanded."""
 
     def entry_box(self) -> SafetyBox | EntryBox | None:
-        """Returns what bounds the tool; where it starts outside the box, it may only move in."""
+        """Returns the bounds of the tool; if it starts outside the box, it may only move inwards."""
         return box_for_start(self.box, *(pose.parts[1] for pose in self.starts))
 
 
@@ -58,18 +58,18 @@ def build_motion_limits(
 ) -> MotionLimits:
     """Returns filters and bounds of a motion.
 
-    A stop ends beyond a soft limit or outside the safety box when that is what it was for. A motion that begins there
-    may lead back, and not farther out: the bound of a joint is its present angle, that of the tool moves in with it
-    (see `EntryBox`). Where walls push the tool back into its box, the box is not checked.
+    After a violation of a soft limit or of the safety box, the arm stops outside. A motion that begins there may only
+    lead back: the bound of a joint is its present angle, that of the tool follows it inwards (see `EntryBox`). With
+    walls that push the tool back into its box, the box is not checked.
 
     Args:
-        mode: What the motion is.
+        mode: Type of command and control law.
         model: The arm with its tool and load.
-        parameters: What the client has configured.
-        limits: Of the arm, as they apply to this motion; infinite where the maker checks nothing.
-        starts: Measured and commanded joint angles at the start: the farther one opens a range.
+        parameters: The configuration from the client.
+        limits: Limits of the arm for this motion; infinite where the maker has no check.
+        starts: Measured and commanded joint angles at the start: the farther one extends a range.
         tools: Measured and commanded pose of the tool in base.
-        tolerance: How far the first command may be off the reference.
+        tolerance: Largest difference of the first command from the reference.
     """
     joint = parameters.soft_limits(limits.joint)
     for q in starts:

@@ -1,12 +1,12 @@
-"""How far from the controller's reference a motion may begin, and how that offset is absorbed.
+"""Tolerance of a motion's start relative to the controller's reference, and absorption of the offset.
 
-The manual's 4.2 recommends that a motion begins at T = T_c; it does not require it. A client begins at what the state
-shows, measured or commanded, or at its own last command. For an arm on its servos these agree up to rounding and the
-servo's error. After a motion in which the arm yields they differ by as much as a few newtons bend its springs.
+Section 4.2 of the manual recommends that a motion begins at T = T_c; it does not require it. A client begins at the
+measured or the commanded state, or at its own last command. For a position-controlled arm these agree up to rounding
+and the servo error. After a motion of a compliant arm they differ by the deflection of its springs under a few newtons.
 
-An offset inside the tolerance is no motion of the client's: it is not differentiated. The reference begins where the
-arm is and approaches the client's commands on a quintic that uses `SHARE` of the joints' limits. Beyond the tolerance
-the first command is a jump, with the fault that the manual has for it.
+An offset inside the tolerance is not differentiated. The reference begins at the arm and approaches the client's
+commands on a quintic that uses `SHARE` of the joints' limits. Beyond the tolerance the first command is a jump, which
+raises the fault of the manual.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from rcilab.sim.arm_parameters import ArmParameters
 
 SERVO_ERROR = 1e-3  # [rad] Static error of a joint on its servo, and rounding; the MuJoCo plant's stays below 0.2 mrad.
 SERVO_LENGTH = 1e-3  # [m] The same at the tool, at a lever of 1 m.
-FORCE = 5.0  # [N] At the tool; with it, what friction and an imperfect load model leave in a yielding arm.
+FORCE = 5.0  # [N] At the tool: the effect of friction and an imperfect load model on a compliant arm.
 LEVER = 0.5  # [m] From a joint to the tool, about half of the arms' reach: FORCE becomes a torque of 2.5 N m.
-TURNING_LEVER = 0.1  # [m] From the tool's axes to where FORCE acts: 0.5 N m that turn the tool.
+TURNING_LEVER = 0.1  # [m] From the tool's axes to the point of FORCE: a torque of 0.5 N m.
 WIDEST_ANGLE = (
     0.05  # [rad] However soft the spring: an arm that is farther off has been moved, and is not where it was.
 )
 WIDEST_LENGTH = 0.02  # [m] The same for the tool.
-SHARE = 0.1  # Of the joints' acceleration and jerk limits, for absorbing an offset: what remains is for the motion.
+SHARE = 0.1  # Of the joints' acceleration and jerk limits, for absorbing an offset; the rest is for the motion.
 
 
 @dataclass(frozen=True, slots=True)
 class StartTolerance:
-    """How far the first command of a motion may be off the controller's reference."""
+    """Largest difference of a motion's first command from the controller's reference."""
 
     joint: tuple[float, ...]
     """Of each joint, n numbers, [rad]."""
@@ -49,7 +49,7 @@ class StartTolerance:
     """Of the arm angle, [rad]: shoulder and wrist both contribute."""
 
     def widened(self, other: StartTolerance) -> StartTolerance:
-        """Returns the larger of two tolerances, each number for itself."""
+        """Returns the element-wise maximum of two tolerances."""
         return StartTolerance(
             tuple(map(max, self.joint, other.joint)),
             max(self.translation, other.translation),
@@ -59,7 +59,7 @@ class StartTolerance:
 
 
 def start_tolerance(law: ControlLaw, parameters: ArmParameters) -> StartTolerance:
-    """Returns what a control law makes of an arm's position: what a motion in it, or right after it, may be off.
+    """Returns the tolerance for a motion under a control law, or directly after one.
 
     Args:
         law: Of the motion.
@@ -85,12 +85,12 @@ def _deflection(load: float, stiffness: float, least: float, most: float) -> flo
 
 
 def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: StartTolerance) -> Remark | None:
-    """Returns which joint a motion would begin too far off at, in words and numbers, or None.
+    """Returns the first joint whose start is outside the tolerance, as a remark, or None.
 
     Args:
         q: First commanded angles, n numbers, [rad].
-        reference: The controller's, [rad].
-        tolerance: How far they may be apart.
+        reference: The controller's reference, [rad].
+        tolerance: Largest difference.
     """
     for number, (angle, here, bound) in enumerate(zip(q, reference, tolerance.joint, strict=True), 1):
         if not abs(angle - here) <= bound:
@@ -99,13 +99,13 @@ def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: S
 
 
 def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolerance: StartTolerance) -> Remark | None:
-    """Returns what of the tool a motion would begin too far off at, in words and numbers, or None.
+    """Returns the first quantity of the tool whose start is outside the tolerance, as a remark, or None.
 
     Args:
         translation: From the controller's reference to the first commanded position, [m].
         rotation: To the first commanded orientation, [rad].
         arm_angle: To the first commanded arm angle, [rad].
-        tolerance: How far they may be apart.
+        tolerance: Largest difference.
     """
     if not translation <= tolerance.translation:
         return _tool_jump("start_position", "position", translation, tolerance.translation)
@@ -140,7 +140,7 @@ class Stepping(Protocol):
 
     @property
     def step(self) -> Callable[..., Sequence[LimitViolation]]:
-        """Takes the commands of this cycle and returns what they violate."""
+        """Returns the violations of this cycle's commands."""
         ...
 
 
@@ -149,17 +149,17 @@ _AMBIGUOUS = 4  # Commands after which a third difference no longer reaches the 
 
 
 class StartMonitor(Generic[_M]):
-    """Evaluates commands, the first few of which may be read in two ways; what violates a condition in both counts.
+    """Checks commands with an ambiguous start; a violation counts if both interpretations have one.
 
-    A first command that is off the reference by no more than one cycle's jerk is the first step of a motion from there,
-    or the place where another motion begins. Owned by a motion generator.
+    A first command within one cycle's jerk of the reference is either the first step of a motion from the reference or
+    the start of a motion at this command. Owned by a motion generator.
 
     Attributes:
-        monitor: The reading that holds.
+        monitor: The valid interpretation.
 
     Args:
-        monitor: Of commands that continue from the reference.
-        alternative: Of commands that begin at the first one.
+        monitor: Monitor of commands that continue from the reference.
+        alternative: Monitor of commands that begin at the first one.
     """
 
     def __init__(self, monitor: _M, alternative: _M) -> None:
@@ -169,11 +169,11 @@ class StartMonitor(Generic[_M]):
 
     @property
     def is_decided(self) -> bool:
-        """Whether only one reading is left: `monitor` alone goes on."""
+        """Whether only one interpretation is left: `monitor`."""
         return self._alternative is None
 
     def step(self, *signals: Any) -> Sequence[LimitViolation]:
-        """Takes the commands of this cycle and returns what they violate."""
+        """Returns the violations of this cycle's commands."""
         violations = self.monitor.step(*signals)
         if self._alternative is not None:
             other = self._alternative.step(*signals)
@@ -186,7 +186,7 @@ class StartMonitor(Generic[_M]):
 
 
 class StartOffset:
-    """What the reference is off the client's commands, from the start of a motion until it is absorbed.
+    """Offset of the reference from the client's commands, from the start of a motion until it is absorbed.
 
     Owned by a motion generator.
 
@@ -210,7 +210,7 @@ class StartOffset:
 
     @property
     def is_absorbed(self) -> bool:
-        """Whether nothing is left of it."""
+        """Whether the offset is zero."""
         return self._cycle >= self._cycles
 
     def step(self, q: Sequence[float]) -> list[float]:

@@ -1,9 +1,9 @@
 """Joint torques commanded one by one, on top of gravity and friction, which the controller compensates.
 
-The commanded torques pass the torque filter, then the conditions on torques. Nothing is commanded before the first one,
-so it may be one cycle's torque rate away from zero at most. A lost cycle keeps the last torque; when a later command is
-known already, it goes there on a straight line. The conditions apply to the commands that came, over the cycles
-between.
+The commanded torques pass the torque filter, then the conditions of torques. The torque before the first command is
+zero, so the first one may differ from zero by one cycle's torque rate. A lost cycle holds the last torque, or, if a
+later command is already known, interpolates linearly to it. The conditions apply to the received commands, over the
+cycles between them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class TorqueGenerator:
         return self._stream.is_next(command.tau[: self._n], steps, in_doubt)
 
     def step(self, playback: Playback) -> GeneratorOutput:
-        """Takes this cycle's torques, or bridges a cycle that has none."""
+        """Processes the torques of this cycle, or bridges a cycle without any."""
         command, steps, is_lost, _ = playback
         cycles = self._gap.step(playback)
         tau = self._tau

@@ -173,7 +173,7 @@ class RciController:
     @property
     def is_moving(self) -> bool:
         """Whether the arm moves, or listens for commands that would make it."""
-        return self.phase in _MOVING or not self.arm.commanded.is_at_rest
+        return self.phase in _MOVING or not self.arm.commanded.is_stationary
 
     @property
     def wants_commands(self) -> bool:
@@ -329,7 +329,7 @@ class RciController:
             return
         if self.phase is Phase.STARTING:
             self.on_event(Event.MODES_SHOWN)
-        elif self.arm.commanded.is_at_rest:
+        elif self.arm.commanded.is_stationary:
             self.on_event(Event.RECOVERED)
 
     def _raise(self, violations: Violations) -> None:

@@ -122,9 +122,9 @@ class StateReporter:
         self._tau_c = tau_c
         is_new = before is None or measured is not before.measured
         drives = self._drives
-        theta, dtheta, motor_tau, tau_filtered, motor_tau_filtered = drives.step(measured, commanded.is_at_rest)
+        theta, dtheta, motor_tau, tau_filtered, motor_tau_filtered = drives.step(measured, commanded.is_stationary)
         self._is_settled = (
-            commanded.is_at_rest and tool_c.is_at_rest and drives.is_settled and not is_new and not dtau_c.any()
+            commanded.is_stationary and tool_c.is_stationary and drives.is_settled and not is_new and not dtau_c.any()
         )
         tool_rates_c = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
         return (

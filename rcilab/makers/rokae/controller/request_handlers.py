@@ -85,7 +85,7 @@ def check_request(request: rci.Request, phase: Phase, settings: Settings, arm: V
             refusal = None if is_known else rci.SettingStatus.INVALID_ARGUMENT
         case rci.AutomaticErrorRecovery() if phase in (Phase.REFLEX, Phase.CUT_OFF):
             refusal = check_recovery(settings, arm.measured_state)
-        case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_at_rest:
+        case _ if request.code in GROUNDED and Action.APPLY in cell.actions and not arm.commanded.is_stationary:
             refusal = rci.SettingStatus.NOT_POSSIBLE
         case _:
             pass
@@ -97,7 +97,7 @@ def _check_start(request: rci.StartMove, model: RobotModel, commanded: Reference
     if controller_mode >= ControllerMode.OTHER or motion_mode not in tuple(rci.StartMotionMode):
         return rci.StartStatus.INVALID_ARGUMENT
     mode = MODES.get((ControllerMode(controller_mode), rci.StartMotionMode(motion_mode)))
-    if mode is None or not commanded.is_at_rest:
+    if mode is None or not commanded.is_stationary:
         return rci.StartStatus.NOT_POSSIBLE
     if mode.is_cartesian and model.solver.singularity(commanded.q) is not None:
         return rci.StartStatus.SINGULAR_START_POSE
@@ -146,7 +146,7 @@ def describe_refusal(
     why: object = _describe_phase(phase, safety_stop, faults)
     if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
-        why = f"there is no {pair}" if arm.commanded.is_at_rest else _MOVES
+        why = f"there is no {pair}" if arm.commanded.is_stationary else _MOVES
     elif request.code in GROUNDED and Action.APPLY in transition(phase, request.code).actions:
         why = _MOVES
     elif status is rci.StartStatus.SINGULAR_START_POSE:
