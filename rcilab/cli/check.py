@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,7 @@ def run(args: Namespace) -> int:
     from rcilab.motion import Program
 
     out: Path | None = args.slow_down
-    if out is not None and out.exists() and out.samefile(args.file):
+    if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
         raise InvalidValueError("--slow-down", str(out), "is the file to check; choose another one")
     found = read_file(args.file, args.max_rows)
     name = found.model if args.model is None and isinstance(found, Program) else args.model

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.core.atomic_file import read_limited
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 
@@ -41,7 +43,7 @@ def read_file(file: Path, max_rows: int = DEFAULT_MAX_ROWS) -> Motion | Program:
     """
     from rcilab.motion import Motion, Program
 
-    if file.suffix.lower() == ".rcirun" and file.is_file():
+    if file.suffix.lower() == ".rcirun" and os.path.isfile(file):
         raise InvalidValueError("motion file", file.name, f"is a recorded run: open it with `rcilab replay {file}`")
     return Program.load(file) if file.suffix.lower() == ".json" else Motion.load(file, max_rows=max_rows)
 
@@ -85,7 +87,8 @@ def as_motion(
 
 def _line_of(waypoint: int, file: Path) -> int:
     """Returns the line, from 1, of a waypoint in a valid program file."""
-    from rcilab.motion.located_json import read_json
+    from rcilab.motion.located_json import read_json, require_length
 
-    content: Any = read_json(file.read_bytes(), file.name).value
+    text = read_limited(file, "program file", lambda size: require_length(size, file.name))
+    content: Any = read_json(text, file.name).value
     return content["waypoints"].value[waypoint - 1].line

@@ -62,7 +62,7 @@ def _request(name: str, texts: list[str]) -> WorldRequest:
             raise InvalidValueError("field", text, "needs FIELD=VALUE, such as duration=1")
         try:
             content[field] = json.loads(value)
-        except ValueError:
+        except (ValueError, RecursionError):
             content[field] = value
     _, request = decode_world_request(json.dumps(content).encode())
     if isinstance(request, Refused):

@@ -6,13 +6,16 @@ import errno
 import os
 import stat
 import tempfile
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import IO
 
 from rcilab.core.error_base import InvalidValueError
+
+_LARGEST_OWN = 32_000_000
+"""Largest file of our own, [bytes]; tuning value: the longest programs of all arms take 20 million."""
 
 
 @contextmanager
@@ -81,33 +84,47 @@ def read_own_text(file: Path) -> str:
     """Returns the text of a file that this program writes itself, in a folder of the user.
 
     Raises:
-        OSError: It cannot be read, or is not a regular file; reading a named pipe would block forever.
+        OSError: It cannot be read, is not a regular file, or is far larger than this program writes one.
         UnicodeDecodeError: It is not UTF-8 text.
     """
-    with open(os.open(file, os.O_RDONLY | os.O_NONBLOCK), "rb") as stream:
-        if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "not a regular file", str(file))
-        return stream.read().decode()
+    return _read_regular(file, _require_own_size).decode()
 
 
-def read_limited(file: Path, what: str, max_bytes: int) -> bytes:
-    """Returns the content of a file, up to a number of bytes.
+def read_limited(file: Path, what: str, require_size: Callable[[int], None]) -> bytes:
+    """Returns the content of a file.
 
     Args:
         file: The file.
         what: Kind of file, for the error, such as "program file".
-        max_bytes: Largest number of bytes to read.
+        require_size: Called with the file's size, [bytes], before anything is read; raises where it is too large.
 
     Raises:
-        InvalidValueError: The file does not exist or cannot be read.
+        InvalidValueError: The file does not exist, is not a regular file, or cannot be read.
     """
     try:
-        with file.open("rb") as stream:
-            status = os.fstat(stream.fileno())  # Allocate the file's size, not the bound.
-            return stream.read(min(max_bytes, status.st_size + 1) if stat.S_ISREG(status.st_mode) else max_bytes)
+        return _read_regular(file, require_size)
     except FileNotFoundError as error:
         raise InvalidValueError(what, str(file), "does not exist").coded("no_file", file=str(file)) from error
     except OSError as error:
         raise InvalidValueError(what, str(file), f"cannot be read: {error.strerror}").coded(
             "file_unreadable", file=str(file)
         ) from error
+
+
+def _read_regular(file: Path, require_size: Callable[[int], None]) -> bytes:
+    """Returns the content of a regular file; a device has no end, and a named pipe may have no writer."""
+    with open(file, "rb", opener=_open_without_waiting) as stream:
+        status = os.fstat(stream.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "not a regular file", str(file))
+        require_size(status.st_size)
+        return stream.read(status.st_size + 1)
+
+
+def _open_without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def _require_own_size(size: int) -> None:
+    if size > _LARGEST_OWN:
+        raise OSError(errno.EFBIG, f"{size / 1e6:.0f} MB are more than {_LARGEST_OWN / 1e6:.0f}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import sys
 import zlib
 from collections.abc import Callable, Mapping
 from io import BytesIO
@@ -31,6 +32,10 @@ _DAMAGE = (
     *(ValueError, TypeError, SyntaxError, TokenError, LookupError, OverflowError),  # Of an array's header.
 )
 """Exceptions that NumPy and zipfile raise on foreign or damaged bytes."""
+
+_MAX_HEADER = 10_012  # [bytes] Header of an array; NumPy accepts one of 10 000 characters.
+_NUMBER_BYTES = 8  # Size of a double, or of an item of a list, which every element becomes.
+_MAX_MEMBERS = 1000  # Tuning value: a motion has 9 arrays.
 
 
 Shapes: TypeAlias = Mapping[str, tuple[int, ...]]
@@ -74,6 +79,11 @@ def read_arrays(
         raise InvalidValueError(what, name, problem) from error
 
 
+def contains_numbers(array: np.ndarray) -> bool:
+    """Returns whether the elements of an array are real numbers within the range of a double."""
+    return np.can_cast(array.dtype, np.float64)
+
+
 def _read_headers(content: bytes) -> tuple[int, Shapes]:
     """Returns the unpacked size of the arrays, [bytes], and their shapes."""
     if not content.startswith(b"PK"):
@@ -81,7 +91,10 @@ def _read_headers(content: bytes) -> tuple[int, Shapes]:
         return size, {SINGLE_ARRAY: shape}
     total, shapes = 0, dict[str, tuple[int, ...]]()
     with ZipFile(BytesIO(content)) as archive:
-        for member in archive.infolist():
+        members = archive.infolist()
+        if len(members) > _MAX_MEMBERS:
+            raise ValueError(f"{len(members)} arrays are more than {_MAX_MEMBERS}")
+        for member in members:
             with archive.open(member) as stream:
                 size, shape = _read_header(stream)
             total += max(member.file_size, size)
@@ -90,7 +103,8 @@ def _read_headers(content: bytes) -> tuple[int, Shapes]:
 
 
 def _read_header(stream: IO[bytes]) -> tuple[int, tuple[int, ...]]:
-    version = np.lib.format.read_magic(stream)
+    header = BytesIO(stream.read(_MAX_HEADER))  # NumPy would read the length in the header, up to 4 GB.
+    version = np.lib.format.read_magic(header)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
-    return prod(shape) * dtype.itemsize, shape
+    shape, _, dtype = read(header)
+    return min(prod(shape) * max(dtype.itemsize, _NUMBER_BYTES), sys.maxsize), shape

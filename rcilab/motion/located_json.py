@@ -18,6 +18,8 @@ from rcilab.core.errors import InvalidValueError
 
 MAX_BYTES = 8_000_000
 """Largest text, [bytes]; tuning value: a program of 10 000 waypoints has 4 million."""
+MAX_VALUES = 300_000
+"""Largest number of values; tuning value: a program of 10 000 waypoints has 200 000."""
 MAX_DEPTH = 8
 """Largest nesting depth of lists and objects; tuning value: a program needs 4."""
 
@@ -54,6 +56,22 @@ class LongListError(Exception):
         self.count, self.line = count, line
 
 
+def require_length(size: int, name: str) -> None:
+    """Requires a text that is not too long.
+
+    Args:
+        size: Its length, [bytes].
+        name: Name of the text, for errors.
+
+    Raises:
+        InvalidValueError: It is too long.
+    """
+    if size > MAX_BYTES:
+        raise InvalidValueError(name, Unquoted(f"{size / 1e6:.1f} MB"), f"is above {MAX_BYTES / 1e6:g} MB").coded(
+            "file_large", file=name, size=f"{size / 1e6:.1f}", most=f"{MAX_BYTES / 1e6:g}"
+        )
+
+
 def read_json(content: bytes, name: str, max_items: Mapping[str, int] = MappingProxyType({})) -> Node:
     """Returns the content of a JSON text, with lines.
 
@@ -67,10 +85,7 @@ def read_json(content: bytes, name: str, max_items: Mapping[str, int] = MappingP
         LongListError: One of those lists has more values.
         InvalidValueError: The text is not valid JSON, or exceeds a bound; the message names the line.
     """
-    if len(content) > MAX_BYTES:
-        raise InvalidValueError(
-            name, Unquoted(f"{len(content) / 1e6:.1f} MB"), f"is above {MAX_BYTES / 1e6:g} MB"
-        ).coded("file_large", file=name, size=f"{len(content) / 1e6:.1f}", most=f"{MAX_BYTES / 1e6:g}")
+    require_length(len(content), name)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -87,7 +102,7 @@ class _Reader:
 
     def __init__(self, text: str, name: str, max_items: Mapping[str, int]) -> None:
         self._text, self._name, self._max_items = text, name, max_items
-        self._position = 0
+        self._position = self._values = 0
         self._line_breaks = [match.start() for match in re.finditer("\n", text)]
 
     def read(self) -> Node:
@@ -99,6 +114,9 @@ class _Reader:
     def _value(self, depth: int, key: str = "") -> Node:
         character = self._peek()
         line = self._line()
+        self._values += 1
+        if self._values > MAX_VALUES:
+            raise self._error(f"is one value more than {MAX_VALUES}, the most in a file")
         if character and character in "{[":
             if depth == MAX_DEPTH:
                 raise self._error(f"opens more than {MAX_DEPTH} levels; a program needs 4")

@@ -124,7 +124,7 @@ class NamedPoseStore:
             raise self._file_error(f"cannot be read: {reason}").coded("unreadable") from error
         try:
             content: Any = json.loads(text)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise self._file_error(f"is not valid JSON ({error}); correct it or move it away").coded(
                 "poses_no_file"
             ) from error

@@ -14,6 +14,9 @@ from rcilab.core.errors import InvalidValueError
 DERIVATIVES = 4
 """Number of derivatives with the position: position, velocity, acceleration and jerk."""
 
+_MAX_POWERS = 64  # Tuning value: a motion has up to 6.
+_MAX_TIME = 1e12  # [s] The number of rows must be an integer.
+_SHOWN_BREAKS = 10  # In an error.
 _SAME_BREAK = 1e-11  # [s] Closer breaks of two joints are merged; at 1e4 rad/s^3 that is 1e-7 rad/s^2.
 
 
@@ -26,10 +29,9 @@ def require_piece_shapes(breaks: tuple[int, ...], coefficients: tuple[int, ...])
     if len(breaks) != 1 or breaks[0] < 2 or len(coefficients) != 3 or coefficients[0] != breaks[0] - 1:
         shapes = f"breaks of shape {breaks}, coefficients of shape {coefficients}"
         raise InvalidValueError("polynomial pieces", shapes, "must have shapes (S + 1,) and (S, n, k)")
-    if coefficients[1] < 1 or coefficients[2] < 1:
-        raise InvalidValueError(
-            "coefficients", f"array of shape {coefficients}", "must have at least one joint and one power"
-        )
+    if coefficients[1] < 1 or not 1 <= coefficients[2] <= _MAX_POWERS:
+        problem = f"must have at least one joint and one power, and at most {_MAX_POWERS} powers"
+        raise InvalidValueError("coefficients", f"array of shape {coefficients}", problem)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +60,9 @@ class PiecewisePolynomial:
         if not np.isfinite(breaks).all() or not np.isfinite(coefficients).all():
             raise InvalidValueError("polynomial pieces", "breaks, coefficients", "must be finite in every element")
         if breaks[0] != 0.0 or (breaks[1:] < breaks[:-1]).any():
-            raise InvalidValueError("breaks", breaks.tolist(), "must begin at 0 and never decrease [s]")
+            raise InvalidValueError("breaks", breaks[:_SHOWN_BREAKS].tolist(), "must begin at 0 and never decrease [s]")
+        if breaks[-1] > _MAX_TIME:
+            raise InvalidValueError("breaks", float(breaks[-1]), f"must end before {_MAX_TIME:g} [s]")
         object.__setattr__(self, "breaks", breaks)
         object.__setattr__(self, "coefficients", coefficients)
         powers = coefficients.shape[2]

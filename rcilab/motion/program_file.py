@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from rcilab.core.arrays import Unquoted, described
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchError, plain_text
-from rcilab.motion.located_json import MAX_BYTES, LongListError, Node, read_json
+from rcilab.motion.located_json import LongListError, Node, read_json, require_length
 from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS, MOST_WAYPOINTS, Waypoint, require_count, require_fit
 from rcilab.robots import RobotDescription, describe_robot
 
@@ -73,7 +73,7 @@ def load_program(file: str | PathLike[str], build: Callable[..., P]) -> P:
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("program file", described(file), "must be a file name")
     path = Path(fspath(file))
-    content = read_limited(path, "program file", MAX_BYTES + 1)
+    content = read_limited(path, "program file", lambda size: require_length(size, path.name))
     return read_program(content, path.name, build)
 
 

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from math import prod
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, JointPath, as_number, as_path, as_vector
+from rcilab.core.arrays import Array, JointPath, Unquoted, as_number, as_path, as_vector
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
-from rcilab.motion.archive import Shapes, read_arrays
+from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
+from rcilab.motion.archive import Shapes, contains_numbers, read_arrays
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
 
@@ -28,10 +30,13 @@ MAX_ANGLE = 4.0 * math.pi
 _ON_GRID = 1e-6
 """Tolerance of times at whole cycles, [s]: the rounding to six decimals."""
 
+_MAX_TIME = 1e20
+"""Largest time in a file, [s]: nanoseconds since 1970, read as seconds."""
+
 _TIME_KEYS = ("t", "time", "times")
 _MOST_JOINTS = 7
 _TIME = re.compile(r"(?:t|time|times|timestamp)[ _]*[\[(]?(s|ms|us|ns)?[\])]?")
-_JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d+)\]|(\d+))[ _]*[\[(]?(rad|deg|°)?[\])]?")
+_JOINT = re.compile(r"(?:(?:\w*[_./])?joint|q|j|axis)[ _]*(?:\[(\d{1,3})\]|(\d{1,3}))[ _]*[\[(]?(rad|deg|°)?[\])]?")
 _SECONDS = {None: 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
@@ -61,8 +66,7 @@ def read_samples(
     path = Path(fspath(file))
     if path.suffix.lower() not in _READERS:
         raise InvalidValueError("samples", str(path), f"must end in {' or '.join(_READERS)}")
-    content = read_limited(path, "samples", max_rows * ROW_BYTES + 1)
-    require_bytes(len(content), max_rows, "samples", path.name)
+    content = read_limited(path, "samples", lambda size: require_bytes(size, max_rows, "samples", path.name))
     times, q, locations = _READERS[path.suffix.lower()](content, path.name, rate_hz is not None, unit, max_rows)
     if times is None:
         if rate_hz is None:
@@ -72,7 +76,7 @@ def read_samples(
         times = np.arange(len(q)) / rate_hz
     elif rate_hz is not None:
         raise InvalidValueError("rate_hz", rate_hz, f"is not needed: {path.name} has times; omit it")
-    _require_increasing(times, locations)
+    _require_times(times, locations)
     _require_angles(q, locations)
     return times, q
 
@@ -134,11 +138,18 @@ def _from_npz(
     if "q" not in arrays:
         found = ", ".join(arrays) or "nothing"
         raise InvalidValueError("samples", name, f"has no array q of joint angles (found: {found})")
+    _require_numbers(arrays, name)
     q = as_path(arrays["q"], None, f"{name}, q", unit)
     key = next((key for key in _TIME_KEYS if key in arrays), None)
     times = None if key is None else as_vector(arrays[key], len(q), f"{name}, {key}", "s")
     locations = [f"{name}, row {row} (from 0)" for row in range(len(q))]
     return times, np.radians(q) if unit == "deg" else q, locations
+
+
+def _require_numbers(arrays: Mapping[str, NDArray[Any]], name: str) -> None:
+    for key in ("q", *_TIME_KEYS):
+        if key in arrays and not contains_numbers(arrays[key]):
+            raise InvalidValueError(f"{name}, {key}", Unquoted(f"array of {arrays[key].dtype}"), "needs real numbers")
 
 
 def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
@@ -153,7 +164,12 @@ def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
 _READERS = {".csv": _from_csv, ".npz": _from_npz}
 
 
-def _require_increasing(times: Array, locations: list[str]) -> None:
+def _require_times(times: Array, locations: list[str]) -> None:
+    beyond = np.flatnonzero(np.abs(times) > _MAX_TIME)
+    if beyond.size:
+        i = int(beyond[0])
+        problem = f"s is more than {_MAX_TIME:g}; are the times in s?"
+        raise InvalidValueError(locations[i], float(times[i]), problem)
     not_later = np.flatnonzero(np.diff(times) <= 0.0)
     if not_later.size:
         i = int(not_later[0]) + 1

@@ -16,13 +16,16 @@ from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
-from rcilab.motion.archive import Shapes, read_arrays
+from rcilab.motion.archive import Shapes, contains_numbers, read_arrays
 from rcilab.motion.piecewise import PiecewisePolynomial, require_piece_shapes
 
 M = TypeVar("M", bound=Sized)
 
 KIND = "rcilab motion"
 VERSION = 1
+
+_PIECES_PER_ROW = 5
+"""Largest number of pieces of a curve per 1 ms; tuning value: a planned motion has one for several ms."""
 
 _SIGNATURES = (b"PK", b"\x93NUMPY")
 """First bytes of a NumPy archive and of a single array."""
@@ -102,6 +105,8 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
         advice = "plan and save the motion again, or read it with the version of rcilab that wrote it"
         raise VersionMismatchError(f"motion file {name!r}", found, VERSION, advice)
     try:
+        if not all(contains_numbers(content[key]) for key in ("breaks", "coefficients", "goal")):
+            raise TypeError("complex or other numbers")
         curve = PiecewisePolynomial(content["breaks"], content["coefficients"])
         motion = build(
             polynomial=curve,
@@ -109,7 +114,7 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
             law=str(content["law"]),
             speed=as_number(content["speed"], "speed"),
             # Files of older versions have neither.
-            segment_starts=content.get("segment_starts", np.zeros(1)),
+            segment_starts=content.get("segment_starts", np.zeros(1)).astype(np.float64, casting="safe"),
             notes=tuple(content["notes"].tolist()) if "notes" in content else (),
         )
     except KeyError as error:
@@ -117,28 +122,33 @@ def read_content(file: str | PathLike[str] | BinaryIO, max_rows: int, build: Cal
     except InvalidValueError as error:
         raise InvalidValueError("motion file", name, f"contains a damaged motion: {error}") from error
     except (TypeError, ValueError, OverflowError) as error:
-        problem = "contains a damaged motion: breaks and coefficients are not all numbers"
+        problem = "contains a damaged motion: its arrays do not all contain real numbers"
         raise InvalidValueError("motion file", name, problem) from error
     require_rows(len(motion), max_rows, "motion file", name)
     return motion
 
 
 def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dict[str, np.ndarray]:
-    max_bytes = max_rows * ROW_BYTES + 1
-    content = (
-        read_limited(Path(file), "motion file", max_bytes) if isinstance(file, str | PathLike) else file.read(max_bytes)
-    )
+    def require_size(size: int) -> None:
+        require_bytes(size, max_rows, "motion file", name)
+
+    if isinstance(file, str | PathLike):
+        content = read_limited(Path(file), "motion file", require_size)
+    else:
+        content = file.read(max_rows * ROW_BYTES + 1)
+        require_size(len(content))
     if not content:
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it was not written by Motion.save")
     problem = "cannot be read as a motion: it is damaged, or has another content; save the motion again"
-    require_bytes(len(content), max_rows, "motion file", name)
-    return read_arrays(content, "motion file", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name))
+    return read_arrays(
+        content, "motion file", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name, max_rows)
+    )
 
 
-def _require_shapes(shapes: Shapes, name: str) -> None:
-    """Requires arrays that fit together; a missing one is reported when the file is read."""
+def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
+    """Requires arrays that fit together and are not too long; a missing one is reported when the file is read."""
     breaks, coefficients, goal = (shapes.get(key) for key in ("breaks", "coefficients", "goal"))
     if breaks is None or coefficients is None:
         return
@@ -148,6 +158,7 @@ def _require_shapes(shapes: Shapes, name: str) -> None:
             raise InvalidValueError("goal", f"array of shape {goal}", f"must have {coefficients[1]} joints")
     except InvalidValueError as error:
         raise InvalidValueError("motion file", name, f"contains a damaged motion: {error}") from error
+    require_rows(coefficients[0] // _PIECES_PER_ROW, max_rows, "motion file", name)
 
 
 def _require_stream(file: object, method: str) -> None:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from array import array
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from dataclasses import dataclass
-from io import StringIO
 
 import numpy as np
 
 from rcilab.core.arrays import Array
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.file_bounds import require_rows
+from rcilab.core.file_bounds import require_bytes, require_rows
 
-_LONGEST_LINE = 65_536  # [characters] Tuning value: a line written by rcilab has some hundreds.
+_LONGEST_LINE = 65_536  # [bytes] Tuning value: a line written by rcilab has some hundreds.
+_MAX_COLUMNS = 1024  # Tuning value: the table of a run with the complete state has 200.
+_LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +35,8 @@ class Table:
     """Shape (N, columns), at least one row; NaN for a cell that is not a number."""
     lines: list[int]
     """Line of each row, from 1."""
-    text: str
-    """The whole text."""
+    content: bytes
+    """The whole text, UTF-8."""
 
     @property
     def columns(self) -> int:
@@ -50,9 +53,9 @@ class Table:
         invalid = np.flatnonzero(~np.isfinite(numbers))
         if invalid.size:
             line = self.lines[int(invalid[0])]
-            cell = next(
-                _cells(text, _separator_of(self.text)) for number, text in _data_lines(self.text) if number == line
-            )[index]
+            separator = _separator_of(self.content, self.name)
+            lines = _data_lines(self.content, self.name)
+            cell = next(_cells(text, separator) for number, text in lines if number == line)[index]
             problem = f"in column {index + 1} is not a finite number; use a point for decimals"
             raise InvalidValueError(f"{self.name}, line {line}", cell, problem).coded("table_cell", column=index + 1)
         return numbers
@@ -71,29 +74,20 @@ def read_table(content: bytes, name: str, max_rows: int) -> Table:
     Raises:
         InvalidValueError: The content is not text, has no rows or too many, or lines differ in their number of columns.
     """
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        problem = "is not UTF-8 text; save the file as CSV"
-        raise InvalidValueError(f"{name}, line {line}", content[error.start : error.end], problem).coded(
-            "table_no_text", file=name, line=line
-        ) from error
-    rows = text.count("\n") + 1
+    rows = max(content.count(b"\n"), content.count(b"\r")) + 1
     if rows > max_rows + 1000:  # With room for comments and a header; the rows are counted below.
         require_rows(rows, max_rows, "samples", name)
-    separator = _separator_of(text)
+    separator = _separator_of(content, name)
     header, header_line, columns = None, 0, 0
     values, lines = array("d"), array("q")
-    for number, line in _data_lines(text):
-        if len(line) > _LONGEST_LINE:
-            raise InvalidValueError(
-                f"{name}, line {number}", len(line), f"characters are more than the {_LONGEST_LINE} allowed in a line"
-            ).coded("table_line", count=len(line), most=_LONGEST_LINE)
+    for number, line in _data_lines(content, name):
         cells = _cells(line, separator)
         numbers = [_number(cell) for cell in cells]
         if columns == 0:
             columns = len(cells)
+            if columns > _MAX_COLUMNS:
+                raise InvalidValueError(f"{name}, line {number}", columns, f"columns are more than {_MAX_COLUMNS}")
+            require_bytes(rows * columns * values.itemsize, max_rows, "samples", name)
             if all(math.isnan(value) and not _is_nan_text(cell) for cell, value in zip(cells, numbers, strict=True)):
                 header, header_line = cells, number
                 continue
@@ -109,19 +103,36 @@ def read_table(content: bytes, name: str, max_rows: int) -> Table:
         detail = " below the header" if header is not None else ""
         raise InvalidValueError("samples", name, f"has no rows{detail}").coded("table_empty", file=name)
     require_rows(len(lines), max_rows, "samples", name)
-    return Table(name, header, header_line, np.array(values).reshape(-1, columns), lines.tolist(), text)
+    return Table(name, header, header_line, np.frombuffer(values).reshape(-1, columns), lines.tolist(), content)
 
 
-def _data_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Yields the number, from 1, and the text of each line that is neither empty nor a comment."""
-    for number, line in enumerate(StringIO(text, newline=None), 1):
-        if (line := line.strip("\r\n")).strip() and not line.lstrip().startswith("#"):
+def _data_lines(content: bytes, name: str) -> Iterator[tuple[int, str]]:
+    """Yields the number, from 1, and the text of each line that is neither empty nor a comment.
+
+    Raises:
+        InvalidValueError: A line is not text, or too long.
+    """
+    start = len(BOM_UTF8) if content.startswith(BOM_UTF8) else 0
+    for number, match in enumerate(_LINE.finditer(content, start), 1):
+        size = match.end(1) - match.start(1)
+        if size > _LONGEST_LINE:
+            raise InvalidValueError(
+                f"{name}, line {number}", size, f"characters are more than the {_LONGEST_LINE} allowed in a line"
+            ).coded("table_line", count=size, most=_LONGEST_LINE)
+        try:
+            line = match[1].decode()
+        except UnicodeDecodeError as error:
+            problem = "is not UTF-8 text; save the file as CSV"
+            raise InvalidValueError(f"{name}, line {number}", match[1][error.start : error.end], problem).coded(
+                "table_no_text", file=name, line=number
+            ) from error
+        if line.strip() and not line.lstrip().startswith("#"):
             yield number, line
 
 
-def _separator_of(text: str) -> str | None:
+def _separator_of(content: bytes, name: str) -> str | None:
     """Returns the column separator; None is white space."""
-    first = next(_data_lines(text), (0, ""))[1]
+    first = next(_data_lines(content, name), (0, ""))[1]
     return next((separator for separator in ";,\t" if separator in first), None)
 
 

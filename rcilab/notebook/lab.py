@@ -32,7 +32,7 @@ def lab_command(
         UsageError: JupyterLab is not installed, there is no such directory, or root has not asked to be allowed.
     """
     require_lab(allow_root=allow_root)
-    if not directory.is_dir():
+    if not os.path.isdir(directory):
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
     command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
     command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.

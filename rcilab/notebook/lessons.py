@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -90,12 +91,24 @@ def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | N
         if not file.exists():
             was_declined = candidate != name and given.get(candidate) == digest  # Offered beside, and deleted.
             return None if was_declined else candidate
-        found = _digest(file.read_text(encoding="utf-8", errors="replace"))
+        found = _digest(_read_copy(file))
         if digest in (found, given.get(candidate)):
             return None
         if found == given.get(candidate):
             return candidate
     raise AssertionError("the names have no end")
+
+
+def _read_copy(file: Path) -> str:
+    """Returns the text of a copy; nothing where it is no longer one: something else, no text, or of many megabytes."""
+    try:
+        return read_own_text(file)
+    except UnicodeDecodeError:
+        return ""
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.EFBIG, errno.EISDIR):
+            raise
+        return ""
 
 
 def _names(name: str) -> Iterator[str]:
@@ -111,7 +124,7 @@ def _names(name: str) -> Iterator[str]:
 def _read_record(folder: Path) -> dict[str, str]:
     try:
         found = json.loads(read_own_text(folder / _RECORD))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}  # Then every copy that differs counts as edited.
     return {str(name): str(digest) for name, digest in found.items()} if isinstance(found, dict) else {}
 

@@ -42,15 +42,16 @@ def encode_chunk(kind: str, payload: bytes) -> bytes:
     return _BLOCK.pack(name, len(payload), zlib.crc32(name + payload)) + payload
 
 
-def decode_chunks(content: bytes, name: str) -> tuple[Chunk, ...]:
+def decode_chunks(content: bytes, name: str, max_chunks: int) -> tuple[Chunk, ...]:
     """Returns the chunks of a file up to the last complete one.
 
     Args:
         content: Content of the file.
         name: Name of the file, for errors.
+        max_chunks: Largest number of chunks.
 
     Raises:
-        InvalidValueError: It is not such a file.
+        InvalidValueError: It is not such a file, or has more chunks.
         VersionMismatchError: It was written by another version of this format.
     """
     if not content.startswith(MAGIC):
@@ -69,8 +70,12 @@ def decode_chunks(content: bytes, name: str) -> tuple[Chunk, ...]:
     while offset + _BLOCK.size <= len(content):
         kind, length, checksum = _BLOCK.unpack_from(content, offset)
         payload = content[offset + _BLOCK.size : offset + _BLOCK.size + length]
-        if len(payload) < length or zlib.crc32(kind + payload) != checksum:
+        if len(payload) < length or zlib.crc32(payload, zlib.crc32(kind)) != checksum:
             break
+        if len(chunks) == max_chunks:
+            raise InvalidValueError("run file", name, f"is damaged: it has more than {max_chunks} chunks").coded(
+                "run_damaged", file=name
+            )
         chunks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
         offset += _BLOCK.size + length
     return tuple(chunks)

@@ -40,7 +40,7 @@ from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.core.file_bounds import require_max_rows, require_rows
+from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
@@ -70,6 +70,9 @@ _STOP_CODES = {
 }
 """Codes of the reasons of a stop, by their sentences: files of earlier versions have only the sentence."""
 _ROWS = struct.Struct("<I")
+_MAX_TEXT = 4_000_000  # [bytes] Length of HEAD or TAIL. Tuning value: a head with a report has 30 000.
+_MIN_CYCLES = 16  # Average of the chunks. Tuning value: all but the last one have `CHUNK_CYCLES`.
+_OTHER_CHUNKS = 1000  # Tuning value: a file has up to four other chunks.
 _LARGEST_ROW = 4096  # [bytes] Tuning value: a cycle with the complete state takes a third of it.
 
 
@@ -254,13 +257,18 @@ def read_run(file: str | PathLike[str], max_rows: int, build: Callable[..., R]) 
     if not isinstance(file, str | PathLike):
         raise InvalidValueError("run file", described(file), "must be a file name")
     name = fspath(file)
-    content = read_limited(Path(name), "run file", require_max_rows(max_rows) * _LARGEST_ROW + 1)
+    require_max_rows(max_rows)
+
+    def require_size(size: int) -> None:
+        require_bytes(max(size - _MAX_TEXT, 0), max_rows, "run file", name)
+
+    content = read_limited(Path(name), "run file", require_size)
     return decode_content(content, name, max_rows, build)
 
 
 def decode_content(content: bytes, name: str, max_rows: int, build: Callable[..., R]) -> R:
     """Reads the content of a `.rcirun` file; see `read_run`."""
-    chunks = decode_chunks(content, name)
+    chunks = decode_chunks(content, name, max_rows // _MIN_CYCLES + _OTHER_CHUNKS)
     if not chunks or chunks[0].kind != "HEAD":
         raise InvalidValueError("run file", name, "ends before its first cycle; nothing was recorded in it").coded(
             "run_empty", file=name
@@ -297,7 +305,7 @@ def _count_cycles(chunk: Chunk) -> int:
 
 
 def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) -> R:
-    head = json.loads(chunks[0].payload)
+    head = _decode_text(chunks[0])
     dtype = np.dtype([(name, kind, tuple(shape)) for name, kind, shape in head["fields"]])
     if dtype.itemsize != head["bytes"]:
         raise ValueError(f"a cycle takes {head['bytes']} bytes, its fields {dtype.itemsize}")
@@ -308,8 +316,8 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
     cycles = _to_current_layout(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
     plans = [chunk.payload for chunk in chunks if chunk.kind == "PLAN"]
-    tails = [json.loads(chunk.payload) for chunk in chunks if chunk.kind == "TAIL"]
-    tail = tails[-1] if tails else {}
+    tails = [chunk for chunk in chunks if chunk.kind == "TAIL"]
+    tail = _decode_text(tails[-1]) if tails else {}
     stopped = tail.get("stopped")
     if not isinstance(stopped, str | None):
         raise TypeError("the reason of the stop is not text")
@@ -328,6 +336,17 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
         has_speed_override=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )
+
+
+def _decode_text(chunk: Chunk) -> Any:
+    """Returns the content of a chunk of JSON.
+
+    Raises:
+        ValueError: It is not valid JSON, or too long.
+    """
+    if len(chunk.payload) > _MAX_TEXT:
+        raise ValueError(f"its {chunk.kind} takes {len(chunk.payload)} bytes, the maximum is {_MAX_TEXT}")
+    return json.loads(chunk.payload)
 
 
 def _to_current_layout(cycles: NDArray[np.void]) -> NDArray[np.void]:

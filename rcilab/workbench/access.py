@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from rcilab.core.atomic_file import read_own_text
 from rcilab.core.errors import UsageError
 from rcilab.views.access_control import is_loopback
 
@@ -86,7 +87,7 @@ def private_address(url: str) -> Iterator[str]:
 def _token_in(file: Path) -> str:
     try:
         mode = file.stat().st_mode
-        lines = file.read_text(encoding="utf-8").splitlines()
+        lines = read_own_text(file).splitlines()
     except (OSError, UnicodeError) as error:
         raise UsageError(f"cannot read the token in {file}: {error}") from error
     if mode & (stat.S_IRWXG | stat.S_IRWXO):

@@ -74,6 +74,15 @@ def test_a_slow_down_does_not_take_the_place_of_what_is_judged(file, tmp_path, c
     assert rows.read_bytes() == before
 
 
+@pytest.mark.parametrize("name", ["none.npz", "x" * 300 + ".npz", "x" * 300 + ".rcirun"])
+def test_a_file_that_does_not_exist_is_named_in_one_line(file, tmp_path, capsys, name):
+    there = tmp_path / "there.npz"
+    there.touch()
+    assert main(["check", str(tmp_path / name), "--model", "xMatePro7", "--slow-down", str(there)]) == 2
+    assert main(["check", str(file), "--slow-down", str(tmp_path / name)]) == (0 if name == "none.npz" else 2)
+    assert "Traceback" not in capsys.readouterr().err
+
+
 def test_json_has_the_verdict_every_condition_and_the_slow_down(file, tmp_path, capsys):
     fast = Motion.from_cycles(plan_program(MODEL, PROGRAM).q[::2])
     fast.save(tmp_path / "fast.csv")

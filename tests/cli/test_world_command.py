@@ -38,6 +38,7 @@ def test_a_box_is_placed_the_arm_is_pushed_and_the_status_is_printed(address, ca
         (["push"], "push needs wrench"),
         (["press", "button=red"], "button: 'red' is unknown"),
         (["press", "estop"], "needs FIELD=VALUE"),
+        (["press", "button=" + "[" * 10_000], "button"),
         (["remove_box", "box=chair"], "chair"),
     ],
 )

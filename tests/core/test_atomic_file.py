@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rcilab import check, load_model, plan_joint, simulate
+from rcilab import check, load_model, load_run, plan_joint, simulate
 from rcilab.core.atomic_file import read_own_text, replacing
-from rcilab.core.errors import UsageError
-from rcilab.motion import Program, Waypoint
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.motion import Motion, Program, Waypoint
 from rcilab.recording.optional_deps import MissingExtraError
+from rcilab.workbench.access import find_token
 
 
 def folder_after(file: Path) -> list[str]:
@@ -73,10 +75,34 @@ def run():
         yield robot.execute(plan_joint(model, model.home, model.home + 0.01))
 
 
-def test_a_pipe_in_the_place_of_an_own_file_is_not_waited_for(tmp_path: Path) -> None:
-    file = tmp_path / "own.json"
-    os.mkfifo(file)
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: os.symlink("/dev/zero", path)])
+def test_what_has_no_end_is_not_read(tmp_path: Path, make: Callable[[Path], None]) -> None:
+    own = tmp_path / "own.json"
+    make(own)
     with pytest.raises(OSError, match="not a regular file"):
+        read_own_text(own)
+    with pytest.raises(UsageError, match="not a regular file"):
+        find_token("127.0.0.1", file=own, environ={})
+    for load, ending in ((Motion.load, "npz"), (Motion.load, "csv"), (Program.load, "json"), (load_run, "rcirun")):
+        file = tmp_path / f"any.{ending}"
+        make(file)
+        with pytest.raises(InvalidValueError, match="cannot be read: not a regular file"):
+            load(file)
+
+
+def test_a_folder_in_the_place_of_an_own_file_costs_no_descriptor(tmp_path: Path) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(3):
+        with pytest.raises(IsADirectoryError):
+            read_own_text(tmp_path)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_a_link_to_something_huge_in_the_place_of_an_own_file_is_not_read(tmp_path: Path) -> None:
+    file = tmp_path / "huge"
+    file.touch()
+    os.truncate(file, 2**40)
+    with pytest.raises(OSError, match="1099512 MB are more than 32"):
         read_own_text(file)
 
 

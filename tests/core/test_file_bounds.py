@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -20,6 +22,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.recording.chunks import encode_chunk, encode_header
+from tests.core.bombs import BOMBS
 from tests.recording.runs import export_run, some_run
 
 MODEL = rcilab.load_model("xMatePro7")
@@ -168,6 +171,29 @@ def test_a_bomb_is_refused_in_one_sentence_within_the_memory_of_a_small_machine(
     assert said in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("name", "make", "said"), BOMBS, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_bomb_is_refused_before_it_takes_memory(tmp_path: Path, name: str, make: Callable[[Path], None], said: str):
+    file = tmp_path / name
+    make(file)
+    readers = {".rcirun": rcilab.load_run, ".json": Program.load}
+    tracemalloc.start()
+    try:
+        with pytest.raises(InvalidValueError, match=re.escape(said)):
+            readers.get(file.suffix, Motion.load)(file)
+        assert tracemalloc.get_traced_memory()[1] < 3e8
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_motion_of_far_more_pieces_than_rows_is_refused(tmp_path: Path):
+    rcilab.plan_joint(MODEL, MODEL.home, MODEL.home + 0.1).save(tmp_path / "a.npz")
+    parts = dict(np.load(tmp_path / "a.npz"))
+    more = {"breaks": np.zeros(1001), "coefficients": np.zeros((1000, 1, 1)), "goal": [0]}
+    np.savez(tmp_path / "a.npz", **{**parts, **more})
+    with pytest.raises(InvalidValueError, match="200 rows of 1 ms are more than 100"):
+        Motion.load(tmp_path / "a.npz", max_rows=100)
 
 
 def test_what_is_meant_is_taken(tmp_path: Path):

@@ -71,6 +71,7 @@ def test_what_is_no_pose_is_not_stored(file, q):
     ("text", "said"),
     [
         ("{", "not valid JSON"),
+        ("[" * 100_000, "not valid JSON"),
         ("[]", "not a pose file"),
         ('{"format": "rcilab poses", "version": 1, "poses": {"xMatePro7": []}}', "not a pose file"),
         ('{"format": "rcilab poses", "version": 1}', "not a pose file"),

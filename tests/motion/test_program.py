@@ -346,6 +346,11 @@ def test_a_program_is_saved_as_json_and_never_over_another_kind_of_file(tmp_path
         program.save(None)
 
 
+def test_a_text_of_more_values_than_any_program_has_is_not_read_to_its_end():
+    with pytest.raises(InvalidValueError, match="is one value more than 300000, the most in a file"):
+        Program.from_json(b'{"start": [' + 400_000 * b"0," + b"?", "program.json")
+
+
 def test_far_too_many_waypoints_are_counted_and_not_read():
     listed = 60_000 * [{"type": "joint", "q": 7 * [0.1]}]
     text = json.dumps(

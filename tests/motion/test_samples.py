@@ -114,6 +114,8 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("t,q1\n0,1\n", {"rate_hz": 100}, "is not needed"),
         ("t,q1\n0,1\n1,90\n", {}, r"line 3: 90.0 rad of joint 1 .*unit='deg'"),
         (b"t,q1\n0,1\n\xff\xfe,2\n", {}, "line 3: .*not UTF-8 text"),
+        ("t,q" + "9" * 5000 + "\n0,1\n", {}, "names the joints none"),
+        ("-1e308,1\n1e308,1\n", {}, r"line 1: -1e\+308 s is more than 1e\+20; are the times in s"),
         ("t,q1\n0,1\n", {"unit": "gon"}, "unit: 'gon' is unknown; known: rad, deg"),
         ("0,1\n", {"rate_hz": 0}, "rate_hz must be above 0.*, got 0.0"),
     ],
@@ -134,6 +136,8 @@ def test_a_bad_csv_is_named_with_its_line_in_one_sentence(tmp_path, text, option
         ({"q": np.zeros((3, 7)), "t": np.zeros(2)}, r"t: .* needs \(3,\)"),
         ({"q": np.zeros((3, 7)), "t": [0.0, 2.0, 1.0]}, r"row 2 \(from 0\): 1.0 s is not later"),
         ({"q": np.zeros((3, 7))}, "pass rate_hz"),
+        ({"q": np.zeros((3, 7), complex), "t": np.arange(3.0)}, "q needs real numbers, got array of complex128"),
+        ({"q": np.zeros((3, 7)), "t": np.arange(3).astype("M8[s]")}, "t needs real numbers"),
         ({"q": np.array([[0.0], [np.nan]]), "t": [0.0, 1.0]}, "row 1 .*finite"),
     ],
 )

@@ -57,6 +57,8 @@ def test_a_motion_goes_through_a_stream():
         ({"coefficients": np.zeros(3)}, "shapes"),
         ({"coefficients": np.array([["a"]])}, "damaged"),
         ({"speed": np.array([1.0, 2.0])}, "damaged"),
+        ({"goal": MOTION.goal + 0j}, "do not all contain real numbers"),
+        ({"segment_starts": np.array(["a"])}, "do not all contain real numbers"),
     ],
 )
 def test_a_file_that_holds_no_sound_motion_is_refused_in_words(tmp_path, changes, word):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,6 +52,12 @@ def test_a_newer_lesson_that_was_deleted_is_not_offered_again(tmp_path: Path, so
     assert copy_lessons(tmp_path, source).beside == ()
     (tmp_path / LESSON).unlink()
     assert copy_lessons(tmp_path, source).written == (LESSON,)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.write_bytes(b"\xff")])
+def test_a_lesson_is_offered_beside_what_is_no_copy(tmp_path: Path, source: Path, make: Callable[[Path], None]) -> None:
+    make(tmp_path / LESSON)
+    assert copy_lessons(tmp_path, source).beside == (BESIDE,)
 
 
 def test_a_copy_without_a_record_counts_as_edited(tmp_path: Path, source: Path) -> None:
