@@ -70,7 +70,7 @@ class ToolSignals:
     @cached_property
     def start_turn(self) -> float:
         """Difference of the first commanded arm angle from the arm's, [rad]."""
-        psi = self._inverse.arm_angle_path(self._rows[[PREVIOUS_COMMANDS - 1, self._first]])
+        psi = self._inverse.redundancy_angle_path(self._rows[[PREVIOUS_COMMANDS - 1, self._first]])
         return float(_wrapped(np.diff(psi))[0])
 
     @property
@@ -91,7 +91,7 @@ class ToolSignals:
 
     @cached_property
     def _arm_angle(self) -> Differences:
-        psi = self._inverse.arm_angle_path(self._rows)
+        psi = self._inverse.redundancy_angle_path(self._rows)
         first, second, third = self._derivatives(_wrapped(np.diff(psi))[:, np.newaxis])
         return psi[self._first :, np.newaxis], first, second, third
 

@@ -6,7 +6,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
-from rcilab.sim.generators.motion_limits import Mode
+from rcilab.sim.generators.motion_limits import MotionMode
 from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer
 from rcilab.sim.violations import ArmCondition, ArmViolation
 
@@ -33,7 +33,7 @@ class StreamedMotion:
     def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
-        self.mode = Mode(ControlLaw.POSITION, False)
+        self.mode = MotionMode(ControlLaw.POSITION, False)
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
         self._generator: MotionGenerator | None = None
@@ -45,7 +45,7 @@ class StreamedMotion:
         is_over = self.mode.law.is_force_driven and self.playout.is_finished  # No command holds the arm any more.
         return ControlLaw.POSITION if is_over else self.mode.law
 
-    def prepare(self, mode: Mode) -> None:
+    def prepare(self, mode: MotionMode) -> None:
         """Forgets the last motion, ready for one in this mode."""
         self.mode = mode
         self.playout.begin(most=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)

@@ -92,6 +92,6 @@ class ToolKinematics:
         if not self._has_arm_angle:
             return 0.0
         try:
-            return self._solver.arm_angle(q)
+            return self._solver.redundancy_angle(q)
         except SingularError:
             return self.psi

@@ -31,12 +31,12 @@ class ArmViolation(NamedTuple):
     """The values that violate it, as a sentence."""
 
 
-Violation: TypeAlias = LimitViolation | ArmViolation
+CycleViolation: TypeAlias = LimitViolation | ArmViolation
 """Has a `condition` and a `remark`."""
 
-Violations: TypeAlias = tuple[Violation, ...]
+Violations: TypeAlias = tuple[CycleViolation, ...]
 
 
-def describe_violations(violations: Iterable[Violation]) -> Remark:
+def describe_violations(violations: Iterable[CycleViolation]) -> Remark:
     """Returns all of them in one line."""
     return Remark.all(violation.remark for violation in violations)

@@ -23,7 +23,7 @@ from rcilab.sim.actuator import Actuator, ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.generators import build_generator
-from rcilab.sim.generators.motion_limits import Mode, build_motion_limits
+from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
 from rcilab.sim.generators.start import start_tolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
 from rcilab.sim.jitter_buffer import JitterBuffer
@@ -182,7 +182,7 @@ class VirtualArm:
             self.measured_state.configure(self.model, measured)
         self._actuator.configure(self.model, parameters)
 
-    def prepare_motion(self, mode: Mode) -> None:
+    def prepare_motion(self, mode: MotionMode) -> None:
         """Forgets the last motion, ready for one in this mode."""
         self._motion.prepare(mode)
 

@@ -29,7 +29,7 @@ def tool_curves(model: RobotModel, t: Array, q: JointPath, quantity: ToolQuantit
         quantity: The signal; only 7-axis arms have an arm angle.
     """
     if quantity == "psi":
-        values = model.solver.arm_angle_path(q)
+        values = model.solver.redundancy_angle_path(q)
         return Curves(t=t, values=np.asarray(values)[:, np.newaxis])
     positions = model.position_path(q)
     rates = backward_differences(t, positions, 1 if quantity == "speed" else 2)

@@ -12,7 +12,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
-from rcilab.sim.generators.motion_limits import Mode
+from rcilab.sim.generators.motion_limits import MotionMode
 from rcilab.sim.plants import build_plant
 from rcilab.sim.violations import ArmCondition, ArmViolation, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
@@ -38,7 +38,7 @@ def arm(request) -> VirtualArm:
     arm = VirtualArm(MODEL, build_plant(request.param, MODEL), parameters(), prefill=0, lost_limit=10)
     arm.resting_law = ControlLaw.POSITION
     arm.step()
-    arm.prepare_motion(Mode(ControlLaw.POSITION, False))
+    arm.prepare_motion(MotionMode(ControlLaw.POSITION, False))
     arm.begin_motion(MODEL.limits)
     arm.is_monitored = True
     return arm

@@ -181,7 +181,7 @@ class Signals:
         return near[:, None]
 
     def _psi(self, q: Array) -> Array:
-        return self._closed_form.arm_angle_path(q)
+        return self._closed_form.redundancy_angle_path(q)
 
     def _sent(self, name: str, before: Array | float) -> Array | None:
         """Returns what was checked in each row, with `_BEFORE` rows of standing still in front; None: none was sent."""

@@ -77,7 +77,7 @@ class InverseSearch:
         if near is None:
             return 0.0
         try:
-            return self.solver.arm_angle(near)
+            return self.solver.redundancy_angle(near)
         except SingularError:
             return 0.0
 

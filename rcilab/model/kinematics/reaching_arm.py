@@ -157,7 +157,7 @@ class ReachingArm(MovingArm):
             KinematicsError: The arm has 6 axes.
         """
         self._require_arm_angle()
-        return self.solver.arm_angle(self._floats(q))
+        return self.solver.redundancy_angle(self._floats(q))
 
     def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
         """Returns the circle on which the elbow of a 7-axis xMate can move while the tool stays.

@@ -6,13 +6,13 @@ from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.generators.cartesian import CartesianGenerator
 from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
 from rcilab.sim.generators.joint import JointGenerator
-from rcilab.sim.generators.motion_limits import Mode, MotionLimits
+from rcilab.sim.generators.motion_limits import MotionLimits, MotionMode
 from rcilab.sim.generators.torque import TorqueGenerator
 
-__all__ = ["GeneratorOutput", "Mode", "MotionGenerator", "build_generator"]
+__all__ = ["GeneratorOutput", "MotionGenerator", "MotionMode", "build_generator"]
 
 
-def build_generator(mode: Mode, bounds: MotionLimits, q: list[float]) -> MotionGenerator:
+def build_generator(mode: MotionMode, bounds: MotionLimits, q: list[float]) -> MotionGenerator:
     """Returns the generator of a motion that begins now.
 
     Args:

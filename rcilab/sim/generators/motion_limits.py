@@ -18,7 +18,7 @@ from rcilab.sim.generators.start import StartTolerance
 _SPRINGS = (ControlLaw.JOINT_IMPEDANCE, ControlLaw.CARTESIAN_IMPEDANCE)
 
 
-class Mode(NamedTuple):
+class MotionMode(NamedTuple):
     """Type of command and control law of a motion."""
 
     law: ControlLaw
@@ -48,7 +48,7 @@ class MotionLimits:
 
 
 def build_motion_limits(
-    mode: Mode,
+    mode: MotionMode,
     model: RobotModel,
     parameters: ArmParameters,
     limits: Limits,

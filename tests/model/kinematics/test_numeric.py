@@ -76,7 +76,7 @@ def test_the_builds_declare_their_redundancy():
     kinds = {name: load_model(name).redundancy.kind for name in ("xMatePro7", "xMate7", "Panda")}
     assert kinds == {"xMatePro7": "arm_angle", "xMate7": "none", "Panda": "joint"}
     with pytest.raises(KinematicsError, match="no arm angle"):
-        SIX.solver.arm_angle([0.0] * 6)
+        SIX.solver.redundancy_angle([0.0] * 6)
 
 
 @pytest.mark.parametrize(("model", "count"), [(SEVEN, 1000), (SIX, 300)], ids=["7 joints", "6 joints"])
@@ -106,7 +106,7 @@ def test_answers_are_those_of_the_closed_form(name):
             assert np.abs(model.forward(row).matrix - T.matrix).max() < TOLERANCE
             if closed.singularity_path(row[None])[0] > 0.5:
                 continue  # Two solutions are about to meet: the last digits decide which angles they have.
-            psi = closed.arm_angle(row.tolist()) if model.redundancy else 0.0
+            psi = closed.redundancy_angle(row.tolist()) if model.redundancy else 0.0
             exact = np.array(closed.at(T, row.tolist()).branches(psi))
             assert np.abs(turned(exact - row)).max(axis=1).min() < 1e-7
         asked += 1

@@ -31,11 +31,11 @@ def test_arm_angles_of_a_path_are_those_of_its_rows(name, seed):
     arm, q = build_solver(MODELS[name].description), configurations(name, seed)
     if MODELS[name].n == 6:
         with pytest.raises(KinematicsError, match="no arm angle"):
-            arm.arm_angle_path(q)
+            arm.redundancy_angle_path(q)
         return
-    for row, psi in zip(q, arm.arm_angle_path(q), strict=True):
+    for row, psi in zip(q, arm.redundancy_angle_path(q), strict=True):
         try:
-            expected = arm.arm_angle(row.tolist())
+            expected = arm.redundancy_angle(row.tolist())
         except SingularError:
             continue
         if arm.singularity_path(row[np.newaxis])[0] < 50.0:  # Closer than that, the last digits decide.
@@ -59,6 +59,6 @@ def test_the_solution_near_the_last_angles_is_the_arm_itself(name, seed):
     arm = build_solver(model.description)
     q = model.home + rng.uniform(-0.15, 0.15, model.n)
     near = q + rng.uniform(-2e-3, 2e-3, model.n)
-    psi = arm.arm_angle(q.tolist()) if model.n == 7 else 0.0
+    psi = arm.redundancy_angle(q.tolist()) if model.n == 7 else 0.0
     assert arm.solve_near(model.forward(q), psi, near.tolist()) == pytest.approx(q.tolist(), abs=1e-10)
     assert arm.solve_near(Pose((9.0, 0.0, 0.0)), psi, near.tolist()) is None

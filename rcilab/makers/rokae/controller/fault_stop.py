@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 
 from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.faults import RANGE_FAULTS, Fault
-from rcilab.sim.violations import ArmCondition, ArmViolation, Violation
+from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
 
 
 class FaultSource(Enum):
@@ -100,7 +100,7 @@ ARM_FAULTS: Final = {
 """The fault of every condition that is not a row of the condition table."""
 
 
-def faults_of(violations: Iterable[Violation]) -> tuple[Fault, ...]:
+def faults_of(violations: Iterable[CycleViolation]) -> tuple[Fault, ...]:
     """Returns the faults that violations raise, in wire order and once each."""
     faults: set[Fault | None] = set()
     for violation in violations:
@@ -111,7 +111,7 @@ def faults_of(violations: Iterable[Violation]) -> tuple[Fault, ...]:
     return tuple(sorted(fault for fault in faults if fault is not None))
 
 
-def is_beyond_range(violation: Violation) -> bool:
+def is_beyond_range(violation: CycleViolation) -> bool:
     """Returns whether a joint is beyond its range, which costs motor power. An angle that is not finite is not."""
     return violation.condition is not ArmCondition.FINITE_ANGLES and not RANGE_FAULTS.isdisjoint(
         faults_of((violation,))

@@ -11,16 +11,16 @@ from typing import Final
 from rcilab.core.state import ControllerMode
 from rcilab.makers.rokae.wire import StartMotionMode
 from rcilab.sim.actuator import ControlLaw
-from rcilab.sim.generators import Mode
+from rcilab.sim.generators import MotionMode
 
 C, M = ControllerMode, StartMotionMode
 
 MODES: Final = {
-    (C.JOINT_POSITION, M.JOINT): Mode(ControlLaw.POSITION, False),
-    (C.CARTESIAN_POSITION, M.CARTESIAN): Mode(ControlLaw.POSITION, True),
-    (C.JOINT_IMPEDANCE, M.JOINT): Mode(ControlLaw.JOINT_IMPEDANCE, False),
-    (C.CARTESIAN_IMPEDANCE, M.CARTESIAN): Mode(ControlLaw.CARTESIAN_IMPEDANCE, True),
-    (C.TORQUE, M.IDLE): Mode(ControlLaw.TORQUE, False),  # What the vendor's example asks for.
-    (C.TORQUE, M.JOINT): Mode(ControlLaw.TORQUE, False),
+    (C.JOINT_POSITION, M.JOINT): MotionMode(ControlLaw.POSITION, False),
+    (C.CARTESIAN_POSITION, M.CARTESIAN): MotionMode(ControlLaw.POSITION, True),
+    (C.JOINT_IMPEDANCE, M.JOINT): MotionMode(ControlLaw.JOINT_IMPEDANCE, False),
+    (C.CARTESIAN_IMPEDANCE, M.CARTESIAN): MotionMode(ControlLaw.CARTESIAN_IMPEDANCE, True),
+    (C.TORQUE, M.IDLE): MotionMode(ControlLaw.TORQUE, False),  # What the vendor's example asks for.
+    (C.TORQUE, M.JOINT): MotionMode(ControlLaw.TORQUE, False),
 }
 """Controller mode and motion mode of StartMove, and what they run (manual 3.1.1)."""

@@ -89,7 +89,7 @@ class KinematicsSolver(Protocol):
         """
         ...
 
-    def arm_angle(self, q: Sequence[float]) -> float:
+    def redundancy_angle(self, q: Sequence[float]) -> float:
         """Returns the redundancy angle, [rad] in (-pi, pi].
 
         Raises:
@@ -98,7 +98,7 @@ class KinematicsSolver(Protocol):
         """
         ...
 
-    def arm_angle_path(self, q: JointPath) -> Array:
+    def redundancy_angle_path(self, q: JointPath) -> Array:
         """Returns the redundancy angles of N configurations, shape (N,), [rad]; arbitrary where they have no meaning.
 
         Raises:

@@ -29,11 +29,11 @@ class SphericalSix(SphericalSeven):
         except KinematicsError:
             return None
 
-    def arm_angle(self, q: Sequence[float]) -> float:
+    def redundancy_angle(self, q: Sequence[float]) -> float:
         """Raises KinematicsError: the arm has no arm angle."""
         raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 
-    def arm_angle_path(self, q: JointPath) -> Array:
+    def redundancy_angle_path(self, q: JointPath) -> Array:
         """Raises KinematicsError: the arm has no arm angle."""
         raise KinematicsError("an arm with 6 axes has no arm angle").coded("no_psi")
 

@@ -38,11 +38,11 @@ class SphericalSeven:
         """Returns the inverse at a pose, computed on demand."""
         return _SphericalPose(self.geometry, T_base_flange, near)
 
-    def arm_angle(self, q: Sequence[float]) -> float:
+    def redundancy_angle(self, q: Sequence[float]) -> float:
         """Returns where the elbow is on its circle, [rad]."""
         return arm_angle(self.geometry.upper, self.geometry.fore, q)
 
-    def arm_angle_path(self, q: JointPath) -> Array:
+    def redundancy_angle_path(self, q: JointPath) -> Array:
         """Returns where the elbow is on its circle along a path, [rad]."""
         return arm_angle_path(self.geometry.upper, self.geometry.fore, q)
 

@@ -67,11 +67,11 @@ class NumericSolver:
         """Returns the inverse at a pose, computed on demand."""
         return _NumericPose(self._arm, self.envelope, T_base_flange, near)
 
-    def arm_angle(self, q: Sequence[float]) -> float:
+    def redundancy_angle(self, q: Sequence[float]) -> float:
         """Returns the angle of the held joint, [rad]."""
         return remainder(q[self._redundant()], tau)
 
-    def arm_angle_path(self, q: JointPath) -> Array:
+    def redundancy_angle_path(self, q: JointPath) -> Array:
         """Returns the angles of the held joint, [rad]."""
         return q[:, self._redundant()]
 

@@ -37,11 +37,11 @@ class OffsetSeven:
         """Returns the inverse at a pose, computed on demand."""
         return _OffsetPose(self.geometry, T_base_flange, near)
 
-    def arm_angle(self, q: Sequence[float]) -> float:
+    def redundancy_angle(self, q: Sequence[float]) -> float:
         """Returns the angle of joint 3, [rad]."""
         return remainder(q[ELBOW], tau)
 
-    def arm_angle_path(self, q: JointPath) -> Array:
+    def redundancy_angle_path(self, q: JointPath) -> Array:
         """Returns the angles of joint 3, [rad], as they are: this joint makes no whole turn."""
         return q[:, ELBOW]
 
