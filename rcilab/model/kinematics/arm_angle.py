@@ -18,9 +18,9 @@ from rcilab.core.errors import SingularError
 
 Vec: TypeAlias = tuple[float, float, float]
 
-_VERTICAL = 1e-9  # sin of the angle between SW and the vertical below which psi has no reference direction.
+_VERTICAL = 1e-9  # sin of the angle of SW to the vertical below which psi has no reference.
 _NO_REFERENCE = "arm angle: shoulder and wrist are above each other, so no direction around that line is the upper one"
-_STRETCHED = 1e-12  # Elbow distance from SW, relative to the arm's length, below which psi has no elbow to measure.
+_STRETCHED = 1e-12  # Elbow distance from SW, relative to the arm's length, below which psi is undefined.
 
 
 def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
@@ -46,7 +46,7 @@ def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
     if length == 0.0:
         error = SingularError("arm angle: the wrist is on the shoulder, so there is no shoulder-wrist line")
         raise error.coded("no_arm_angle")
-    # The elbow in the directions of `reference_frame`, written out: this runs every cycle.
+    # The elbow in the directions of `reference_frame`, written out for speed.
     horizontal = hypot(wx, wy)
     if horizontal < _VERTICAL * length:
         raise SingularError(_NO_REFERENCE).coded("no_arm_angle")
@@ -59,7 +59,7 @@ def arm_angle(upper: float, fore: float, q: Sequence[float]) -> float:
 
 
 def arm_angle_path(upper: float, fore: float, q: JointPath) -> Array:
-    """Returns the arm angle of many configurations, shape (N,), [rad]; where it has no meaning, any number.
+    """Returns the arm angle of many configurations, shape (N,), [rad]; arbitrary where it has no meaning.
 
     Args:
         upper: d3, shoulder to elbow, [m].
@@ -83,7 +83,7 @@ def reference_frame(u: Vec) -> tuple[Vec, Vec]:
     """Returns the directions of psi = 0 and psi = +90 degrees, perpendicular to the unit vector u.
 
     Raises:
-        SingularError: u is vertical; then no side of the line is the upper one.
+        SingularError: u is vertical, so no side of the line is the upper one.
     """
     horizontal = hypot(u[0], u[1])
     if horizontal < _VERTICAL:

@@ -12,8 +12,8 @@ from rcilab.core.spatial import Pose, wxyz_from_rotation
 from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.kinematics.solvers.solver import Envelope
 
-_KEEP_BENT = 0.999  # Share of the full reach a projected target is put at: a stretched arm is singular.
-_HALVINGS = 12  # Steps of the search along the way to the target: 1/4096 of it, well below a pixel.
+_MAX_STRETCH = 0.999  # Share of the full reach for a projected target: a stretched arm is singular.
+_HALVINGS = 12  # Bisection steps along the line to the target: 1/4096 of it, well below a pixel.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -25,57 +25,57 @@ class ClosestPose:
     pose: Pose
     """Pose of the tool at q in base: the target itself, or the closest pose found."""
     solutions: Solutions | None
-    """All branches at that pose; None when the present pose is the closest."""
+    """All branches at that pose; None if the current pose is the closest."""
     refusal: UnreachableError | None
-    """Why the target itself cannot be reached; None when it can."""
+    """Why the target itself cannot be reached; None if it can."""
 
 
 def closest_reachable(
     solve: Callable[[Pose, bool], Solutions],
     arm: Envelope,
     T_flange_tool: Pose,
-    here: Pose,
+    current: Pose,
     q: JointVector,
     target: Pose,
 ) -> ClosestPose:
     """Returns joint angles for a target, or for the closest reachable pose.
 
-    A target beyond the reach is pulled straight back towards the shoulder, keeping its orientation. One that a joint
-    limit forbids is approached along the straight way from the present pose, as far as there is a solution.
+    A target beyond the reach is moved straight towards the shoulder, with its orientation. A target outside the joint
+    limits is approached along the straight line from the current pose, as far as a solution exists.
 
     Args:
         solve: Inverse kinematics from a tool pose; raises UnreachableError. Its second argument allows a search for
             another arm angle, which is too slow for every step of the bisection.
         arm: Lengths of the arm.
         T_flange_tool: Pose of the tool in the flange frame.
-        here: Present pose of the tool in base, reached at q.
-        q: Present joint angles, shape (n,), [rad].
-        target: Wanted pose of the tool in base.
+        current: Current pose of the tool in base, at q.
+        q: Current joint angles, shape (n,), [rad].
+        target: Desired pose of the tool in base.
     """
     try:
         found = solve(target, True)
         return ClosestPose(q=found.nearest(q), pose=target, solutions=found, refusal=None)
     except UnreachableError as error:
         refusal = error
-    goal = _pull_in(arm, T_flange_tool, target)
+    goal = _project_to_reach(arm, T_flange_tool, target)
     if goal is not target:
         try:
             found = solve(goal, True)
             return ClosestPose(q=found.nearest(q), pose=goal, solutions=found, refusal=refusal)
         except UnreachableError:
             pass
-    return _approach(solve, here, q, goal, refusal)
+    return _approach(solve, current, q, goal, refusal)
 
 
 def _approach(
-    solve: Callable[[Pose, bool], Solutions], here: Pose, q: JointVector, goal: Pose, refusal: UnreachableError
+    solve: Callable[[Pose, bool], Solutions], current: Pose, q: JointVector, goal: Pose, refusal: UnreachableError
 ) -> ClosestPose:
-    """Returns the last reachable pose found on the straight way from here to an unreachable goal, by bisection."""
-    best = ClosestPose(q=q, pose=here, solutions=None, refusal=refusal)
+    """Returns the last reachable pose on the line from the current pose to an unreachable goal, by bisection."""
+    best = ClosestPose(q=q, pose=current, solutions=None, refusal=refusal)
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
-        pose = interpolate(here, goal, middle)
+        pose = interpolate(current, goal, middle)
         try:
             found = solve(pose, False)
         except UnreachableError:
@@ -104,16 +104,16 @@ def interpolate(a: Pose, b: Pose, share: float) -> Pose:
     )
 
 
-def _pull_in(arm: Envelope, T_flange_tool: Pose, target: Pose) -> Pose:
+def _project_to_reach(arm: Envelope, T_flange_tool: Pose, target: Pose) -> Pose:
     """Returns the target moved so that its wrist centre is inside the reachable shell."""
     r, (x, y, z) = (target @ T_flange_tool.inverse()).parts
     wx, wy, wz = x - arm.hand * r[2], y - arm.hand * r[5], z - arm.hand * r[8] - arm.shoulder
     length = (wx * wx + wy * wy + wz * wz) ** 0.5
-    longest = _KEEP_BENT * (arm.upper + arm.fore)
-    shortest = abs(arm.upper - arm.fore) / _KEEP_BENT
-    wanted = min(max(length, shortest), longest)
-    if length == 0.0 or wanted == length:
+    longest = _MAX_STRETCH * (arm.upper + arm.fore)
+    shortest = abs(arm.upper - arm.fore) / _MAX_STRETCH
+    clamped = min(max(length, shortest), longest)
+    if length == 0.0 or clamped == length:
         return target
-    scale = wanted / length - 1.0
+    scale = clamped / length - 1.0
     rotation, (px, py, pz) = target.parts
     return Pose.from_parts(rotation, (px + scale * wx, py + scale * wy, pz + scale * wz))

@@ -1,11 +1,12 @@
 """Distances between the links and to the floor, computed by coal from the capsules of the URDF.
 
-Neighbours are not checked: their housings share a joint and always touch. All other pairs of links are; within the
-joint limits none of them touch (a test shows it). The floor is checked against every link that can move vertically.
+Neighbouring links are not checked, because their housings share a joint and always touch. All other pairs are; none of
+them touch within the joint limits (covered by a test). The floor is checked against every link that can move
+vertically.
 """
 
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false
-# pinocchio and coal define their names in compiled code at import, where pyright cannot see them.
+# pinocchio and coal define their names in compiled code at import; pyright does not know them.
 
 from __future__ import annotations
 
@@ -27,15 +28,15 @@ from rcilab.robots.description import RobotDescription
 from rcilab.robots.shapes import Capsule, build_shapes
 from rcilab.robots.upright import upright_flange, upright_joints
 
-_SLANT = 0.5  # Axes are along y or z; this is between.
+_AXIS_THRESHOLD = 0.5  # Between the components of axes along y and along z.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance:
-    """The smallest distance between two links, or a link and the floor, and the two."""
+    """The smallest distance between two links, or a link and the floor, and their numbers."""
 
     distance: Array
-    """Below 0 where capsules overlap, shape () or (N,), [m]; infinite without a pair to check."""
+    """Distance, negative for an overlap, shape () or (N,), [m]; infinite without a pair to check."""
     links: NDArray[np.intp]
     """Numbers of the two, shape (2,) or (N, 2): 0 the base, n the last link, -1 the floor, -2 the tool."""
 
@@ -50,7 +51,7 @@ class Clearance:
 
 
 class CollisionGeometry:
-    """The capsules of an arm, the pairs to check, and how far a joint can move them. Immutable.
+    """The capsules of an arm, the pairs to check, and the levers of the joints. Immutable.
 
     Args:
         description: The arm.
@@ -65,17 +66,19 @@ class CollisionGeometry:
             self.bodies.append((tool,))
         self.tree = _tree(description)
         n = description.n
-        # The tool is fixed to the last link: neither of the two is compared with what the other one touches.
+        # The tool is fixed to the last link, so neither is compared with the neighbours of the other.
         names = [*range(n + 1), TOOL][: len(self.bodies)]
-        apart = [LinkPair(a, b) for a, b in combinations(names, 2) if (b - a > 1 if b != TOOL else a < n - 1)]
-        self.links, self.link_pairs = self._compare(apart, None)
-        rising = names[_first_rising(description) :] if floor_height is not None else []
-        self.floor, self.floor_pairs = self._compare([LinkPair(name, FLOOR) for name in rising], floor_height)
+        checked_pairs = [LinkPair(a, b) for a, b in combinations(names, 2) if (b - a > 1 if b != TOOL else a < n - 1)]
+        self.links, self.link_pairs = self._compare(checked_pairs, None)
+        moving_vertically = names[_first_moving_vertically(description) :] if floor_height is not None else []
+        self.floor, self.floor_pairs = self._compare(
+            [LinkPair(name, FLOOR) for name in moving_vertically], floor_height
+        )
         self.levers = readonly_copy(_levers(description, self.bodies))
-        """How far any point of the arm is from each joint's axis at most, shape (n,), [m]."""
+        """Largest distance of any point of the arm from each joint's axis, shape (n,), [m]."""
 
     def _compare(self, pairs: list[LinkPair], floor_height: float | None) -> tuple[Any, list[LinkPair]]:
-        """Returns pinocchio's geometry for some pairs, and which pair each of its comparisons belongs to."""
+        """Returns pinocchio's geometry for some pairs, and the pair of each of its comparisons."""
         geometry = pin.GeometryModel()
         last = self.tree.njoints - 1
         solids = {
@@ -87,13 +90,13 @@ class CollisionGeometry:
         if floor_height is not None:
             plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor_height)
             solids[FLOOR] = [geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), plane))]
-        owners: list[LinkPair] = []
+        pair_of_comparison: list[LinkPair] = []
         for pair in pairs:
             for a in solids[pair.first]:
                 for b in solids[pair.second]:
                     geometry.addCollisionPair(pin.CollisionPair(a, b))
-                    owners.append(pair)
-        return geometry, owners
+                    pair_of_comparison.append(pair)
+        return geometry, pair_of_comparison
 
 
 class ClearanceQuery:
@@ -109,17 +112,17 @@ class ClearanceQuery:
         self._links, self._floor = geometry.links.createData(), geometry.floor.createData()
 
     def links(self, q: JointVector) -> tuple[float, LinkPair]:
-        """Returns the smallest distance between two links, [m], and which; q of shape (n,), [rad]."""
+        """Returns the smallest distance between two links, [m], and the pair; q of shape (n,), [rad]."""
         return self._nearest(self._geometry.links, self._links, self._geometry.link_pairs, q)
 
     def floor(self, q: JointVector) -> tuple[float, LinkPair]:
-        """Returns the smallest distance of a link from the floor, [m], and which; infinite without a floor."""
+        """Returns the smallest distance of a link from the floor, [m], and the pair; infinite without a floor."""
         if not self._geometry.floor_pairs:
             return float("inf"), LinkPair(self._geometry.tree.njoints - 1, FLOOR)
         return self._nearest(self._geometry.floor, self._floor, self._geometry.floor_pairs, q)
 
     def path(self, q: JointPath) -> Clearance:
-        """Returns the smaller one of the two in every row of q, shape (N, n), [rad]."""
+        """Returns the smaller of both distances for every row of q, shape (N, n), [rad]."""
         distance, links = np.empty(len(q)), np.empty((len(q), 2), dtype=np.intp)
         for row, angles in enumerate(q):
             distance[row], links[row] = min(self.links(angles), self.floor(angles))
@@ -137,7 +140,7 @@ def collision_geometry(
     floor_height: float | None,
     tool_radius: float | None,
 ) -> CollisionGeometry:
-    """Returns the geometry of an arm with a tool, built once.
+    """Returns the geometry of an arm with a tool; cached.
 
     Args:
         description: The arm.
@@ -153,47 +156,47 @@ def collision_geometry(
 
 
 def _tree(description: RobotDescription) -> pin.Model:
-    """Returns the joints between the upright link frames, as pinocchio walks them."""
+    """Returns the joints between the upright link frames as a pinocchio model."""
     tree = pin.Model()
     for number, joint in enumerate(upright_joints(description), start=1):
-        tree.addJoint(number - 1, _kind(joint.axis), pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
+        tree.addJoint(number - 1, _joint_type(joint.axis), pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
     return tree
 
 
-def _kind(axis: Vector3) -> Any:
-    """Returns the fastest kind of joint about an axis."""
-    if axis[2] > _SLANT:
+def _joint_type(axis: Vector3) -> Any:
+    """Returns the fastest joint type for an axis."""
+    if axis[2] > _AXIS_THRESHOLD:
         return pin.JointModelRZ()
-    return pin.JointModelRY() if axis[1] > _SLANT else pin.JointModelRevoluteUnaligned(axis.copy())
+    return pin.JointModelRY() if axis[1] > _AXIS_THRESHOLD else pin.JointModelRevoluteUnaligned(axis.copy())
 
 
 def _solid(capsule: Capsule, link: int) -> Any:
-    """Returns a capsule for pinocchio, fixed to a link; the tool is part of the last one."""
+    """Returns a capsule for pinocchio, fixed to a link; that of the tool belongs to the last link."""
     line = capsule.end - capsule.start
     length = float(np.linalg.norm(line))
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), line) if length else pin.Quaternion.Identity()
-    place = pin.SE3(turn.matrix(), (capsule.start + capsule.end) / 2.0)
-    return pin.GeometryObject("capsule", link, place, coal.Capsule(capsule.radius, length))
+    rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), line) if length else pin.Quaternion.Identity()
+    placement = pin.SE3(rotation.matrix(), (capsule.start + capsule.end) / 2.0)
+    return pin.GeometryObject("capsule", link, placement, coal.Capsule(capsule.radius, length))
 
 
-def _first_rising(description: RobotDescription) -> int:
-    """Returns the first link that a joint can move up or down: those below only turn about the vertical."""
+def _first_moving_vertically(description: RobotDescription) -> int:
+    """Returns the first link that moves vertically; those before it only rotate about the vertical."""
     axes = [joint.axis for joint in upright_joints(description)]
-    return next(number for number, axis in enumerate(axes, start=1) if abs(axis[2]) < _SLANT)
+    return next(number for number, axis in enumerate(axes, start=1) if abs(axis[2]) < _AXIS_THRESHOLD)
 
 
 def _levers(description: RobotDescription, bodies: Sequence[Sequence[Capsule]]) -> list[float]:
-    """Returns how far from each joint's axis the arm beyond it reaches at most, wherever the later joints are, [m].
+    """Returns the largest distance of the following links from each joint's axis, for any angles of later joints, [m].
 
-    Link by link from the flange. What follows is kept as level rings: centre in the link's frame, radius, and thickness
-    all around. A z joint turns a ring about its axis; any other sweeps it into a ball, which is all thickness.
+    Computed link by link from the flange. The following links are represented by horizontal rings: centre in the link's
+    frame, radius and thickness. A z joint rotates a ring about its axis; any other joint sweeps it into a ball.
     """
     levers: list[float] = []
     rings: list[tuple[float, float, float, float, float]] = []
     for number, joint in reversed(list(enumerate(upright_joints(description), start=1))):
         own = bodies[number] if number < description.n else [c for body in bodies[number:] for c in body]
         rings += [(*point.tolist(), 0.0, c.radius) for c in own for point in (c.start, c.end)]
-        if abs(joint.axis[2]) > _SLANT:
+        if abs(joint.axis[2]) > _AXIS_THRESHOLD:
             rings = [(0.0, 0.0, z, hypot(x, y) + ring, radius) for x, y, z, ring, radius in rings]
             levers.append(max(ring + radius for *_, ring, radius in rings))
         else:

@@ -13,16 +13,16 @@ from rcilab.model.kinematics.forward import Chain, joint_frame_paths
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingFrame:
-    """A frame of the arm in base, and the joint axes that move it. N configurations, of n joints the first m."""
+    """A frame of the arm in base, and the axes of the first m of n joints, which move it, for N configurations."""
 
     axes: Array
     """Directions of the joint axes, shape (N, m, 3)."""
     origins: Array
-    """A point on each of them, shape (N, m, 3), [m]."""
+    """A point on each axis, shape (N, m, 3), [m]."""
     pose: Array
     """The frame in base, shape (N, 4, 4)."""
     n: int
-    """How many joints the arm has."""
+    """Number of joints of the arm."""
 
 
 def moving_frame(chain: Chain, q: JointPath, joints: int, T_joint_frame: Pose) -> MovingFrame:
@@ -31,8 +31,8 @@ def moving_frame(chain: Chain, q: JointPath, joints: int, T_joint_frame: Pose) -
     Args:
         chain: From `rcilab.model.kinematics.forward.build_chain`.
         q: Joint angles, shape (N, n), [rad].
-        joints: How many joints come before it.
-        T_joint_frame: Its pose in the Denavit-Hartenberg frame after the last of them.
+        joints: Number of joints before the frame.
+        T_joint_frame: Pose of the frame in the Denavit-Hartenberg frame after the last of them.
     """
     steps = joint_frame_paths(chain[:joints], q[:, :joints])
     before = np.stack([np.broadcast_to(np.eye(4), (len(q), 4, 4)), *steps[:-1]], axis=1)
@@ -42,7 +42,7 @@ def moving_frame(chain: Chain, q: JointPath, joints: int, T_joint_frame: Pose) -
 def jacobian_path(frame: MovingFrame) -> Array:
     """Returns Jacobians at the frame's origin, shape (N, 6, n), linear rows first, base axes.
 
-    Column i is `[z_i x (p - p_i); z_i]` (Siciliano et al., Robotics, 2009, eq. 3.30); joints behind the frame have
+    Column i is `[z_i x (p - p_i); z_i]` (Siciliano et al., Robotics, 2009, eq. 3.30); joints after the frame have
     columns of zeros.
     """
     count, joints, _ = frame.axes.shape
@@ -53,9 +53,9 @@ def jacobian_path(frame: MovingFrame) -> Array:
 
 
 def drift_path(frame: MovingFrame, dq: JointPath) -> Array:
-    """Returns the acceleration of the frame while the joints have none: dJ/dt dq, shape (N, 6), [m/s^2, rad/s^2].
+    """Returns the acceleration of the frame for zero joint accelerations: dJ/dt dq, shape (N, 6), [m/s^2, rad/s^2].
 
-    The accelerations of a chain, link by link (Siciliano et al., Robotics, 2009, section 7.5.1, with ddq = 0).
+    Recursion of accelerations along the links (Siciliano et al., Robotics, 2009, section 7.5.1, with ddq = 0).
 
     Args:
         frame: From `moving_frame`.

@@ -1,4 +1,4 @@
-"""The circle on which the elbow of a 7-axis arm can move while the tool stays, as geometry in base."""
+"""The circle on which the elbow of a 7-axis arm can move at a fixed pose of the tool, in base."""
 
 from __future__ import annotations
 
@@ -12,32 +12,34 @@ from rcilab.core.arrays import Array, readonly_copy
 from rcilab.core.errors import SingularError
 from rcilab.model.kinematics.arm_angle import reference_frame
 
-_LOOKS = 720  # Arm angles at which a ray is compared with the circle: half a degree; a parabola does the rest.
-_PULL = 1e-3  # [m] per rad: weight of the distance to `near` where a ray passes both sides of the circle. Tuning value.
-_LEAST = 1e-6  # [m] Radius below which the arm counts as stretched, without a circle.
+_SAMPLES = 720  # Arm angles at which a ray is compared with the circle: half a degree, refined by a parabola.
+_NEAR_WEIGHT = (
+    1e-3  # [m/rad] Weight of the difference to `near` if a ray passes both sides of the circle. Tuning value.
+)
+_MIN_RADIUS = 1e-6  # [m] Below it the arm counts as stretched.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ElbowCircle:
-    """Where the elbow can be at one pose of the tool."""
+    """Possible positions of the elbow at one pose of the tool."""
 
     center: Array
     """On the shoulder-wrist line, in base, shape (3,), [m]."""
     radius: float
-    """[m]."""
+    """Radius, [m]."""
     axis: Array
-    """Direction from shoulder to wrist, shape (3,): the arm angle turns about it, right-handed."""
+    """Direction from shoulder to wrist, shape (3,): axis of the arm angle, right-handed."""
     upward: Array
     """Direction from the centre to the elbow at arm angle 0, shape (3,)."""
     across: Array
-    """The same at 90 degrees."""
+    """Direction from the centre to the elbow at arm angle 90 degrees, shape (3,)."""
 
     def points(self, psi: ArrayLike, outward: float = 0.0) -> Array:
         """Returns the elbow at arm angles, shape (N, 3), [m].
 
         Args:
             psi: Arm angles, shape (N,), [rad].
-            outward: How far outside the circle the points shall be, [m].
+            outward: Distance of the points outside the circle, [m].
         """
         angles = np.atleast_1d(np.asarray(psi, dtype=np.float64))[:, None]
         return self.center + (self.radius + outward) * (np.cos(angles) * self.upward + np.sin(angles) * self.across)
@@ -46,22 +48,22 @@ class ElbowCircle:
         """Returns the arm angle, [rad], at which the circle comes closest to a line of sight.
 
         Args:
-            eye: Where the line begins, shape (3,), [m].
+            eye: Start of the line, shape (3,), [m].
             through: Another point on it, shape (3,), [m].
-            near: Which arm angle to prefer, [rad], where the line passes two sides of the circle.
+            near: Preferred arm angle, [rad], if the line passes two sides of the circle.
             outward: As in `points`.
         """
         origin = np.asarray(eye, dtype=np.float64)
-        way = np.asarray(through, dtype=np.float64) - origin
-        way = way / max(float(np.linalg.norm(way)), 1e-12)
-        psi = np.linspace(-pi, pi, _LOOKS, endpoint=False)
-        beside = np.linalg.norm(np.cross(self.points(psi, outward) - origin, way), axis=1)
-        turned = np.abs((psi - near + pi) % tau - pi)
-        best = int((beside + _PULL * turned).argmin())
-        before, here, after = (float(beside[(best + step) % _LOOKS]) for step in (-1, 0, 1))
-        bend = before - 2.0 * here + after
-        step = 0.5 * (before - after) / bend if bend > 1e-12 else 0.0
-        return remainder(float(psi[best]) + min(max(step, -0.5), 0.5) * tau / _LOOKS, tau)
+        direction = np.asarray(through, dtype=np.float64) - origin
+        direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
+        psi = np.linspace(-pi, pi, _SAMPLES, endpoint=False)
+        distance = np.linalg.norm(np.cross(self.points(psi, outward) - origin, direction), axis=1)
+        offset = np.abs((psi - near + pi) % tau - pi)
+        best = int((distance + _NEAR_WEIGHT * offset).argmin())
+        before, center_value, after = (float(distance[(best + step) % _SAMPLES]) for step in (-1, 0, 1))
+        curvature = before - 2.0 * center_value + after
+        step = 0.5 * (before - after) / curvature if curvature > 1e-12 else 0.0
+        return remainder(float(psi[best]) + min(max(step, -0.5), 0.5) * tau / _SAMPLES, tau)
 
 
 def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
@@ -77,7 +79,7 @@ def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
     """
     line = wrist - shoulder
     length = float(np.linalg.norm(line))
-    if length < _LEAST:
+    if length < _MIN_RADIUS:
         raise SingularError("elbow circle: the wrist is on the shoulder, so there is no shoulder-wrist line").coded(
             "no_arm_angle"
         )
@@ -85,7 +87,7 @@ def elbow_circle(shoulder: Array, elbow: Array, wrist: Array) -> ElbowCircle:
     upward, across = reference_frame((float(axis[0]), float(axis[1]), float(axis[2])))
     center = shoulder + axis * float(axis @ (elbow - shoulder))
     radius = float(np.linalg.norm(elbow - center))
-    if radius < _LEAST:
+    if radius < _MIN_RADIUS:
         raise SingularError("elbow circle: the arm is stretched, the elbow is on the shoulder-wrist line").coded(
             "stretched"
         )

@@ -1,4 +1,4 @@
-"""The feasible ranges of the arm angle at a pose, and what forbids the other ranges."""
+"""The feasible ranges of the arm angle at a pose, and the reasons against the other ranges."""
 
 from __future__ import annotations
 
@@ -7,38 +7,38 @@ from math import degrees, remainder, tau
 from typing import Literal, TypeAlias
 
 Reason: TypeAlias = Literal["joint limits", "singularity", "safety box", "reach"]
-"""What forbids an arm angle; "reach": no solution at this angle, which happens on an arm with offsets."""
+"""Reason against an arm angle; "reach": no solution at this angle, possible for an arm with offsets."""
 
 INSIDE = 0.1
-"""How far inside a range an arm angle is chosen automatically, [rad]. Tuning value: some six degrees."""
+"""Distance inside a range of an automatically selected arm angle, [rad]. Tuning value: about six degrees."""
 
-_SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
+_TOLERANCE = 1e-12  # [rad] Rounding of arm angles.
 _LIMITING: frozenset[Reason] = frozenset({"joint limits", "reach"})
 """Reasons for which no branch exists inside the joint limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
-    """A range of arm angles in which nothing changes."""
+    """A range of arm angles with the same branches and reasons."""
 
     start: float
-    """[rad] in [-pi, pi)."""
+    """Start, [rad] in [-pi, pi)."""
     end: float
-    """[rad], above start by at most a full turn."""
+    """End, [rad], above start by at most a full turn."""
     reasons: tuple[Reason, ...]
-    """What forbids it; empty if it is feasible."""
+    """Reasons against it; empty if it is feasible."""
     joints: tuple[int, ...]
-    """Numbers (from 1) of the joints beyond their limits in the branch that breaks fewest; empty if one breaks none."""
+    """Numbers (from 1) of the joints beyond their limits in the branch with the fewest; empty if a branch has none."""
     branches: tuple[int, ...]
-    """Which branches, counted from 0 as in `Solutions.all`, keep every joint limit; empty for an arm with offsets,
-    whose branches begin and end within the circle."""
+    """Branches inside every joint limit, counted from 0 as in `Solutions.all`; empty for an arm with offsets, whose
+    branches begin and end within the circle."""
 
     @property
     def ok(self) -> bool:
         """Whether at least one branch is feasible here."""
         return not self.reasons
 
-    def holds(self, psi: float) -> bool:
+    def contains(self, psi: float) -> bool:
         """Returns whether an arm angle, [rad], is in this range, ends included."""
         return (psi - self.start) % tau <= self.end - self.start
 
@@ -48,7 +48,7 @@ class FeasibleArcs:
     """The whole circle of arm angles at one pose."""
 
     arcs: tuple[Arc, ...]
-    """One after the other, from the smallest start; together a full turn."""
+    """In order, from the smallest start; together a full turn."""
 
     @property
     def feasible(self) -> tuple[tuple[float, float], ...]:
@@ -56,18 +56,18 @@ class FeasibleArcs:
         return _joined([(arc.start, arc.end) for arc in self.arcs if arc.ok])
 
     def nearest(self, psi: float, branch: int | None = None) -> float | None:
-        """Returns the arm angle closest to one, [rad], at which a branch keeps every joint limit; None if none does.
+        """Returns the arm angle closest to `psi`, [rad], at which a branch is inside every joint limit, or None.
 
-        It is `INSIDE` a feasible range, or in the middle of a narrower one, unless the angle asked for is possible
-        itself. Where no range is feasible (the whole circle is singular, the tool is outside the safety box), joint
-        limits alone count.
+        Unless `psi` itself is possible, it is `INSIDE` a feasible range, or in the middle of a narrower one. If no
+        range is feasible (the whole circle is singular, or the tool is outside the safety box), only joint limits
+        count.
 
         Args:
-            psi: Wanted arm angle, [rad].
-            branch: Which branch, 0 to 7, it shall be; None for any.
+            psi: Desired arm angle, [rad].
+            branch: Required branch, 0 to 7; None for any.
         """
-        stands = [arc for arc in self.arcs if _LIMITING.isdisjoint(arc.reasons)]
-        possible = stands if branch is None else [arc for arc in self.arcs if branch in arc.branches]
+        within_limits = [arc for arc in self.arcs if _LIMITING.isdisjoint(arc.reasons)]
+        possible = within_limits if branch is None else [arc for arc in self.arcs if branch in arc.branches]
         if any(_is_within(psi, *ends) for ends in _joined([(arc.start, arc.end) for arc in possible])):
             return remainder(psi, tau)
         found: float | None = None
@@ -81,8 +81,8 @@ class FeasibleArcs:
         return None if found is None else remainder(found, tau)
 
     def at(self, psi: float) -> Arc:
-        """Returns the arc that an arm angle, [rad], is in."""
-        return next((arc for arc in self.arcs if arc.holds(psi)), self.arcs[0])
+        """Returns the arc that contains an arm angle, [rad]."""
+        return next((arc for arc in self.arcs if arc.contains(psi)), self.arcs[0])
 
     def __repr__(self) -> str:
         ranges = ", ".join(f"{degrees(start):.1f} to {degrees(end):.1f}" for start, end in self.feasible)
@@ -92,18 +92,18 @@ class FeasibleArcs:
 
 
 def _is_within(psi: float, start: float, end: float) -> bool:
-    """Returns whether an arm angle is in a range, ends excluded: there a joint is at its limit."""
-    return end - start > tau - _SAME or 0.0 < (psi - start) % tau < end - start
+    """Returns whether an arm angle is in a range, without its ends, at which a joint is at its limit."""
+    return end - start > tau - _TOLERANCE or 0.0 < (psi - start) % tau < end - start
 
 
 def _joined(ranges: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Returns ranges of a circle, given in order, with those in one that meet."""
+    """Returns ordered ranges of a circle, with adjacent ones merged."""
     joined: list[tuple[float, float]] = []
     for start, end in ranges:
-        if joined and start - joined[-1][1] < _SAME:
+        if joined and start - joined[-1][1] < _TOLERANCE:
             start = joined.pop()[0]
         joined.append((start, end))
-    if len(joined) > 1 and abs(joined[0][0] + tau - joined[-1][1]) < _SAME:
+    if len(joined) > 1 and abs(joined[0][0] + tau - joined[-1][1]) < _TOLERANCE:
         joined[-1] = joined[-1][0], joined[0][1] + tau
         del joined[0]
     return tuple(joined)

@@ -18,11 +18,11 @@ from rcilab.robots.description import DhRow
 Chain: TypeAlias = tuple[tuple[float, float, float, float, float], ...]
 """Per joint: theta offset, d, a, cos(alpha), sin(alpha); lengths in [m], angles in [rad]."""
 
-_EXACT = 1e-12  # cos(pi/2) is 6e-17 in floats; a right angle in the table is meant exactly.
+_EXACT = 1e-12  # cos(pi/2) is 6e-17 in floats; right angles in the table are exact.
 
 
 def build_chain(dh: Sequence[DhRow]) -> Chain:
-    """Returns the constants of a Denavit-Hartenberg table in the form the functions below walk."""
+    """Returns the constants of a Denavit-Hartenberg table in the form used by the functions below."""
     return tuple((row.theta_offset, row.d, row.a, _snap(cos(row.alpha)), _snap(sin(row.alpha))) for row in dh)
 
 
@@ -103,7 +103,7 @@ def joint_frame_paths(chain: Chain, q: JointPath) -> list[Array]:
 
 
 def position_path(chain: Chain, q: JointPath, point: Sequence[float] = (0.0, 0.0, 0.0)) -> Array:
-    """Returns where a point of the flange is in base along a path; a tenth of the work of `forward_path`.
+    """Returns the positions of a point of the flange in base along a path; a tenth of the time of `forward_path`.
 
     Args:
         chain: From `build_chain`.

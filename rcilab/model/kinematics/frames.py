@@ -1,4 +1,4 @@
-"""The named frames of an arm: those after each joint, the flange, the tool, the stiffness frame."""
+"""The named frames of an arm: after each joint, flange, tool and stiffness frame."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ Frame: TypeAlias = Literal[
     "joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "joint7", "flange", "tool", "stiffness"
 ]
 """joint1 to jointn: Denavit-Hartenberg frames after each joint; the last one is the flange. The vendor's library has
-the same ones; there the tool is called end effector."""
+the same frames; it calls the tool the end effector."""
 
 
 def locate(frame: str, n: int, T_flange_tool: Pose, T_tool_stiffness: Pose) -> tuple[int, Pose]:
-    """Returns how many joints come before a frame, and its pose in the frame after the last of them.
+    """Returns the number of joints before a frame, and its pose in the frame after the last of them.
 
     Args:
-        frame: Its name.
-        n: How many joints the arm has.
+        frame: Name of the frame.
+        n: Number of joints of the arm.
         T_flange_tool: Pose of the tool in the flange.
         T_tool_stiffness: Pose of the stiffness frame in the tool.
 
     Raises:
-        InvalidValueError: The arm has no such frame; the message lists those it has.
+        InvalidValueError: The arm has no frame of this name; the message lists its frames.
     """
     if frame == "tool":
         return n, T_flange_tool

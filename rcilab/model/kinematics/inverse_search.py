@@ -1,6 +1,6 @@
-"""Inverse kinematics of the flange inside the joint limits: at a given arm angle, else at the closest with a solution.
+"""Inverse kinematics of the flange inside the joint limits: at a given arm angle, or the closest with a solution.
 
-The error of an unreachable pose says by what distance, or which joint limit is exceeded and by how much.
+The error of an unreachable pose has the missing distance, or the exceeded joint limit and the excess.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.robots.description import RobotDescription
 
-_LOOKS = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
-"""Offsets of the arm angle to try, nearest first, for the error of a pose that no arm angle reaches, [rad]."""
+_OFFSETS = tuple(math.radians(sign * step) for step in range(10, 181, 10) for sign in (1, -1))
+"""Offsets of the arm angle to try, smallest first, for the error of a pose that is unreachable at every one, [rad]."""
 
 
 class InverseSearch:
@@ -26,7 +26,7 @@ class InverseSearch:
         description: The arm.
 
     Raises:
-        ModelError: No solver serves the arm.
+        ModelError: No solver supports the arm.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -36,15 +36,15 @@ class InverseSearch:
         self._upper: list[float] = self._joint.upper.tolist()
 
     def solve(self, T_base_flange: Pose, psi: float | None, near: Sequence[float] | None) -> Solutions:
-        """Returns the solutions at an arm angle; at that of `near` when none is asked for, or else at the closest.
+        """Returns the solutions at an arm angle; if None, at that of `near`, or at the closest that has solutions.
 
         Args:
             T_base_flange: Pose of the flange in base.
-            psi: Arm angle, [rad]; None leaves it open, and is all that 6 axes know.
-            near: Joint angles, [rad], that decide what a singular pose leaves open.
+            psi: Arm angle, [rad]; None leaves it open, and is required for 6 axes.
+            near: Joint angles, [rad], that resolve the ambiguity of a singular pose.
 
         Raises:
-            UnreachableError: There is no solution; the message says why.
+            UnreachableError: No solution exists; the message has the reason.
         """
         start = psi
         if start is None and self.solver.redundancy:
@@ -64,7 +64,7 @@ class InverseSearch:
         raise best.refusal(everywhere=True)
 
     def arcs(self, T_base_flange: Pose, outside_box: bool = False) -> FeasibleArcs:
-        """Returns which arm angles a pose of the flange leaves, and what forbids the others.
+        """Returns the feasible arm angles of a pose of the flange, and the reasons against the others.
 
         Raises:
             UnreachableError: The pose is out of reach at every arm angle.
@@ -82,11 +82,11 @@ class InverseSearch:
             return 0.0
 
     def _other_arm_angles(self, T_base_flange: Pose, start: float) -> Iterator[float]:
-        """Yields the closest arm angle that has a solution if one has; then steps all round, to see what is missing."""
+        """Yields the closest arm angle with a solution, if any; then others, to find the smallest excess."""
         closest = self.arcs(T_base_flange).nearest(start)
         if closest is not None:
             yield closest
-        yield from (math.remainder(start + offset, math.tau) for offset in _LOOKS)
+        yield from (math.remainder(start + offset, math.tau) for offset in _OFFSETS)
 
 
 def _least_excess(solutions: Solutions) -> float:

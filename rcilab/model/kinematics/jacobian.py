@@ -32,7 +32,7 @@ def jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTITY) -
 def tool_jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTITY) -> tuple[Matrix, Rotation9]:
     """Returns the Jacobian as `jacobian` does, and the rotation of the tool in base, nine numbers row by row.
 
-    One walk along the arm in plain floats, a third of the cost of one over `Pose` objects.
+    One pass along the arm in plain floats takes a third of the time of one over `Pose` objects.
     """
     # Columns x, y, z of the rotation and the position p, all in base.
     xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
@@ -49,7 +49,7 @@ def tool_jacobian(chain: Chain, q: Sequence[float], T_flange_tool: Pose = IDENTI
         if a:
             px, py, pz = px + a * ux, py + a * uy, pz + a * uz
         xx, xy, xz = ux, uy, uz
-        if not ca:  # Most neighbouring axes are at right angles.
+        if not ca:  # Most neighbouring axes are perpendicular.
             yx, yy, yz, zx, zy, zz = sa * zx, sa * zy, sa * zz, -sa * vx, -sa * vy, -sa * vz
         else:
             yx, yy, yz, zx, zy, zz = (

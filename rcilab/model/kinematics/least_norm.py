@@ -1,4 +1,4 @@
-"""The inverse of a Jacobian: the smallest joint motion for a wanted tool motion, bounded at singularities."""
+"""The inverse of a Jacobian: the smallest joint motion for a desired tool motion, bounded at singularities."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ NEAR_SINGULAR = 0.03  # [m, rad] Smallest singular value that is inverted undamp
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointRates:
-    """The joint motion that comes closest to a wanted motion of a frame. With a leading N where N were asked for."""
+    """The joint motion closest to a desired motion of a frame; with a leading dimension N for N motions."""
 
     rates: Array
     """Joint velocities, [rad/s], or accelerations, [rad/s^2], shape (n,)."""
     damped: NDArray[np.bool_]
-    """Whether the arm is so close to a singularity that the answer was damped, shape ()."""
+    """Whether the result is damped because of a singularity, shape ()."""
     missed: Array
-    """What is missing of the wanted motion, base axes, shape (6,), linear part first: wanted minus J @ rates."""
+    """Missing part of the desired motion, base axes, shape (6,), linear part first: desired minus J @ rates."""
 
     def __repr__(self) -> str:
         if self.rates.ndim > 1:
@@ -31,22 +31,22 @@ class JointRates:
         return f"<JointRates {rates}, {note}>"
 
 
-def least_norm(J: Array, wanted: Array, weights: Array) -> JointRates:
-    """Returns the joint rates of least weighted norm, sum(weights * rates^2), with J @ rates = wanted.
+def least_norm(J: Array, desired: Array, weights: Array) -> JointRates:
+    """Returns the joint rates of least weighted norm, sum(weights * rates^2), with J @ rates = desired.
 
     From the singular values s of J W^(-1/2) (Siciliano et al., Robotics, 2009, section 3.5). A direction whose s is
     below `NEAR_SINGULAR` gets s / NEAR_SINGULAR^2 in place of 1 / s: damped least squares with the damping chosen
-    for each direction (section 3.5.2), so that rates stay bounded and all other directions stay exact.
+    for each direction (section 3.5.2), so that rates are bounded and all other directions are exact.
 
     Args:
         J: Jacobians, shape (..., 6, n).
-        wanted: Motions of the frame, shape (..., 6).
-        weights: What a joint's motion costs, shape (n,), positive; only their ratios matter.
+        desired: Motions of the frame, shape (..., 6).
+        weights: Costs of the joints' motions, shape (n,), positive; only their ratios matter.
     """
     scale = np.sqrt(weights.mean() / weights)
     U, s, Vt = np.linalg.svd(J * scale, full_matrices=False)
     gain = s / np.square(np.maximum(s, NEAR_SINGULAR))
-    along = np.einsum("...ij,...i->...j", U, wanted)
-    rates = scale * np.einsum("...ji,...j->...i", Vt, gain * along)
-    missed = wanted - np.einsum("...ij,...j->...i", J, rates)
+    components = np.einsum("...ij,...i->...j", U, desired)
+    rates = scale * np.einsum("...ji,...j->...i", Vt, gain * components)
+    missed = desired - np.einsum("...ij,...j->...i", J, rates)
     return JointRates(rates=rates, damped=np.asarray(s[..., -1] < NEAR_SINGULAR), missed=missed)

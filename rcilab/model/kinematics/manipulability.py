@@ -1,4 +1,4 @@
-"""How close a configuration is to losing a direction of motion, from the singular values of its Jacobian."""
+"""Measures of the closeness to a singularity, from the singular values of the Jacobian."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class Manipulability:
     manipulability: float
     """sqrt(det(J J^T)): product of the singular values (Yoshikawa 1985); 0 at a singularity."""
     smallest: float
-    """Smallest singular value: the tool velocity that unit joint velocity gives in the worst direction."""
+    """Smallest singular value: the tool velocity of unit joint velocity in the worst direction."""
     condition: float
     """Largest over smallest singular value; infinite at a singularity."""
 
 
 def manipulability_of(J: Matrix) -> Manipulability:
-    """Returns the dexterity measures of a Jacobian, shape (6, n), metres and radians taken as they are."""
+    """Returns the dexterity measures of a Jacobian, shape (6, n), in m and rad."""
     values = np.linalg.svd(J, compute_uv=False)
     smallest, largest = float(values[-1]), float(values[0])
     return Manipulability(float(np.prod(values)), smallest, largest / smallest if smallest > 0.0 else float("inf"))

@@ -56,14 +56,14 @@ class MovingArm:
         return T @ self.T_flange_tool if self._has_tool else T
 
     def pose(self, q: ArrayLike, frame: Frame = "tool") -> Pose:
-        """Returns the pose of a frame of the arm in base (GetCartPose); `forward` is the short way for the tool.
+        """Returns the pose of a frame of the arm in base (GetCartPose); for the tool see also `forward`.
 
         Args:
             q: Joint angles, shape (n,), [rad]; limits are not checked.
             frame: joint1 to jointn, flange, tool or stiffness.
 
         Raises:
-            InvalidValueError: q is not n finite numbers, or there is no such frame.
+            InvalidValueError: q is not n finite numbers, or the frame is unknown.
         """
         joints, T_joint_frame = self._locate(frame)
         return forward_kinematics.forward(self._chain[:joints], self._floats(q)[:joints]) @ T_joint_frame
@@ -76,7 +76,7 @@ class MovingArm:
         return T if T_joint_frame is IDENTITY else T @ T_joint_frame.matrix
 
     def position_path(self, q: ArrayLike) -> Array:
-        """Returns where the tool is in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
+        """Returns the positions of the tool in base along a path, shape (N, 3), [m], for q of shape (N, n)."""
         point = self.T_flange_tool.parts[1]
         return forward_kinematics.position_path(self._chain, as_path(q, self.n, "q", "rad"), point)
 
@@ -87,8 +87,8 @@ class MovingArm:
     def jacobian(self, q: ArrayLike, frame: Frame = "tool") -> Array:
         """Returns the Jacobian at the origin of a frame (Jacobian), linear rows first, base axes.
 
-        The vendor's library gives something else for the tool and the stiffness frame; this is the derivative of
-        `pose` for every frame.
+        It is the derivative of `pose` for every frame. The vendor's library differs for the tool and the stiffness
+        frame.
 
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
@@ -98,7 +98,7 @@ class MovingArm:
             Shape (6, n) or (N, 6, n), [m/rad] and [rad/rad].
 
         Raises:
-            InvalidValueError: q has another shape or is not finite, or there is no such frame.
+            InvalidValueError: q has another shape or is not finite, or the frame is unknown.
         """
         if frame == "tool" and getattr(q, "ndim", 0) == 1:
             return jacobian(self._chain, self._floats(q), self.T_flange_tool)
@@ -149,16 +149,16 @@ class MovingArm:
 
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
-            twist: Wanted motion in base axes, shape (6,) or (N, 6), linear part first, [m/s, rad/s].
+            twist: Desired motion in base axes, shape (6,) or (N, 6), linear part first, [m/s, rad/s].
             weights: Relative costs of the joints' motions, shape (n,), positive; all equal when absent.
-            frame: joint1 to jointn, flange, tool or stiffness. What fewer than 6 joints move is always damped.
+            frame: joint1 to jointn, flange, tool or stiffness. A frame moved by fewer than 6 joints is always damped.
 
         Raises:
             InvalidValueError: An argument has another shape or is not finite, a weight is not positive.
         """
         angles = as_rows(q, self.n, "q", "rad")
-        wanted = as_rows(twist, 6, "twist", "m/s, rad/s", angles)
-        return least_norm(self.jacobian(angles, frame), wanted, self._weights(weights))
+        desired = as_rows(twist, 6, "twist", "m/s, rad/s", angles)
+        return least_norm(self.jacobian(angles, frame), desired, self._weights(weights))
 
     def joint_acceleration(
         self,
@@ -173,7 +173,7 @@ class MovingArm:
         Args:
             q: Joint angles, shape (n,) or (N, n), [rad].
             dq: Joint velocities, of q's shape, [rad/s].
-            acceleration: Wanted, in base axes, shape (6,) or (N, 6), linear part first, [m/s^2, rad/s^2].
+            acceleration: Desired acceleration, in base axes, shape (6,) or (N, 6), linear part first, [m/s^2, rad/s^2].
             weights: As for `joint_velocity`.
             frame: joint1 to jointn, flange, tool or stiffness.
 
@@ -181,9 +181,9 @@ class MovingArm:
             InvalidValueError: As for `joint_velocity`.
         """
         angles = as_rows(q, self.n, "q", "rad")
-        wanted = as_rows(acceleration, 6, "acceleration", "m/s^2, rad/s^2", angles)
+        desired = as_rows(acceleration, 6, "acceleration", "m/s^2, rad/s^2", angles)
         drift = self.acceleration(angles, dq, np.zeros(angles.shape), frame)
-        return least_norm(self.jacobian(angles, frame), wanted - drift, self._weights(weights))
+        return least_norm(self.jacobian(angles, frame), desired - drift, self._weights(weights))
 
     def _locate(self, frame: str) -> tuple[int, Pose]:
         return locate(frame, self.n, self.T_flange_tool, self.T_tool_stiffness)
@@ -203,7 +203,7 @@ class MovingArm:
         """Returns q as n finite plain floats; cheap for an array.
 
         Raises:
-            InvalidValueError: It is not n finite numbers, or an angle is so large that it must be in degrees.
+            InvalidValueError: It is not n finite numbers, or an angle is too large for radians.
         """
         if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
             values = q.tolist()

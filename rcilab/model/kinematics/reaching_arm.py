@@ -1,4 +1,4 @@
-"""Inverse kinematics of an arm with its tool, and why a pose cannot be reached."""
+"""Inverse kinematics of an arm with its tool."""
 
 from __future__ import annotations
 
@@ -54,20 +54,20 @@ class ReachingArm(MovingArm):
         """Returns every solution inside the joint limits (GetJointPos); `.nearest(q)` is the vendor's answer.
 
         The xMates have 8 solutions at an arm angle. The Panda has offsets and 0 to 16 solutions, the roots of a
-        polynomial, which takes one or two milliseconds. Of two that almost coincide one may be missing; the one next
+        polynomial, which takes one or two milliseconds. Of two almost equal solutions one may be missing; the one next
         to `near` is always found. An arm without closed form is solved by iteration: every returned solution is exact,
         but some may be missing.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            psi: Arm angle of a 7-axis arm, [rad]; of the Panda the angle of joint 3. When absent: that of `near`, or 0;
-                and if nothing is inside the limits there, the closest arm angle that has a solution, a little inside
+            psi: Arm angle of a 7-axis arm, [rad]; for the Panda the angle of joint 3. When absent: that of `near`, or
+                0; if no solution is inside the limits there, the closest arm angle with a solution, slightly inside
                 its range.
             near: Joint angles, [rad], that resolve the ambiguity of a singular pose.
 
         Raises:
-            UnreachableError: The pose is out of reach, or every branch exceeds a joint limit; the message says by how
-                much, and `.distance`, `.joint` and `.excess` hold the numbers.
+            UnreachableError: The pose is out of reach, or every branch exceeds a joint limit; the message has the
+                amount, also in `.distance`, `.joint` and `.excess`.
             InvalidValueError: T, psi or near is not usable, or psi was given for a 6-axis arm.
         """
         pose = T if isinstance(T, Pose) else Pose.from_matrix(T)
@@ -89,8 +89,8 @@ class ReachingArm(MovingArm):
         """Returns joint angles for a target, or for the closest reachable pose.
 
         Args:
-            T: Wanted pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
-            near: Present joint angles, shape (n,), [rad]: the start of the search and its branch.
+            T: Desired pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
+            near: Current joint angles, shape (n,), [rad]: the start of the search and its branch.
             psi: Arm angle of a 7-axis arm, [rad]; that of `near` when absent.
 
         Raises:
@@ -98,10 +98,10 @@ class ReachingArm(MovingArm):
         """
         q = as_vector(near, self.n, "near", "rad")
         target = T if isinstance(T, Pose) else Pose.from_matrix(T)
-        held = self._search.natural_psi(q.tolist()) if psi is None and self.redundancy else psi
+        arm_angle = self._search.natural_psi(q.tolist()) if psi is None and self.redundancy else psi
 
         def solve(pose: Pose, may_search: bool) -> Solutions:
-            return self.inverse(pose, psi if may_search else held, q)
+            return self.inverse(pose, psi if may_search else arm_angle, q)
 
         return closest_reachable(solve, self.solver.envelope, self.T_flange_tool, self.forward(q), q, target)
 
@@ -110,10 +110,10 @@ class ReachingArm(MovingArm):
 
         Args:
             T: Poses of the tool in base, shape (N, 4, 4), such as `forward_path` gives.
-            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
+            psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); not used for 6 axes.
 
         Returns:
-            `.q`, shape (N, 8, n), not a number where a pose is out of reach; `.inside`; `.nearest(q)`.
+            `.q`, shape (N, 8, n), NaN for a pose out of reach; `.inside`; `.nearest(q)`.
 
         Raises:
             InvalidValueError: T or psi has another shape, is not finite, or contains an invalid pose.
@@ -129,7 +129,7 @@ class ReachingArm(MovingArm):
         return SolutionBatch(self.solver.batch(flange, angles), joint.lower, joint.upper)
 
     def feasible_arcs(self, T: Pose | ArrayLike, box: SafetyBox | None = None) -> FeasibleArcs:
-        """Returns the feasible arm angles of a 7-axis arm at a pose, and what forbids the others.
+        """Returns the feasible arm angles of a 7-axis arm at a pose, and the reasons against the others.
 
         Args:
             T: Pose of the tool in base: a `Pose` or a homogeneous matrix, shape (4, 4).
@@ -160,14 +160,14 @@ class ReachingArm(MovingArm):
         return self.solver.redundancy_angle(self._floats(q))
 
     def elbow_circle(self, q: ArrayLike) -> ElbowCircle:
-        """Returns the circle on which the elbow of a 7-axis xMate can move while the tool stays.
+        """Returns the circle on which the elbow of a 7-axis xMate can move at a fixed pose of the tool.
 
         Args:
             q: Joint angles, shape (7,), [rad].
 
         Raises:
             SingularError: The arm is stretched, or shoulder and wrist are above each other.
-            KinematicsError: The arm has 6 axes, or offsets, with which its elbow does not move on a circle.
+            KinematicsError: The arm has 6 axes, or has offsets, so that its elbow does not move on a circle.
         """
         self._require_arm_angle()
         if self.redundancy.kind != "arm_angle":

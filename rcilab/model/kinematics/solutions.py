@@ -1,4 +1,4 @@
-"""Solutions of the inverse: every analytic branch, and which of them are inside the joint limits."""
+"""Solutions of the inverse: every analytic branch, and those inside the joint limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.core.arrays import JointVector, as_vector, readonly_copy
 from rcilab.core.errors import UnreachableError
 from rcilab.core.limits import JointLimits
 
-_AT_LIMIT = 1e-3  # [rad] An excess of less than 0.1 deg is not worth a number.
+_AT_LIMIT = 1e-3  # [rad] A smaller excess, below 0.1 deg, is not given as a number.
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +23,9 @@ class Branch:
     q: tuple[float, ...]
     """Joint angles, [rad]."""
     joint: int | None
-    """Number (from 1) of the joint that is furthest beyond its limit; None inside all limits."""
+    """Number (from 1) of the joint farthest beyond its limit; None inside all limits."""
     excess: float
-    """How far that joint is beyond its limit, [rad]; 0 inside all limits."""
+    """Excess of that joint over its limit, [rad]; 0 inside all limits."""
 
     @property
     def ok(self) -> bool:
@@ -34,9 +34,9 @@ class Branch:
 
 
 class Solutions(Sequence[JointVector]):
-    """The joint configurations that put the tool at a pose, those inside the joint limits.
+    """The joint configurations for a pose of the tool that are inside the joint limits.
 
-    Iterating gives arrays of shape (n,), [rad]. `all` also holds the branches that a limit forbids.
+    Iteration gives arrays of shape (n,), [rad]. `all` also has the branches outside the limits.
     """
 
     __slots__ = ("_all", "_branches", "_feasible", "_limits", "_lower", "_upper", "psi")
@@ -57,7 +57,7 @@ class Solutions(Sequence[JointVector]):
 
     @property
     def all(self) -> tuple[Branch, ...]:
-        """Every analytic branch with the joint that forbids it; computed on first access."""
+        """Every analytic branch with the joint that exceeds its limit; computed on first access."""
         if self._all is None:
             self._all = tuple(_branch(q, self._lower, self._upper) for q in self._branches)
         return self._all
@@ -81,18 +81,18 @@ class Solutions(Sequence[JointVector]):
         """
         if not len(self._feasible):
             raise self.refusal()
-        here = as_vector(q, len(self._lower), "q", "rad")
-        turns = np.round((here - self._feasible) / tau) * tau
-        turned = self._feasible + turns
-        inside = (turned > self._lower) & (turned < self._upper)
-        candidates = np.where(inside, turned, self._feasible)
-        return readonly_copy(candidates[np.argmin(((candidates - here) ** 2).sum(axis=1))])
+        reference = as_vector(q, len(self._lower), "q", "rad")
+        turns = np.round((reference - self._feasible) / tau) * tau
+        shifted = self._feasible + turns
+        inside = (shifted > self._lower) & (shifted < self._upper)
+        candidates = np.where(inside, shifted, self._feasible)
+        return readonly_copy(candidates[np.argmin(((candidates - reference) ** 2).sum(axis=1))])
 
     def refusal(self, *, everywhere: bool = False) -> UnreachableError:
-        """Returns the error that names the joint limit that is exceeded, for the branch that exceeds it least.
+        """Returns the error with the exceeded joint limit, for the branch with the smallest excess.
 
         Args:
-            everywhere: Whether no other arm angle does better either.
+            everywhere: Whether every arm angle was tried.
         """
         if not self.all:
             where = "" if self.psi is None else f" at arm angle {degrees(self.psi):.1f} deg"

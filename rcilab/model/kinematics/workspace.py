@@ -12,19 +12,19 @@ from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.model.kinematics.manipulability import ManipulabilityPath, dexterity_path
 from rcilab.model.kinematics.moving_arm import MovingArm
 
-_MOST = 1_000_000  # Samples: they take about 200 MB while they are computed.
+_MAX_SAMPLES = 1_000_000  # They take about 200 MB during computation.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Workspace:
-    """N configurations spread over the joint ranges, and the tool positions."""
+    """N random configurations in the joint ranges, and their tool positions."""
 
     q: JointPath
     """Joint angles, shape (N, n), [rad]."""
     position: Array
     """Origin of the tool in base, shape (N, 3), [m]."""
     dexterity: ManipulabilityPath
-    """Manipulability there."""
+    """Manipulability of the configurations."""
 
     def __len__(self) -> int:
         return len(self.q)
@@ -48,13 +48,13 @@ def sample_workspace(
         upper: Largest joint angles, shape (n,), [rad].
         count: Number of configurations to try.
         seed: Seed of the random numbers.
-        box: Keeps only samples with the tool in it; all when absent or not active.
+        box: Only samples with the tool inside are returned; all when absent or not active.
 
     Raises:
         InvalidValueError: `count` is not from 1 to 1 000 000, `seed` is negative, or the box is not valid.
     """
-    if not isinstance(count, int | np.integer) or not 1 <= count <= _MOST:
-        raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MOST}")
+    if not isinstance(count, int | np.integer) or not 1 <= count <= _MAX_SAMPLES:
+        raise InvalidValueError("count", described(count), f"must be a whole number from 1 to {_MAX_SAMPLES}")
     if not isinstance(seed, int | np.integer) or seed < 0:
         raise InvalidValueError("seed", described(seed), "must be a whole number, 0 or more")
     q = np.random.default_rng(seed).uniform(lower, upper, (count, arm.n))
