@@ -6,7 +6,8 @@ from math import ceil, degrees, floor, isfinite
 
 from rcilab.conformance.catalogue import Phrase
 from rcilab.core.condition import Condition, Signal
-from rcilab.motion.motion import Motion, TimeLaw
+from rcilab.motion.joint import JOINT_LAWS
+from rcilab.motion.motion import Motion
 
 
 def share(ratio: float) -> str:
@@ -65,7 +66,7 @@ def advise(
     # One displaced sample changes two first differences, three second and four third ones.
     if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
         return Phrase("advice.jump")
-    if motion.law in _PLANNED:
+    if motion.law in JOINT_LAWS:
         lower = floor(100.0 * motion.speed / ratio) / 100.0
         if 0.0 < lower < motion.speed:
             return Phrase("advice.speed_to", speed=f"{lower:.2f}")
@@ -88,13 +89,9 @@ _REMEDIES: dict[Signal, str] = {
 """Remedies for signals that are out of bounds themselves, not by a derivative; the default is the joint's range."""
 
 
-_PLANNED: tuple[TimeLaw, ...] = ("jerk_limited", "torque_rate_limited", "s_profile")
-"""Time laws whose planners have a speed."""
-
-
 def _torque_advice(condition: Condition, motion: Motion) -> Phrase:
     if condition.necessity == "necessary":
         return Phrase("advice.torque.rate" if condition.order == 1 else "advice.torque.range")
     if condition.order == 1 and motion.law == "jerk_limited":
-        return Phrase("advice.gentler")
-    return Phrase("advice.speed" if motion.law in _PLANNED else "advice.softer")
+        return Phrase("advice.torque_rate_limited")
+    return Phrase("advice.speed" if motion.law in JOINT_LAWS else "advice.softer")
