@@ -36,7 +36,8 @@ def exhibit_fault(demo: FaultDemo) -> Exhibition:
     """Returns a provoked fault as scene, timeline and curves draw it."""
 
     def draw(motion: Motion) -> Plan:
-        checked = Motion.from_cycles(motion.q[: demo.sample + 1])  # The rest is the controller's stop.
+        reported = round(demo.moment / CYCLE_TIME)
+        checked = Motion.from_cycles(motion.q[: reported + 1])  # The rest is the controller's stop.
         return build_plan_view(demo.model, motion, check(checked, demo.model, distance=None))
 
     commanded = demo.commanded
@@ -44,7 +45,7 @@ def exhibit_fault(demo: FaultDemo) -> Exhibition:
         plan=draw(commanded),
         scene=draw(demo.moved),
         run=Run(plan=commanded, cycles=demo.whole, model=demo.model),
-        moment=demo.sample * CYCLE_TIME,
+        moment=demo.moment,
     )
 
 
@@ -52,11 +53,6 @@ def exhibit_run(run: Run, model: RobotModel) -> Exhibition | None:
     """Returns a run of `execute` or of a callback as it is drawn; None where there is too little to draw."""
     if len(run.cycles) < _FEWEST:
         return None
-    motion = run.plan or _commanded(run)
+    motion = run.plan or run.commanded()
     plan = build_plan_view(model, motion, check(motion, model, distance=None))
     return Exhibition(plan=plan, scene=plan, run=run)
-
-
-def _commanded(run: Run) -> Motion:
-    """Returns what a callback commanded, each row at the time of its command; of torques, the measured angles."""
-    return Motion.from_cycles(run.q if run.setup.mode == "torque" else run.q_c[run.delay :])

@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.control_process.layout import ControlBlock
 from rcilab.control_process.ring import RingReader
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import state_cycles
 from rcilab.recording.run import find_delay
 
 _PERIOD = 0.5  # [s] between two samples; the delay changes slowly.
@@ -43,5 +44,5 @@ class RoundTrip:
         self._fields = {**self._fields, "answer_time": 1e-9 * float(np.median(rows["sent_ns"] - rows["received_ns"]))}
         command = rows["command"]
         if np.isfinite(command).all() and np.ptp(command, axis=0).max() > _MIN_MOTION:
-            self._fields["round_trip"] = CYCLE_TIME * find_delay(rows["q_c"], command)
+            self._fields["round_trip"] = CYCLE_TIME * state_cycles(rows) * find_delay(rows["q_c"], command)
         return self._fields

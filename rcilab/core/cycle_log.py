@@ -96,6 +96,13 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     )
 
 
+def state_cycles(rows: NDArray[np.void]) -> int:
+    """Returns from how many cycles to the next a controller sends its state: the shortest step of recorded rows."""
+    steps = np.diff(rows["message_id"].astype(np.int64))
+    steps = steps[steps > 0]
+    return int(steps.min()) if steps.size else 1
+
+
 def _shape(name: str, n: int) -> tuple[int, ...]:
     if name in _POSES:
         return (4, 4)

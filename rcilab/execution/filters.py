@@ -29,11 +29,12 @@ _NEAR = 1e-7  # [rad, m or N m] In one cycle that is a jerk of 100 units/s^3.
 _ARRIVED = 1e-12  # [rad or m] Rounding.
 
 
-def smoothing(cut_off: float) -> float:
-    """Returns k of the first-order filter x += k (u - x) at 1 kHz: dt / (dt + 1 / (2 pi f)); 1 at 1000 Hz and above.
+def smoothing(cut_off: float, period: int = 1) -> float:
+    """Returns k of the first-order filter x += k (u - x): dt / (dt + 1 / (2 pi f)); 1 at 1000 Hz and above.
 
     Args:
         cut_off: f, [Hz].
+        period: dt, [cycles].
 
     Raises:
         InvalidValueError: It is not above 0.
@@ -41,7 +42,9 @@ def smoothing(cut_off: float) -> float:
     frequency = as_number(cut_off, "cut_off", "Hz")
     if not frequency > 0.0:
         raise InvalidValueError("cut_off", cut_off, f"must be above 0 [Hz]; {FILTER_OFF:g} switches the filter off")
-    return 1.0 if frequency >= FILTER_OFF else CYCLE_TIME / (CYCLE_TIME + 1.0 / (math.tau * frequency))
+    return (
+        1.0 if frequency >= FILTER_OFF else period * CYCLE_TIME / (period * CYCLE_TIME + 1.0 / (math.tau * frequency))
+    )
 
 
 def low_pass(u: Array, x: Array, k: float) -> Array:
@@ -144,13 +147,14 @@ class LowPass:
 
     Args:
         cut_off: Cut-off frequency, [Hz]; the vendor's client uses 100 by default.
+        period: Cycles from one command to the next.
 
     Raises:
         InvalidValueError: The frequency is not above 0.
     """
 
-    def __init__(self, cut_off: float) -> None:
-        self._k = smoothing(cut_off)
+    def __init__(self, cut_off: float, period: int = 1) -> None:
+        self._k = smoothing(cut_off, period)
         self._last: Command | None = None
 
     def begin(self, command: Command) -> None:
@@ -181,15 +185,17 @@ class RateLimiter:
 
     Args:
         limits: Bounds of the arm, from the manual's table or the vendor's (`cartesian_limits`); `LIMIT_MARGIN` is kept.
+        period: Cycles from one command to the next. Everything here is per cycle of 1 ms, so bounds of a longer period
+            are scaled: what a command may change by is the same.
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: Limits, period: int = 1) -> None:
         joint, c, psi = limits.joint, limits.cartesian, limits.arm_angle
-        self._joint = _bounds(joint.velocity, joint.acceleration, joint.jerk)
-        self._translation = _bounds(c.translation_velocity, c.translation_acceleration, c.translation_jerk)
-        self._rotation = _bounds(c.rotation_velocity, c.rotation_acceleration, c.rotation_jerk)
-        self._psi = None if psi is None else _bounds(psi.velocity, psi.acceleration, psi.jerk)
-        self._torque_step = LIMIT_MARGIN * joint.torque_rate * CYCLE_TIME
+        self._joint = _bounds(joint.velocity, joint.acceleration, joint.jerk, period)
+        self._translation = _bounds(c.translation_velocity, c.translation_acceleration, c.translation_jerk, period)
+        self._rotation = _bounds(c.rotation_velocity, c.rotation_acceleration, c.rotation_jerk, period)
+        self._psi = None if psi is None else _bounds(psi.velocity, psi.acceleration, psi.jerk, period)
+        self._torque_step = LIMIT_MARGIN * joint.torque_rate * period * CYCLE_TIME
         self._command: Command | None = None  # The last one before the limiter.
         self._sent: Command | None = None
         self._rates: list[SignalState] = []
@@ -293,8 +299,10 @@ def _is_allowed(acceleration: Array, last: SignalState, bounds: Bounds) -> bool:
     )
 
 
-def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | Array) -> Bounds:
-    return Bounds(LIMIT_MARGIN * velocity, LIMIT_MARGIN * acceleration, LIMIT_MARGIN * jerk)
+def _bounds(velocity: float | Array, acceleration: float | Array, jerk: float | Array, period: int) -> Bounds:
+    return Bounds(
+        LIMIT_MARGIN * velocity * period, LIMIT_MARGIN * acceleration * period**2, LIMIT_MARGIN * jerk * period**3
+    )
 
 
 def _standstill(size: int) -> SignalState:

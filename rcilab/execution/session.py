@@ -40,7 +40,7 @@ from rcilab.makers.driver import (
     require_signal,
     require_timeout,
 )
-from rcilab.makers.maker import capabilities_of, find_lack, require_driver, require_feature, require_parts
+from rcilab.makers.maker import capabilities_of, find_lack, require_driver, require_feature, require_parts, timing_of
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
@@ -498,9 +498,10 @@ class RobotSession(Closeable):
             Exception: An exception of the callback; the arm was stopped.
         """
         require_feature(require_feature(self.model, "streaming"), require_mode(mode))
-        filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off)]
+        period = timing_of(self.model).command_cycles
+        filters: list[CommandFilter] = [] if cut_off is None else [LowPass(cut_off, period)]
         if rate_limit is not None:
-            filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit)))
+            filters.append(RateLimiter(self._driver.select_limits(self.model.limits, rate_limit), period))
         if not callable(callback):
             raise InvalidValueError("callback", described(callback), "must be a function (state, t) -> command")
         with self._lock.begin_motion("control"):

@@ -123,13 +123,14 @@ class Motion:
         return motion_through(times, rows)
 
     @classmethod
-    def from_cycles(cls, q: ArrayLike) -> Motion:
+    def from_cycles(cls, q: ArrayLike, period: int = 1) -> Motion:
         """Returns the motion through rows at the controller's cycle of 1 ms, such as those of a recording.
 
         Between the rows it is cubic, with slopes from central differences, one-sided at both ends.
 
         Args:
             q: Joint angles, shape (N, n), N >= 1, [rad].
+            period: Cycles from one row to the next.
 
         Raises:
             InvalidValueError: Not a finite table of at least one row; the message names the row and the joint.
@@ -137,7 +138,7 @@ class Motion:
         rows = as_path(q, None, "q", "rad")
         if len(rows) == 1:
             return stationary_motion(rows[0], law="samples")
-        h = CYCLE_TIME
+        h = period * CYCLE_TIME
         slopes = np.gradient(rows, h, axis=0)
         rise = np.diff(rows, axis=0) / h
         pieces = np.empty((len(rows) - 1, rows.shape[1], 4))
@@ -145,7 +146,7 @@ class Motion:
         pieces[:, :, 1] = slopes[:-1]
         pieces[:, :, 2] = (3.0 * rise - 2.0 * slopes[:-1] - slopes[1:]) / h
         pieces[:, :, 3] = (slopes[:-1] + slopes[1:] - 2.0 * rise) / h**2
-        return cls(polynomial=PiecewisePolynomial(_grid(len(rows)), pieces), goal=rows[-1], law="samples")
+        return cls(polynomial=PiecewisePolynomial(_grid(len(rows)) * period, pieces), goal=rows[-1], law="samples")
 
     @property
     def duration(self) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rcilab.conformance.check import check
 from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
@@ -202,7 +203,7 @@ class Run:
                 reference[self.t >= self.stop_time] = np.nan
         faulty = np.flatnonzero(self.cycles["faults"])
         shown = self.q_c if not faulty.size else self.q_c[: faulty[0]]  # After a fault it follows no command.
-        return find_delay(shown, reference[: len(shown)])
+        return state_cycles(self.cycles) * find_delay(shown, reference[: len(shown)])
 
     @property
     def stop_time(self) -> float | None:
@@ -274,7 +275,7 @@ class Run:
         """
         if not np.isfinite(self.command).any():
             return self.q - self.q_c
-        delay = self.delay
+        delay = self.delay // state_cycles(self.cycles)
         commanded = np.full_like(self.q, np.nan)
         if len(commanded) > delay:
             commanded[delay:] = self.command[:-delay]
@@ -301,13 +302,12 @@ class Run:
                 lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
             )  # fmt: skip
         steps = np.diff(sent["message_id"].astype(np.int64))
-        every = max(int(steps.min()), 1)  # Cycles from one state to the next.
         period = np.diff(sent["received_ns"]) * 1e-9
         response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
         lateness = sent["lateness"]
         return Timing(
             cycles=len(sent),
-            lost=int((steps // every - 1).sum()),
+            lost=int((steps // state_cycles(self.cycles) - 1).sum()),
             period_median=float(np.median(period)),
             period_max=float(period.max()),
             response_median=float(np.median(response)),
@@ -375,7 +375,7 @@ class Run:
 
 
 def find_delay(q_c: JointPath, command: JointPath) -> int:
-    """Returns after how many cycles the controller reports a command as commanded; found by comparison, usually 1.
+    """Returns after how many rows the controller reports a command as commanded; found by comparison, usually 1.
 
     Args:
         q_c: Commanded joint angles as the controller reports them, shape (N, n), [rad].

@@ -176,10 +176,11 @@ def backward_differences(t: Array, values: Array, order: int) -> Array:
     if len(values) > order:
         # A difference across a lost cycle is not a derivative.
         steps = np.rint(np.diff(t) / CYCLE_TIME)
+        every = max(steps.min(), 1.0)  # Cycles from one row to the next.
         whole = np.ones(len(t) - order, dtype=bool)
         for shift in range(order):
-            whole &= steps[shift : len(steps) - order + 1 + shift] == 1.0
-        found[order:][whole] = np.diff(values, n=order, axis=0)[whole] / CYCLE_TIME**order
+            whole &= steps[shift : len(steps) - order + 1 + shift] == every
+        found[order:][whole] = np.diff(values, n=order, axis=0)[whole] / (every * CYCLE_TIME) ** order
     return found
 
 

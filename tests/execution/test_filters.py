@@ -157,3 +157,15 @@ def test_torques_keep_their_rate_and_start_at_zero():
     monitor = TorqueMonitor(LIMITS.joint)
     assert all(monitor.step(c.tau.tolist()) == [] for c in sent)
     assert np.array_equal(sent[-1].tau, np.full(7, 10.0))
+
+
+@pytest.mark.parametrize("period", [1, 10])
+def test_commands_of_any_period_keep_the_limits_over_that_period(period):
+    joint, h = LIMITS.joint, period * 1e-3
+    limiter = RateLimiter(LIMITS, period)
+    limiter.begin(JointPosition(HOME))
+    rows = np.array([HOME] * 3 + [limiter.step(JointPosition(HOME + 0.5)).q for _ in range(2000 // period)])
+    for order, bound in enumerate((joint.velocity, joint.acceleration, joint.jerk), 1):
+        assert (np.abs(np.diff(rows, order, axis=0)) / h**order <= bound).all()
+    assert np.abs(rows[-1] - HOME - 0.5).max() < 1e-3
+    assert smoothing(100.0, period) == pytest.approx(h / (h + 1.0 / (200.0 * math.pi)))

@@ -199,3 +199,12 @@ def test_a_motion_slowed_by_one_is_itself_and_two_slow_downs_multiply():
 def test_a_factor_that_is_no_slow_down_is_refused(factor):
     with pytest.raises(InvalidValueError, match="factor"):
         plan_joint(MODEL, MODEL.home, GOAL).slowed(factor)
+
+
+def test_rows_of_every_tenth_cycle_are_ten_cycles_apart():
+    planned = plan_joint(MODEL, MODEL.home, GOAL)
+    rows = planned.q[::10]
+    again = Motion.from_cycles(rows, 10)
+    assert again.duration == pytest.approx((len(rows) - 1) * 10 * CYCLE_TIME)
+    assert np.allclose(again.q[::10], rows, rtol=0, atol=1e-12)
+    assert np.abs(again.dq[: len(planned.dq)] - planned.dq[: len(again.dq)]).max() < 0.05

@@ -58,3 +58,15 @@ def test_the_delay_of_poses_is_found_by_the_plan_until_the_stop():
     cycles = run.cycles.copy()
     cycles["command"] = np.nan  # Sent as poses.
     assert build_run(cycles, plan=PLAN, model=MODEL).delay == 1
+
+
+def test_a_run_with_a_state_every_tenth_cycle_has_lost_none_and_its_delay_in_cycles():
+    cycles = some_cycles()[::10].copy()
+    cycles["q_c"][1:] = cycles["command"][:-1]
+    run = build_run(cycles, plan=PLAN, model=MODEL)
+    assert (run.timing.lost, run.delay) == (0, 10)
+    cycles["q"] = cycles["q_c"]
+    run = build_run(cycles, plan=PLAN, model=MODEL)
+    assert np.nanmax(np.abs(run.error)) < 1e-12
+    assert np.nanmax(np.abs(run._lag())) < 1e-12
+    assert np.abs(run.commanded().at(0.2).q - PLAN.at(0.2).q).max() < 1e-4

@@ -84,6 +84,12 @@ def test_recorded_derivatives_are_the_controllers_backward_differences():
     assert np.array_equal(jerk, expected)
 
 
+def test_rows_of_every_tenth_cycle_are_differences_over_ten():
+    t = 0.01 * np.arange(20)
+    q = np.tile((t**3)[:, None], 7)
+    assert np.allclose(recorded_curves(t, q, q, q, "jerk").values[3:], 6.0)
+
+
 def test_a_lost_cycle_makes_no_false_spike():
     motion = some_motion()
     keep = np.ones(len(motion.times), dtype=bool)

@@ -12,7 +12,9 @@ from rcilab.app.fault_lab.signals import Signal
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array, JointVector, readonly_copy
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
+from rcilab.core.cycle_log import state_cycles
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.i18n.locale import Language
@@ -61,6 +63,16 @@ class FaultDemo:
         return float(self.cycles["t"][-1])
 
     @property
+    def moment(self) -> float:
+        """The same on the clock of `commanded` and `moved`, in which rows that were dropped are left out, [s]."""
+        return self.sample * self._period * CYCLE_TIME
+
+    @property
+    def _period(self) -> int:
+        """Cycles from one row to the next."""
+        return state_cycles(self.cycles)
+
+    @property
     def whole(self) -> NDArray[np.void]:
         """All recorded cycles: up to the fault, and the controlled stop."""
         return np.concatenate((self.cycles, self.after))
@@ -107,20 +119,20 @@ class FaultDemo:
             q[:] = q[0]
         elif np.isfinite(sent).all():
             q[1 : len(self.cycles)] = sent
-        return Motion.from_cycles(q)
+        return Motion.from_cycles(q, self._period)
 
     @property
     def moved(self) -> Motion:
         """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
         if self.scenario.is_commanded:
             return self.commanded
-        return Motion.from_cycles(self._every_cycle("q"))
+        return Motion.from_cycles(self._every_cycle("q"), self._period)
 
     def _every_cycle(self, name: str) -> Array:
         """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""
         stop = np.concatenate((self.cycles[-1:], self.after))
         known: Array = np.array(stop["message_id"], np.float64)
-        wanted: Array = np.arange(float(known[0]) + 1.0, float(known[-1]) + 1.0)
+        wanted: Array = np.arange(float(known[0]) + self._period, float(known[-1]) + 1.0, self._period)
         angles: Array = np.array(stop[name], np.float64)
         after: list[Array] = [np.interp(wanted, known, angles[:, joint]) for joint in range(angles.shape[1])]
         return np.concatenate((self.cycles[name], np.stack(after, axis=1)))

@@ -16,6 +16,7 @@ from rcilab.conformance.tool_signals import rotation_steps
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
+from rcilab.core.cycle_log import state_cycles
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
@@ -24,7 +25,6 @@ from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
 
 _BEFORE = 3  # Rows that a third difference looks back to.
-_SHARE = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 _UNREACHABLE = 2.0  # What a pose counts as that no joint angles give: 1 is the bound. For the plot.
 
 
@@ -81,6 +81,7 @@ class Signals:
     ) -> None:
         self._rows, self._model, self._limits, self._box, self._lost = rows, model, limits, box, lost
         self._closed_form = model.solver
+        self._period = CYCLE_TIME * state_cycles(rows)
 
     def find(self, fault: FaultCode) -> Signal | None:
         """Returns the signal that raised a fault: the one farthest past its bound in the last row."""
@@ -116,10 +117,10 @@ class Signals:
                 return np.maximum(self._lost - last + np.arange(last + 1), 0.0)[:, None]
             case "joint":
                 commands = self._sent("command", self._rows["q_c"][0])
-                return None if commands is None else _differences(commands, condition.order)
+                return None if commands is None else _differences(commands, condition.order, self._period)
             case "torque":
                 torques = self._sent("command_tau", np.zeros(self._model.n))
-                return None if torques is None else _differences(torques, condition.order)
+                return None if torques is None else _differences(torques, condition.order, self._period)
             case _:
                 return self._commanded_tool(condition)
 
@@ -135,12 +136,12 @@ class Signals:
             return self._singularity(poses)
         if condition.signal == "arm_angle":
             psi = self._sent("command_psi", self._psi(self._rows["q_c"][:1])[0])
-            return None if psi is None else _differences(np.unwrap(psi)[:, None], condition.order)
+            return None if psi is None else _differences(np.unwrap(psi)[:, None], condition.order, self._period)
         if condition.signal not in ("translation", "rotation") or condition.order == 0:
             return None
         is_turn = condition.signal == "rotation"
         steps = rotation_steps(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
-        rates = np.diff(steps / CYCLE_TIME, condition.order - 1, axis=0) / CYCLE_TIME ** (condition.order - 1)
+        rates = np.diff(steps, condition.order - 1, axis=0) / self._period**condition.order
         return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
 
     def _measured(self, condition: Condition) -> Array | None:
@@ -151,16 +152,16 @@ class Signals:
             case "joint", 1:
                 return dq
             case "joint", _:
-                return _low_passed(dq)
+                return _low_passed(dq, self._period)
             case "position", _:
                 place = self._model.forward_path(q)[:, :3, 3]
                 return None if self._box is None else self._box.excess_path(place)[:, None]
             case "arm_angle", _:
-                return np.diff(np.unwrap(self._psi(q)), prepend=self._psi(q[:1])[0])[:, None] / CYCLE_TIME
+                return np.diff(np.unwrap(self._psi(q)), prepend=self._psi(q[:1])[0])[:, None] / self._period
             case signal, order:
                 half = slice(0, 3) if signal == "translation" else slice(3, 6)
                 twist = np.array([self._model.jacobian(a) @ b for a, b in zip(q, dq, strict=True)])
-                rates = twist if order == 1 else _low_passed(twist)
+                rates = twist if order == 1 else _low_passed(twist, self._period)
                 return np.linalg.norm(rates[:, half], axis=1)[:, None]
 
     def _external(self) -> Array:
@@ -191,12 +192,13 @@ class Signals:
         return np.concatenate((np.repeat(np.asarray(before)[None], _BEFORE + 1, axis=0), sent))
 
 
-def _differences(values: Array, order: int) -> Array:
-    return np.diff(values, order, axis=0)[_BEFORE - order :] / CYCLE_TIME**order
+def _differences(values: Array, order: int, period: float) -> Array:
+    return np.diff(values, order, axis=0)[_BEFORE - order :] / period**order
 
 
-def _low_passed(rates: Array) -> Array:
-    steps, found = np.diff(rates, axis=0, prepend=rates[:1]) / CYCLE_TIME, np.zeros_like(rates)
+def _low_passed(rates: Array, period: float) -> Array:
+    steps, found = np.diff(rates, axis=0, prepend=rates[:1]) / period, np.zeros_like(rates)
+    share = period / (period + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
     for row in range(1, len(rates)):
-        found[row] = found[row - 1] + _SHARE * (steps[row] - found[row - 1])
+        found[row] = found[row - 1] + share * (steps[row] - found[row - 1])
     return found

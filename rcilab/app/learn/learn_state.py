@@ -31,7 +31,7 @@ class Show:
     @property
     def place(self) -> float:
         """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
-        return self.exhibit.sample * CYCLE_TIME / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
+        return self.exhibit.moment / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
