@@ -17,7 +17,7 @@ from rcilab.robots.description import RobotDescription
 
 @lru_cache(maxsize=16)
 def build_solver(description: RobotDescription) -> KinematicsSolver:
-    """Returns the closed-form solver for the geometry of an arm, or the numeric one where no closed form applies.
+    """Returns the closed-form solver for the geometry of an arm, or the numeric one if no closed form applies.
 
     Raises:
         ModelError: The arm has more than 7 joints.

@@ -1,4 +1,4 @@
-"""Newton's method for any chain, with one joint held or none: it refines guesses to joint angles for flange poses."""
+"""Newton's method for any chain, with one joint held or none: refines guesses to joint angles for flange poses."""
 
 from __future__ import annotations
 
@@ -12,48 +12,48 @@ from rcilab.core.spatial import Pose
 from rcilab.model.kinematics.forward import Chain, forward
 from rcilab.model.kinematics.jacobian import tool_jacobian
 
-_ROUNDS = 12  # Of Newton's method; near the stretched arm two solutions meet, and the first steps only halve.
+_ROUNDS = 12  # Newton iterations; near the stretched arm two solutions meet, and the error only halves at first.
 _SLOW_ROUNDS = 40
-_LONGEST = 0.5  # [rad] Of its steps.
-_ALMOST = 3e-7  # [m] and [rad] What is missing before a step that leaves rounding, as each squares it.
-_GOOD = 1e-10  # [m] and [rad] What counts as the pose at the end.
-_CLOSE = 1e-7  # [rad] The last step of one alone, by the same reason.
-_FARTHEST = 1.2  # [rad] A step of one alone that leaves its guess.
-_SETTLED = 1e-12  # [m] and [rad] What counts as the pose for one alone.
+_MAX_STEP = 0.5  # [rad] Bound of a step.
+_CONVERGING = 3e-7  # [m] and [rad] The next step reduces a smaller error to rounding, as each squares it.
+_TOLERANCE = 1e-10  # [m] and [rad] Largest error of a solution.
+_SMALL_STEP = 1e-7  # [rad] Last step of `refine_near`, for the same reason.
+_LARGEST_STEP = 1.2  # [rad] A larger step of `refine_near` leaves its guess.
+_TOLERANCE_NEAR = 1e-12  # [m] and [rad] Largest error of a solution of `refine_near`.
 
 
 def refine(
     chain: Chain, held: int | None, rotations: Array, positions: Array, q: Array, *, slowly: bool = False
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns joint angles near guesses that put the flange at poses, by Newton's method.
+    """Returns joint angles near guesses for poses of the flange, by Newton's method.
 
     Args:
         chain: From `build_chain`.
-        held: Which joint, from 0, keeps the guesses' angle; None for none.
+        held: Index of the joint that keeps the guesses' angle; None for none.
         rotations: Flange in base, shape (M, 3, 3).
         positions: Flange in base, shape (M, 3), [m].
         q: Guesses, shape (M, n), [rad].
-        slowly: Whether to iterate until rounding stops it, which is needed where two solutions almost coincide.
+        slowly: Whether to iterate down to rounding, as required where two solutions almost coincide.
 
     Returns:
-        Joint angles, shape (M, n), [rad], and which of them are solutions, shape (M,).
+        Joint angles, shape (M, n), [rad], and whether each is a solution, shape (M,).
     """
     q = np.array(q)
     free = free_joints(chain, held)
     error = np.full(len(q), np.inf)
     active = np.arange(len(q))
     for _ in range(_SLOW_ROUNDS if slowly else _ROUNDS):
-        J, miss = differential(chain, q[active], rotations[active], positions[active])
-        error[active] = np.abs(miss).max(axis=1)
-        step = solved(J[:, :, free], miss)
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
+        J, pose_error = differential(chain, q[active], rotations[active], positions[active])
+        error[active] = np.abs(pose_error).max(axis=1)
+        step = solve_steps(J[:, :, free], pose_error)
+        step *= np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
         before = error[active]
         q[active[:, None], free] += step
-        active = active[before > (_GOOD / 10.0 if slowly else _ALMOST)]
+        active = active[before > (_TOLERANCE / 10.0 if slowly else _CONVERGING)]
         if not len(active):
             break
-    _, miss = differential(chain, q, rotations, positions)
-    return q, np.abs(miss).max(axis=1) < _GOOD
+    _, pose_error = differential(chain, q, rotations, positions)
+    return q, np.abs(pose_error).max(axis=1) < _TOLERANCE
 
 
 def refine_near(
@@ -63,11 +63,11 @@ def refine_near(
 
     Args:
         chain: From `build_chain`.
-        held: Which joint, from 0, is held at `psi`; None for none.
+        held: Index of the joint that is held at `psi`; None for none.
         rotation: Flange in base, shape (3, 3).
         position: Flange in base, shape (3,), [m].
         psi: Angle of the held joint, [rad].
-        guess: Joint angles close by, n plain floats, [rad].
+        guess: Joint angles close to the solution, n plain floats, [rad].
     """
     q = [*guess]
     free = free_joints(chain, held)
@@ -75,43 +75,45 @@ def refine_near(
         q[held] = psi
     for _ in range(_ROUNDS):
         J, _ = tool_jacobian(chain, q)
-        miss = _miss(forward(chain, q), rotation, position)
+        pose_error = _pose_error(forward(chain, q), rotation, position)
         try:
-            step = np.linalg.solve(J[:, free], miss) if len(free) == 6 else np.linalg.pinv(J[:, free]) @ miss
+            step = (
+                np.linalg.solve(J[:, free], pose_error) if len(free) == 6 else np.linalg.pinv(J[:, free]) @ pose_error
+            )
         except np.linalg.LinAlgError:
             return None
-        if np.abs(step).max() > _FARTHEST:
+        if np.abs(step).max() > _LARGEST_STEP:
             return None
-        for joint, turn in zip(free, step.tolist(), strict=True):
-            q[joint] += turn
-        if np.abs(step).max() < _CLOSE:
+        for joint, step_angle in zip(free, step.tolist(), strict=True):
+            q[joint] += step_angle
+        if np.abs(step).max() < _SMALL_STEP:
             break
-    missing = np.abs(_miss(forward(chain, q), rotation, position)).max()
-    return q if missing < _SETTLED else None
+    residual = np.abs(_pose_error(forward(chain, q), rotation, position)).max()
+    return q if residual < _TOLERANCE_NEAR else None
 
 
 def free_joints(chain: Chain, held: int | None) -> list[int]:
-    """Returns the joints, from 0, that are not held."""
+    """Returns the indices of the joints that are not held."""
     return [joint for joint in range(len(chain)) if joint != held]
 
 
-def _miss(now: Pose, rotation: Array, position: Array) -> Array:
-    """Returns what is missing to a pose as a small twist, base axes, shape (6,)."""
-    turn = rotation @ now.rotation.T
-    w = 0.5 * np.array((turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]))
-    return np.concatenate((position - now.position, w))
+def _pose_error(current: Pose, rotation: Array, position: Array) -> Array:
+    """Returns the difference to a pose as a small twist, base axes, shape (6,)."""
+    R = rotation @ current.rotation.T
+    w = 0.5 * np.array((R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]))
+    return np.concatenate((position - current.position, w))
 
 
 def differential(chain: Chain, q: Array, rotations: Array, positions: Array) -> tuple[Array, Array]:
-    """Returns Jacobians of the flange, shape (M, 6, n), and what is missing to poses, shape (M, 6), base axes.
+    """Returns Jacobians of the flange, shape (M, 6, n), and differences to poses, shape (M, 6), base axes.
 
-    The missing turn is its axis times its sine, which is the turn itself once it is small.
+    The rotational difference is the axis times the sine of the angle, equal to the rotation vector if it is small.
     """
     J, p, axes = jacobians(chain, q)
-    miss = np.empty((6, len(q)))
-    miss[:3] = positions.T - p
-    miss[3:] = 0.5 * sum(cross(now, rotations[:, :, i].T) for i, now in enumerate(axes))
-    return J, miss.T
+    pose_error = np.empty((6, len(q)))
+    pose_error[:3] = positions.T - p
+    pose_error[3:] = 0.5 * sum(cross(current, rotations[:, :, i].T) for i, current in enumerate(axes))
+    return J, pose_error.T
 
 
 def jacobians(chain: Chain, q: Array) -> tuple[Array, Array, tuple[Array, Array, Array]]:
@@ -134,15 +136,15 @@ def jacobians(chain: Chain, q: Array) -> tuple[Array, Array, tuple[Array, Array,
     return np.moveaxis(J, 2, 0), p, (x, y, z)
 
 
-def solved(J: Array, miss: Array) -> Array:
-    """Returns the steps that J maps to what is missing, shape (M, n); of least squares where that is not unique."""
+def solve_steps(J: Array, pose_error: Array) -> Array:
+    """Returns the steps that J maps to the differences, shape (M, n); of least squares if they are not unique."""
     if J.shape[1] != J.shape[2]:
-        return np.asarray((np.linalg.pinv(J) @ miss[..., None])[..., 0], dtype=np.float64)
+        return np.asarray((np.linalg.pinv(J) @ pose_error[..., None])[..., 0], dtype=np.float64)
     try:
-        return np.asarray(np.linalg.solve(J, miss[..., None])[..., 0], dtype=np.float64)
-    except np.linalg.LinAlgError:  # One of them is exactly singular.
+        return np.asarray(np.linalg.solve(J, pose_error[..., None])[..., 0], dtype=np.float64)
+    except np.linalg.LinAlgError:  # A Jacobian is exactly singular.
         inverse = np.asarray(np.linalg.pinv(J, rcond=1e-9), dtype=np.float64)
-        return (inverse @ miss[..., None])[..., 0]
+        return (inverse @ pose_error[..., None])[..., 0]
 
 
 def cross(a: Array, b: Array) -> Array:

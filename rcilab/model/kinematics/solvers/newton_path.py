@@ -1,7 +1,7 @@
-"""The inverse along a whole path by Newton's method: one branch, followed without a jump.
+"""The inverse along a whole path by Newton's method, on one branch and without jumps.
 
-The numeric counterpart of `spherical/branch.py`. A few rows are solved one after the other, each from the one before;
-between them the joint angles are interpolated linearly, and Newton's method refines all rows at once.
+The numeric counterpart of `spherical/branch.py`. A few rows are solved in sequence, each from the previous one; between
+them the joint angles are interpolated linearly, and Newton's method refines all rows together.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from rcilab.model.kinematics.forward import Chain
 from rcilab.model.kinematics.solvers.newton import refine, refine_near
 from rcilab.model.kinematics.solvers.solver import Angles, BranchEnd
 
-_KNOTS = 48  # Rows that are solved one by one: takes a few ms, and gives guesses good to a hundredth of a radian.
-_TURN = 0.15  # [rad] Of a joint from knot to knot, beyond which rows between them are solved first.
-_JUMP = 0.6  # [rad] From row to row: a larger step is a change of branch.
+_KNOTS = 48  # Rows solved in sequence: takes a few ms, and gives guesses accurate to 0.01 rad.
+_MAX_KNOT_STEP = 0.15  # [rad] A larger step from knot to knot needs further knots in between.
+_MAX_ROW_STEP = 0.6  # [rad] A larger step from row to row is a change of branch.
 
 
 def follow_by_newton(
@@ -32,43 +32,44 @@ def follow_by_newton(
     psi: Array,
     start: JointVector,
 ) -> tuple[JointPath, BranchEnd | None]:
-    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not checked.
+    """Returns the joint angles along a path of the flange, on one branch; limits are not checked.
 
     Args:
         chain: From `build_chain`.
-        held: Which joint, from 0, is held at `psi`; None for none.
-        solve: Every solution at a pose of the flange and an angle of the held joint; asked where the branch ends.
+        held: Index of the joint that is held at `psi`; None for none.
+        solve: Returns every solution at a pose of the flange and an angle of the held joint; used if the branch ends.
         rotations: Flange in base, shape (N, 3, 3).
         positions: Flange in base, shape (N, 3), [m].
         psi: Angles of the held joint, shape (N,), [rad].
-        start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
+        start: Joint angles at row 0, shape (n,), [rad]; they select the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], meaningless from the first row without solution on, and that row, or None.
+        Joint angles, shape (N, n), [rad], and the first row without a solution, or None. From that row on the angles
+        have no meaning.
     """
-    march = _RowByRow(chain, held, rotations, positions, psi)
-    known = march.run(start)
+    knot_solver = _KnotSolver(chain, held, rotations, positions, psi)
+    known = knot_solver.run(start)
     rows = np.arange(len(psi))
-    places = sorted(known)
-    table = np.array([known[place] for place in places])
-    guess = np.stack([np.interp(rows, places, column) for column in table.T], axis=1)
+    solved_rows = sorted(known)
+    table = np.array([known[row_index] for row_index in solved_rows])
+    guess = np.stack([np.interp(rows, solved_rows, column) for column in table.T], axis=1)
     if held is not None:
         guess[:, held] = psi
     q, settled = refine(chain, held, rotations, positions, guess)
-    q[places] = table
-    settled[places] = True
+    q[solved_rows] = table
+    settled[solved_rows] = True
     lost = ~settled
-    lost[1:] |= (np.abs(np.diff(q, axis=0)) > _JUMP).any(axis=1)
-    if march.lost is not None:
-        lost[march.lost] = True
+    lost[1:] |= (np.abs(np.diff(q, axis=0)) > _MAX_ROW_STEP).any(axis=1)
+    if knot_solver.lost is not None:
+        lost[knot_solver.lost] = True
     if not lost.any():
         return q, None
     row = int(lost.argmax())
     return q, BranchEnd(row, _reason(solve, rotations[row], positions[row], float(psi[row]), held))
 
 
-class _RowByRow:
-    """Solves a few rows of a path one after the other."""
+class _KnotSolver:
+    """Solves a few rows of a path in sequence."""
 
     def __init__(self, chain: Chain, held: int | None, rotations: Array, positions: Array, psi: Array) -> None:
         self._chain, self._held = chain, held
@@ -76,8 +77,8 @@ class _RowByRow:
         self.lost: int | None = None
 
     def run(self, start: JointVector) -> dict[int, list[float]]:
-        """Returns joint angles of some rows, by row; where the branch ends, `lost` is the row."""
-        first = self._settled(0, start.tolist())
+        """Returns joint angles of some rows, by row; `lost` is the row at which the branch ends."""
+        first = self._solve_row(0, start.tolist())
         known: dict[int, list[float]] = {0: start.tolist() if first is None else first}
         if first is None:
             self.lost = 0
@@ -88,26 +89,26 @@ class _RowByRow:
         longest = stride
         while row < last:
             after = min(row + stride, last)
-            here = known[row]
-            guess = here
+            current = known[row]
+            guess = current
             if before is not None:
                 part = (after - row) / (row - before[0])
-                guess = [a + part * (a - b) for a, b in zip(here, before[1], strict=True)]
-            found = self._settled(after, guess)
-            small = _TURN if stride > 1 else _JUMP
-            if found is None or max(abs(a - b) for a, b in zip(found, here, strict=True)) > small:
+                guess = [a + part * (a - b) for a, b in zip(current, before[1], strict=True)]
+            found = self._solve_row(after, guess)
+            max_step = _MAX_KNOT_STEP if stride > 1 else _MAX_ROW_STEP
+            if found is None or max(abs(a - b) for a, b in zip(found, current, strict=True)) > max_step:
                 if stride == 1:
                     self.lost = after
                     return known
                 stride = max(1, stride // 4)
                 continue
-            before, row = (row, here), after
+            before, row = (row, current), after
             known[after] = found
             stride = min(2 * stride, longest)
         return known
 
-    def _settled(self, row: int, guess: list[float]) -> list[float] | None:
-        """Returns the solution at a row next to a guess, or None, in plain floats."""
+    def _solve_row(self, row: int, guess: list[float]) -> list[float] | None:
+        """Returns the solution at a row near a guess, in plain floats, or None."""
         psi = float(self._psi[row])
         return refine_near(self._chain, self._held, self._rotations[row], self._positions[row], psi, guess)
 
@@ -124,16 +125,16 @@ def _reason(
     if not found:
         return no_solution(psi, held)
     return SingularError(
-        "the arm would have to jump, because a singularity is in the way; lead the tool around it, give another arm "
-        "angle, or go there in joint space"
+        "the arm would have to jump, because a singularity is in the way; move the tool around it, use another arm "
+        "angle, or a joint motion"
     ).coded("jump")
 
 
 def no_solution(psi: float, held: int | None) -> UnreachableError:
-    """Returns the error of a pose that has no solution with a joint, from 0, held at an angle, [rad]."""
+    """Returns the error for a pose without solution with a joint, by index, held at an angle, [rad]."""
     if held is None:
         return UnreachableError("no joint angles put the tool there; move the target").coded("no_angles")
     elbow = "the elbow (joint 3)" if held == 2 else f"joint {held + 1}"
     return UnreachableError(
-        f"no joint angles put the tool there with {elbow} at {degrees(psi):.1f} deg; give another arm angle"
+        f"no joint angles put the tool there with {elbow} at {degrees(psi):.1f} deg; use another arm angle"
     ).coded("no_angles")

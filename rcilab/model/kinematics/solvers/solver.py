@@ -13,17 +13,17 @@ from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 
 Angles: TypeAlias = tuple[float, ...]
 
-REACH_TOLERANCE = 1e-9  # [m] A pose that rounding put this far out of reach counts as at its end.
+REACH_TOLERANCE = 1e-9  # [m] A pose out of reach by less, because of rounding, counts as at the limit of reach.
 
 
 @dataclass(frozen=True, slots=True)
 class Redundancy:
-    """The redundancy of an arm at a pose of the flange, and so the meaning of its redundancy angle `psi`."""
+    """The redundancy of an arm at a pose of the flange; it defines the redundancy angle `psi`."""
 
     kind: Literal["none", "arm_angle", "joint"]
     """"arm_angle": the elbow's angle on its circle around the shoulder-wrist line; "joint": the angle of one joint."""
     joint: int | None = None
-    """Which joint, counted from 1; None unless the kind is "joint"."""
+    """Number of the joint, from 1; None unless the kind is "joint"."""
 
     def __bool__(self) -> bool:
         return self.kind != "none"
@@ -35,7 +35,7 @@ ARM_ANGLE = Redundancy("arm_angle")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Envelope:
-    """Lengths of an arm without offsets with the same reach, [m]."""
+    """Lengths of an arm without offsets and with the same reach, [m]."""
 
     shoulder: float
     """Height of the shoulder above the base."""
@@ -53,14 +53,14 @@ class BranchEnd:
 
     row: int
     reason: KinematicsError
-    """Out of reach, or singular."""
+    """The reason: out of reach, or singular."""
 
 
 class PoseSolver(Protocol):
     """The joint angles for one pose."""
 
     def branches(self, psi: float) -> list[Angles]:
-        """Returns every solution at a redundancy angle, [rad], without regard to joint limits.
+        """Returns every solution at a redundancy angle, [rad], also outside the joint limits.
 
         Raises:
             UnreachableError: The pose is out of reach at every redundancy angle.
@@ -131,18 +131,18 @@ class KinematicsSolver(Protocol):
             rotations: Flange in base, shape (N, 3, 3).
             positions: Flange in base, shape (N, 3), [m].
             psi: Redundancy angles, shape (N,), [rad]; None without redundancy.
-            start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
+            start: Joint angles at row 0, shape (n,), [rad]; they select the branch.
 
         Returns:
-            Joint angles, shape (N, n), [rad], and the first row that has none, or None. From that row on they are
-            meaningless.
+            Joint angles, shape (N, n), [rad], and the first row without a solution, or None. From that row on the
+            angles have no meaning.
         """
         ...
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
         """Returns the joint angles of a pose closest to those of the previous cycle, [rad], or None.
 
-        Joint limits are not checked; full turns are counted.
+        Joint limits are not checked; full turns of `near` are kept.
 
         Args:
             T_base_flange: Pose of the flange.

@@ -1,4 +1,4 @@
-"""6 axes with a spherical wrist, as the xMate: 8 branches and no redundancy."""
+"""Solver for 6 axes with a spherical wrist, such as the xMate: 8 branches and no redundancy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class SphericalSix(SphericalSeven):
         return _SixAxisPose(self.geometry, T_base_flange, near)
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
-        """Returns the joint angles of a pose closest to those before, [rad]."""
+        """Returns the joint angles of a pose closest to those of the previous cycle, [rad]."""
         try:
             return closest_branch(inverse_six(self.geometry, T_base_flange, near), near, (2, 4))
         except KinematicsError:

@@ -1,4 +1,4 @@
-"""7 axes without offsets, as the xMatePro: spherical shoulder and wrist, 8 branches at every arm angle."""
+"""Solver for 7 axes without offsets, such as the xMatePro: spherical shoulder and wrist, 8 branches per arm angle."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, inver
 from rcilab.model.kinematics.solvers.spherical.inverse_batch import inverse_batch
 from rcilab.model.kinematics.solvers.spherical.singularity import find_singularity, singularity_path
 
-_SIDES = ((0.0,), (pi,), (0.0, pi))  # Flips of a joint bent to its positive side, to its negative one, or next to zero.
+_SIDES = ((0.0,), (pi,), (0.0, pi))  # Flips of a joint on its positive side, on its negative side, or near zero.
 _FLIPS = [[[list(product(a, b, c)) for c in _SIDES] for b in _SIDES] for a in _SIDES]
-_STEP = 0.1  # [rad] What no joint passes in a cycle, by far: an arm bent more than that stays bent to the same side.
+_NEAR_ZERO = 0.1  # [rad] Far more than a step in one cycle: a joint bent more than this stays on its side.
 
 
 class SphericalSeven:
@@ -39,11 +39,11 @@ class SphericalSeven:
         return _SphericalPose(self.geometry, T_base_flange, near)
 
     def redundancy_angle(self, q: Sequence[float]) -> float:
-        """Returns where the elbow is on its circle, [rad]."""
+        """Returns the arm angle, [rad]."""
         return arm_angle(self.geometry.upper, self.geometry.fore, q)
 
     def redundancy_angle_path(self, q: JointPath) -> Array:
-        """Returns where the elbow is on its circle along a path, [rad]."""
+        """Returns the arm angles along a path, [rad]."""
         return arm_angle_path(self.geometry.upper, self.geometry.fore, q)
 
     def singularity(self, q: Sequence[float]) -> str | None:
@@ -51,11 +51,11 @@ class SphericalSeven:
         return find_singularity(self.geometry, q)
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns how near the arm is to a singularity along a path."""
+        """Returns the closeness to a singularity along a path."""
         return singularity_path(self.geometry, q)
 
     def is_singular(self, q: Sequence[float]) -> bool:
-        """Returns whether the arm counts as at a singularity."""
+        """Returns whether the arm counts as singular."""
         return find_singularity(self.geometry, q) is not None
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
@@ -69,7 +69,7 @@ class SphericalSeven:
         return follow_branch(self.geometry, rotations, positions, psi, start)
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
-        """Returns the joint angles of a pose closest to those before, [rad]."""
+        """Returns the joint angles of a pose closest to those of the previous cycle, [rad]."""
         try:
             branches = inverse_seven(self.geometry, T_base_flange, psi, near, self._near_flips(near))
         except KinematicsError:
@@ -81,7 +81,7 @@ class SphericalSeven:
         return feasible_arcs(self.geometry, T_base_flange, lower, upper, outside_box)
 
     def _near_flips(self, near: Sequence[float]) -> list[Angles]:
-        """Returns the branches that a step from `near` may end on: those of its own sides, and of both next to zero."""
+        """Returns the branches that one cycle from `near` can reach: its own, and both sides of a joint near zero."""
         _, offset_2, _, offset_4, _, offset_6, _ = self.geometry.offsets
         _, q2, _, q4, _, q6, _ = near
         return _FLIPS[_side(q2 - offset_2)][_side(q4 - offset_4)][_side(q6 - offset_6)]
@@ -96,27 +96,27 @@ class _SphericalPose:
 
 
 def closest_branch(branches: list[Angles], near: Sequence[float], bends: tuple[int, ...]) -> list[float]:
-    """Returns the branch closest to joint angles, full turns counted, [rad].
+    """Returns the branch closest to joint angles, with full turns, [rad].
 
     Args:
         branches: At least one.
         near: Joint angles, n plain floats, [rad].
-        bends: Which joints, from 0, bend the arm: they make no full turn, so their difference rules most branches out.
+        bends: Indices of the joints without full turns, whose difference excludes most branches.
     """
     best = branches[0]
     if len(branches) > 1:
-        least, here_bends = inf, [near[i] for i in bends]
+        smallest, near_bends = inf, [near[i] for i in bends]
         for branch in branches:
-            if sum([(branch[i] - here) ** 2 for i, here in zip(bends, here_bends, strict=True)]) >= least:
+            if sum([(branch[i] - target) ** 2 for i, target in zip(bends, near_bends, strict=True)]) >= smallest:
                 continue
-            distance = sum([remainder(angle - here, tau) ** 2 for angle, here in zip(branch, near, strict=True)])
-            if distance < least:
-                least, best = distance, branch
-    return [here + remainder(angle - here, tau) for angle, here in zip(best, near, strict=True)]
+            distance = sum([remainder(angle - target, tau) ** 2 for angle, target in zip(branch, near, strict=True)])
+            if distance < smallest:
+                smallest, best = distance, branch
+    return [target + remainder(angle - target, tau) for angle, target in zip(best, near, strict=True)]
 
 
 def _side(bend: float) -> int:
-    """Returns which of `_SIDES` an upright joint is on."""
-    if abs(bend) < _STEP:
+    """Returns the index in `_SIDES` of the side of an upright joint."""
+    if abs(bend) < _NEAR_ZERO:
         return 2
     return 1 if remainder(bend, tau) < 0.0 else 0

@@ -124,7 +124,7 @@ class NumericSolver:
         return follow_by_newton(self._arm.chain, held, solve, rotations, positions, angles, start)
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
-        """Returns the joint angles of a pose closest to those before, [rad]."""
+        """Returns the joint angles of a pose closest to those of the previous cycle, [rad]."""
         rotation, position = T_base_flange.rotation, T_base_flange.position
         return refine_near(self._arm.chain, self._held, rotation, position, psi, near)
 

@@ -73,7 +73,7 @@ class OffsetSeven:
         return follow_by_newton(self.geometry.chain, ELBOW, solve, rotations, positions, angles, start)
 
     def solve_near(self, T_base_flange: Pose, psi: float, near: Sequence[float]) -> list[float] | None:
-        """Returns the joint angles of a pose closest to those before, [rad]."""
+        """Returns the joint angles of a pose closest to those of the previous cycle, [rad]."""
         return refine_near(self.geometry.chain, ELBOW, T_base_flange.rotation, T_base_flange.position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
