@@ -26,7 +26,7 @@ def _find_robots() -> dict[str, Mapping[str, str]]:
 
 
 ROBOTS_BY_MAKER: Mapping[str, Mapping[str, str]] = MappingProxyType(_find_robots())
-"""Arms by maker: the maker's folder, then the arm's name, to the module of its data file."""
+"""Modules of the data files, by the maker's folder and the arm's name."""
 ROBOT_NAMES = tuple(name for robots in ROBOTS_BY_MAKER.values() for name in robots)
 """Names of all arms."""
 

@@ -41,9 +41,9 @@ class CraigRow:
 def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
     """Returns the standard rows of the chain that a Craig table describes.
 
-    Both are the same product, grouped differently: rotation and translation along z of one row go with translation and
-    rotation along x of the next. The pose of the flange is the same at all joint angles; the frames between follow the
-    standard convention: they lie on the next joint's axis, not on their own.
+    Both are the same product, grouped differently: rotation and translation along z of one row are combined with those
+    along x of the next. The pose of the flange is the same at all joint angles; the frames between follow the
+    standard convention and lie on the next joint's axis, not on their own.
 
     Args:
         table: One row per joint and one for the flange; the first joint turns about the base z axis.
@@ -61,7 +61,7 @@ def rows_from_craig(table: Sequence[CraigRow]) -> tuple[DhRow, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Rod:
-    """A round rod with ball ends, in the link's frame: shape and collision capsule of a link without a drawing."""
+    """A round rod with spherical ends, in the link's frame: shape and collision capsule of a link without a drawing."""
 
     start: tuple[float, float, float]
     """[m]."""
@@ -90,7 +90,7 @@ class Link:
     source: str
     """Source of mass, centre and tensor."""
     origin_ahead: float = 0.0
-    """How far in front of the base z axis, along base x, that origin is then, [m]."""
+    """Distance of that origin from the base z axis along base x when all joint angles are zero, [m]."""
 
     @property
     def origin(self) -> Vector3:
@@ -107,20 +107,20 @@ class RobotDescription:
     """An arm: the data that all computations use."""
 
     name: str
-    """Name as the maker spells it."""
+    """Name, spelled as by the maker."""
     dh: tuple[DhRow, ...]
     """One row per joint, base to flange."""
     dh_source: str
-    """Source of the table, and what was added to it."""
+    """Source of the table, and changes to it."""
     base: Link
-    """The body that does not move."""
+    """The fixed body."""
     links: tuple[Link, ...]
     """The moving bodies, one per joint, base to flange."""
     limits: Limits
     home: JointVector
     """Joint angles away from limits and singularities, shape (n,), [rad]."""
     rated_payload: float
-    """Largest load, [kg]."""
+    """Rated payload, [kg]."""
     rated_payload_source: str
     maker: str = ""
     """Name of its maker: the folder in `rcilab/makers`; empty for an arm without a driver."""

@@ -14,7 +14,7 @@ def write_model(directory: Path, file_name: str, text: str, description: RobotDe
     """Writes a URDF or MJCF and its meshes (`meshes/NAME/*.stl`), and returns the path of the description file.
 
     Raises:
-        ModelError: The directory cannot be written; the message says why.
+        ModelError: The directory cannot be written; the message has the reason.
     """
     try:
         meshes = directory / "meshes" / description.name
@@ -27,6 +27,6 @@ def write_model(directory: Path, file_name: str, text: str, description: RobotDe
             stream.write(text.encode())
     except OSError as error:
         raise ModelError(
-            f"cannot write {file_name} into {directory}: {error.strerror}; name another --output"
+            f"cannot write {file_name} into {directory}: {error.strerror}; use another --output"
         ) from error
     return path

@@ -1,4 +1,4 @@
-"""Triangle meshes as values, bodies of revolution, and the binary STL they are written as."""
+"""Triangle meshes, bodies of revolution, and their encoding as binary STL."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AxisName = Literal["x", "y", "z"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh:
-    """A triangle mesh. Faces that share a vertex are shaded smoothly across it; a crease has its vertices twice."""
+    """A triangle mesh. Faces that share a vertex are shaded smoothly; at a crease vertices are duplicated."""
 
     vertices: Array
     """Shape (V, 3), [m]."""
@@ -33,16 +33,16 @@ class Mesh:
 def shrink(mesh: Mesh, depth: float) -> Mesh:
     """Returns the mesh with every vertex moved inward along its normal by `depth`, [m]."""
     corners = mesh.vertices[mesh.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.stack(
-        [np.bincount(mesh.faces.ravel(), np.repeat(x, 3), minlength=len(mesh.vertices)) for x in across.T], axis=1
+        [np.bincount(mesh.faces.ravel(), np.repeat(x, 3), minlength=len(mesh.vertices)) for x in cross.T], axis=1
     )
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     return Mesh(mesh.vertices - depth * normals, mesh.faces)
 
 
 def merge_meshes(meshes: Sequence[Mesh]) -> Mesh:
-    """Returns one mesh that holds all of the given ones."""
+    """Returns the meshes as one."""
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     return Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]),
@@ -73,42 +73,42 @@ def revolve(
     bends = np.diff(np.arctan2(np.diff(heights), np.diff(radii)))
     bends = np.abs((bends + np.pi) % (2.0 * np.pi) - np.pi)
     sharp = 1 + np.flatnonzero(bends > np.radians(crease))
-    rows = np.sort(np.concatenate([np.arange(len(radii)), sharp]))  # a sharp row stands twice
+    rows = np.sort(np.concatenate([np.arange(len(radii)), sharp]))  # Rows at creases are duplicated.
     angles = np.arange(segments) * (2.0 * np.pi / segments)
     r, h = radii[rows], heights[rows]
     ring = np.stack([np.outer(r, np.cos(angles)), np.outer(r, np.sin(angles))], axis=-1)
     points = np.concatenate([ring, np.broadcast_to(h[:, None, None], (*ring.shape[:2], 1))], axis=-1)
     faces: list[NDArray[np.int64]] = []
-    this = np.arange(segments)
-    after = (this + 1) % segments
+    current = np.arange(segments)
+    following = (current + 1) % segments
     for row in range(len(rows) - 1):
         if rows[row] == rows[row + 1]:
             continue
         low, high = row * segments, (row + 1) * segments
         if r[row] > 0.0:
-            faces.append(np.stack([low + this, low + after, high + after], axis=1))
+            faces.append(np.stack([low + current, low + following, high + following], axis=1))
         if r[row + 1] > 0.0:
-            faces.append(np.stack([low + this, high + after, high + this], axis=1))
-    turn = {"z": (0, 1, 2), "x": (2, 0, 1), "y": (1, 2, 0)}[axis]  # cyclic, so no face turns inside out
-    vertices = points.reshape(-1, 3)[:, turn] + np.asarray(center, dtype=np.float64)
+            faces.append(np.stack([low + current, high + following, high + current], axis=1))
+    order = {"z": (0, 1, 2), "x": (2, 0, 1), "y": (1, 2, 0)}[axis]  # Cyclic, so that the orientation of faces stays.
+    vertices = points.reshape(-1, 3)[:, order] + np.asarray(center, dtype=np.float64)
     return Mesh(vertices, np.concatenate(faces).astype(np.int32))
 
 
 def mirror_y(mesh: Mesh) -> Mesh:
-    """Returns the mirror image in the plane y = 0, still facing outside."""
+    """Returns the mirror image in the plane y = 0, with outward faces."""
     return Mesh(mesh.vertices * (1.0, -1.0, 1.0), np.ascontiguousarray(mesh.faces[:, ::-1]))
 
 
 def encode_stl(mesh: Mesh, title: str = "rcilab") -> bytes:
-    """Returns a mesh as binary STL: 80 bytes of title, the count, then 50 bytes a triangle, little-endian, [m].
+    """Returns a mesh as binary STL: 80 bytes of title, the count, then 50 bytes per triangle, little-endian, [m].
 
     Coordinates are rounded to 10 micrometres, so that the last bit of a sine does not change the file.
     """
     corners = np.round(mesh.vertices, 5).astype(np.float32)[mesh.faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(cross, axis=1, keepdims=True)
     whole = lengths[:, 0] > 0.0
     records = np.zeros(int(whole.sum()), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-    records["normal"] = (across / np.where(lengths > 0.0, lengths, 1.0))[whole]
+    records["normal"] = (cross / np.where(lengths > 0.0, lengths, 1.0))[whole]
     records["corners"] = corners[whole]
     return title.encode("ascii")[:80].ljust(80) + np.uint32(len(records)).astype("<u4").tobytes() + records.tobytes()

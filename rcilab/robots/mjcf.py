@@ -1,7 +1,7 @@
 """An arm as MJCF, MuJoCo's own format: capsules, inertias, joint ranges, torque motors and a site at the flange.
 
-Rotor inertia and friction of the drives are not in any table. The values here are typical of strain-wave geared joints
-of this size and keep a simulated arm from ringing; they are not measured on an xMate.
+Rotor inertia and friction of the drives are not published. The values here are typical of strain-wave geared joints of
+this size and prevent ringing of a simulated arm; they are not measured on an xMate.
 """
 
 from __future__ import annotations
@@ -61,9 +61,9 @@ def build_mjcf(
     Args:
         description: The arm.
         meshes: Whether the housings are drawn (visual geometry, group 2); the files are those of `build_meshes`.
-        mesh_dir: Where they lie, relative to the MJCF file; default `meshes/NAME`.
+        mesh_dir: Folder of the meshes, relative to the MJCF file; default `meshes/NAME`.
         T_flange_tool: Pose of the tool in the flange.
-        load: A body fixed to the flange; None or a massless one adds no body.
+        load: A body fixed to the flange; None, or one without mass, adds no body.
     """
     directory = f"meshes/{description.name}" if mesh_dir is None else mesh_dir.rstrip("/")
     shape = build_shapes(description, "coarse")
@@ -163,7 +163,7 @@ def _capsule(capsule: Capsule) -> str:
 
 
 def _contacts(description: RobotDescription) -> list[str]:
-    """Returns the pairs that never collide: neighbours share a joint, and their neighbours fold next to each other."""
+    """Returns the pairs without collision check: neighbours, which share a joint, and links two apart."""
     names = ["base", *(f"link{number}" for number in range(1, description.n + 1))]
     pairs = [(names[i], names[j]) for i in range(len(names)) for j in range(i + 1, min(i + 3, len(names)))]
     return ["  <contact>", *(f'    <exclude body1="{a}" body2="{b}"/>' for a, b in pairs), "  </contact>"]

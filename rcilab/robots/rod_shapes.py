@@ -1,4 +1,4 @@
-"""The bodies of links that are described as rods: smooth castings around them, a foot plate and a flange."""
+"""Bodies of links that are described as rods: smooth castings, foot plate and flange."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rcilab.robots.description import Rod
 from rcilab.robots.mesh import Mesh, revolve
 from rcilab.robots.surface import join, mesh_surface, rod
 
-_BLEND = 0.016  # [m] How far the seam between two rods is rounded.
+_BLEND = 0.016  # [m] Rounding of the seam between two rods.
 _PLATE = 0.012  # [m] Thickness of the foot plate.
 _FLANGE_RADIUS = 0.0315  # [m] ISO 9409-1-50
 _FLANGE_HEIGHT = 0.020  # [m]
@@ -21,7 +21,7 @@ def cast(rods: Sequence[Rod], cell: float) -> Mesh:
     """Returns the rods of a link as one smooth body, in the link's frame.
 
     Args:
-        rods: One or more.
+        rods: The rods, at least one.
         cell: Edge of a grid cell, about that of a triangle, [m].
     """
     ends = np.array([(r.start, r.end) for r in rods])
@@ -37,13 +37,13 @@ def cast(rods: Sequence[Rod], cell: float) -> Mesh:
 
 
 def foot_plate(radius: float, segments: int) -> Mesh:
-    """Returns the disc the base stands on, in the base frame, [m]."""
+    """Returns the disc under the base, in the base frame, [m]."""
     edge = [(0.0, 0.0), (radius, 0.0), (radius, _PLATE), (0.0, _PLATE)]
     return revolve(edge, segments=segments)
 
 
 def flange_plate(up: float, segments: int) -> Mesh:
-    """Returns the disc that tools are screwed to, in the last link's frame; `up` is the side it looks to, +1 or -1."""
+    """Returns the disc of the flange, in the last link's frame; `up` is the direction of its face along z, +1 or -1."""
     r, bevel = _FLANGE_RADIUS, 0.4 * _FLANGE_HEIGHT  # Bevelled, so that the ball end of the link's capsule covers it.
     edge = [(0.0, -_FLANGE_HEIGHT), (r, -_FLANGE_HEIGHT), (r, -bevel), (0.55 * r, 0.0), (0.0, 0.0)]
     return revolve(edge if up > 0.0 else [(radius, -h) for radius, h in reversed(edge)], segments=segments)

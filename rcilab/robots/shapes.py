@@ -1,12 +1,12 @@
 """Shapes of the arms from a few dimensions: housings, caps and flange as meshes, and capsules for collisions.
 
-Drawn after the arm itself. Every y joint is shared by two housings that lie side by side along its axis, the lower one
-at negative y, the upper one at positive y (the centres of mass in the vendor's description alternate the same way);
-each closes with a domed grey cap. Between two y joints a housing returns to the middle, where the z joints cut it.
+Modelled on the real arm. Every y joint is shared by two housings next to each other along its axis, the lower one at
+negative y, the upper one at positive y (the centres of mass in the vendor's description alternate in the same way);
+each ends with a domed grey cap. Between two y joints a housing returns to the middle, where the z joints divide it.
 A housing is one smooth union of rods and cylinders; parts with sharp edges (collars, caps, foot, flange) are bodies of
 revolution added to it.
 
-Everything is designed standing upright in the base frame and then moved to the link frames of `upright.py`.
+Everything is designed for the upright arm in the base frame and then moved to the link frames of `upright.py`.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ ROLE_COLORS: dict[ColorRole, tuple[int, int, int]] = {
 
 _GAP = 0.0012  # [m] half the gap between two housings
 _COLLAR = 0.014  # [m] width of the machined ring on each side of a gap
-_SEAM = 0.0006  # [m] how much a collar stands proud of the cast housing
-_SWEEP = 0.006  # [m] free space around a joint cylinder for the neighbour's housing
+_COLLAR_HEIGHT = 0.0006  # [m] height of a collar above the cast housing
+_FREE_SPACE = 0.006  # [m] free space around a joint cylinder for the neighbour's housing
 
 
-_ROD_CELL = 1.45  # how much larger the cells of rods may be, which have no edges
-_STRENGTH = 1.15  # how much thicker the 7 kg arms are
+_ROD_CELL = 1.45  # factor on the cell size of rods, which have no edges
+_THICKNESS_FACTOR = 1.15  # factor on the thickness of the 7 kg arms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +84,7 @@ class ArmShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Joint:
-    """A joint as the designer sees it, arm upright."""
+    """A joint of the upright arm, for the design of housings."""
 
     axis: Literal["y", "z"]
     height: float
@@ -119,8 +119,8 @@ def build_shapes(description: RobotDescription, quality: Literal["fine", "coarse
     fine = _FINENESS[quality]
     if description.rods is not None:
         return _rod_arm(description, description.rods, fine)
-    if description.rated_payload >= 5.0:  # as many triangles on a larger arm
-        fine = _Fineness(cell=_STRENGTH * fine.cell, segments=fine.segments)
+    if description.rated_payload >= 5.0:  # The same number of triangles on a larger arm.
+        fine = _Fineness(cell=_THICKNESS_FACTOR * fine.cell, segments=fine.segments)
     joints = _design_joints(description)
     flange = description.links[-1].origin_height
     pedestal = _pedestal(joints[0], fine)
@@ -148,7 +148,7 @@ def _rod_arm(description: RobotDescription, rods: tuple[tuple[Rod, ...], ...], f
 
 
 def _in_frame(shape: LinkShape, height: float) -> LinkShape:
-    """Transforms a link from the base frame into its own frame."""
+    """Returns the shape of a link, moved from the base frame to its own frame."""
     down = np.array([0.0, 0.0, -height])
     return LinkShape(
         tuple(Part(part.mesh.moved(down), part.role) for part in shape.parts),
@@ -157,8 +157,8 @@ def _in_frame(shape: LinkShape, height: float) -> LinkShape:
 
 
 def _design_joints(description: RobotDescription) -> list[_Joint]:
-    """Returns where the housings meet. Radii shrink from base to flange; the 7 kg arms are thicker."""
-    strength = 1.0 if description.rated_payload < 5.0 else _STRENGTH
+    """Returns the joints between housings. Radii decrease from base to flange; the 7 kg arms are thicker."""
+    strength = 1.0 if description.rated_payload < 5.0 else _THICKNESS_FACTOR
     heights = [link.origin_height for link in description.links]
     axes: list[Literal["y", "z"]] = ["y" if abs(joint.axis[1]) > 0.5 else "z" for joint in upright_joints(description)]
     radii = np.interp(np.linspace(0.0, 1.0, len(axes)), [0.0, 0.5, 1.0], [0.064, 0.056, 0.045]) * strength
@@ -177,16 +177,16 @@ def _design_joints(description: RobotDescription) -> list[_Joint]:
 
 
 def _width(joint: _Joint) -> float:
-    """Distance of a y joint's outer faces from the middle, [m]."""
+    """Returns the distance of a y joint's outer faces from the middle, [m]."""
     return 1.42 * joint.radius
 
 
 def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
-    """Returns the link between two joints; at a y joint it lies at +y of its own joint and at -y of the next one."""
+    """Returns the link between two joints; at y joints it is at +y of its own joint and at -y of the next one."""
     ends = [(low, +1.0, +1.0), (high, -1.0, -1.0)]  # joint, side in y, direction in z into the housing
 
     stations = [end.height + up * (_COLLAR + 0.01 if end.axis == "z" else 1.4 * end.radius) for end, _, up in ends]
-    radii = [end.radius - _SEAM if end.axis == "z" else 0.90 * end.radius for end, _, _ in ends]
+    radii = [end.radius - _COLLAR_HEIGHT if end.axis == "z" else 0.90 * end.radius for end, _, _ in ends]
     tips = [end.height + up * (0.002 if end.axis == "z" else 1.0 * end.radius) for end, _, up in ends]
 
     def body(p: Array) -> Array:
@@ -204,7 +204,7 @@ def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
         for end, side, _ in ends:
             if end.axis == "y":
                 near, far = sorted((-side * 0.3, side * _GAP))
-                room = cylinder(p, 1, near, far, end.radius + _SWEEP, 0.0, (0.0, end.height))
+                room = cylinder(p, 1, near, far, end.radius + _FREE_SPACE, 0.0, (0.0, end.height))
                 d = np.maximum(cut(d, room, 0.014), side * p[:, 1] - _width(end))
         return d
 
@@ -220,7 +220,7 @@ def _housing(low: _Joint, high: _Joint, fine: _Fineness) -> LinkShape:
 
 
 def _housing_capsules(ends: list[tuple[_Joint, float, float]]) -> list[Capsule]:
-    """Returns one capsule through the middle and one along each y joint; they stand proud of the caps by a little."""
+    """Returns one capsule through the middle and one along each y joint; they protrude slightly beyond the caps."""
     middle = [
         (0.0, 0.0, end.height + up * 0.35 * end.radius)
         if end.axis == "z"
@@ -236,7 +236,7 @@ def _housing_capsules(ends: list[tuple[_Joint, float, float]]) -> list[Capsule]:
 
 
 def _capsule(start: tuple[float, float, float], end: tuple[float, float, float], radius: float) -> Capsule:
-    """Returns a capsule in whole micrometres: more digits are of no use, and files stay readable."""
+    """Returns a capsule rounded to micrometres, which keeps files readable."""
     return Capsule(readonly_copy(np.round(start, 6)), readonly_copy(np.round(end, 6)), round(radius, 6))
 
 
@@ -267,25 +267,25 @@ def _trim(end: _Joint, side: float, up: float, fine: _Fineness) -> list[Part]:
 
 
 def _gap_ring(joint: _Joint, fine: _Fineness) -> list[Part]:
-    """Returns the dark ring one sees in the gap of the joint at a housing's upper end."""
+    """Returns the dark ring in the gap of the joint at a housing's upper end."""
     r, h = joint.radius - 0.0022, 2.0 * _GAP
     ring = revolve([(r, -h), (r, h)], axis=joint.axis, center=(0.0, 0.0, joint.height), segments=fine.segments)
     return [Part(ring, "dark")]
 
 
 def _by_role(parts: list[Part]) -> tuple[Part, ...]:
-    """Joins the meshes of one colour, trim before castings: drawn translucent, what lies below then stays hidden."""
+    """Merges the meshes of each colour, trim before castings, so that hidden parts stay hidden if translucent."""
     parts = parts[::-1]
     roles: dict[ColorRole, None] = dict.fromkeys(part.role for part in parts)
     return tuple(Part(merge_meshes([p.mesh for p in parts if p.role == role]), role) for role in roles)
 
 
 def _pedestal(joint: _Joint, fine: _Fineness) -> LinkShape:
-    """Returns the base: foot plate, column, connector box at the back (-x) and the ring under joint 1."""
+    """Returns the base: foot plate, column, connector box at the back (-x) and ring under joint 1."""
     r, top = joint.radius, joint.height
 
     def body(p: Array) -> Array:
-        column = vase(p, (-0.03, top - 0.002), (0.02, top - _COLLAR - 0.01), (r * 1.16, r - _SEAM))
+        column = vase(p, (-0.03, top - 0.002), (0.02, top - _COLLAR - 0.01), (r * 1.16, r - _COLLAR_HEIGHT))
         foot = cylinder(p, 2, -0.03, 0.030, r * 1.36, 0.014, (0.0, 0.0))
         back = box(p, (-0.95 * r, 0.0, 0.062), (0.75 * r, 0.66 * r, 0.042), 0.014)
         d = join(join(column, foot, 0.035), back, 0.022)
@@ -313,7 +313,7 @@ def _wrist_plate(joint: _Joint, flange: float, fine: _Fineness) -> LinkShape:
     face = flange - 0.016
 
     def body(p: Array) -> Array:
-        drum = cylinder(p, 2, low - 0.03, face - 0.003, r - _SEAM, 0.002, (0.0, 0.0))
+        drum = cylinder(p, 2, low - 0.03, face - 0.003, r - _COLLAR_HEIGHT, 0.002, (0.0, 0.0))
         pad = rod(p, (0.0, 0.70 * r, low + 0.036), (0.0, 0.70 * r, face - 0.42 * r - 0.004), 0.46 * r, 0.42 * r)
         return np.maximum(join(drum, pad, 0.016), low + 0.004 - p[:, 2])
 

@@ -1,7 +1,7 @@
-"""Smooth bodies from signed distances: primitives, smooth unions of them, and the mesh of their surface.
+"""Smooth bodies from signed distances: primitives, smooth unions, and meshes of their surfaces.
 
-A body is a function from points, shape (N, 3), [m], to signed distances, shape (N,), [m]: negative inside. Minimum
-joins bodies, maximum cuts them; the smooth versions round the seam, so that a housing looks cast in one piece.
+A body is a function from points, shape (N, 3), [m], to signed distances, shape (N,), [m]: negative inside. The minimum
+joins bodies, the maximum cuts them; the smooth versions round the seam, so that a housing looks like one casting.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def cylinder(p: Array, axis: int, low: float, high: float, radius: float, edge: 
 
 
 def rod(p: Array, start: Sequence[float], end: Sequence[float], r0: float, r1: float) -> Array:
-    """Returns distances to a round rod between two points whose radius goes from r0 to r1, [m]."""
+    """Returns distances to a round rod between two points, with the radius changing from r0 to r1, [m]."""
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     along = b - a
     t = np.clip((p - a) @ along / (along @ along), 0.0, 1.0)
@@ -60,11 +60,11 @@ def rod(p: Array, start: Sequence[float], end: Sequence[float], r0: float, r1: f
 
 
 def vase(p: Array, ends: Sequence[float], stations: Sequence[float], radii: Sequence[float]) -> Array:
-    """Returns distances (a little short, on the slope) to an upright body of revolution about the z axis.
+    """Returns distances (slightly too small on the slope) to an upright body of revolution about the z axis.
 
     Args:
         p: Points, shape (N, 3), [m].
-        ends: Heights of its flat bottom and top, [m].
+        ends: Heights of the flat bottom and top, [m].
         stations: Heights between which the radius changes from the first to the second, smoothly, [m].
         radii: Radius below the first and above the second station, [m].
     """
@@ -124,7 +124,7 @@ def _quads_across_edges(inside: np.ndarray, number: np.ndarray) -> np.ndarray:
 
 
 def _project(body: Body, points: Array, times: int) -> Array:
-    """Moves points onto the zero level by Newton steps along the gradient."""
+    """Returns points moved onto the zero level by Newton steps along the gradient."""
     for _ in range(times):
         shifts = np.concatenate([points] + [points + step for step in _STEP * np.eye(3)])
         value, *ahead = body(shifts).reshape(4, -1)
@@ -135,7 +135,7 @@ def _project(body: Body, points: Array, times: int) -> Array:
 
 
 def _average_neighbours(vertices: Array, quads: np.ndarray) -> Array:
-    """Moves every vertex halfway to the mean of the quads around it, which evens out the net."""
+    """Returns vertices moved towards the mean of the quads around them, which smooths the net."""
     ends = np.roll(quads, 1, axis=1).ravel(), np.roll(quads, -1, axis=1).ravel()
     center = quads.ravel()
     total = 2.0 * np.bincount(center, minlength=len(vertices))
@@ -150,7 +150,7 @@ def _average_neighbours(vertices: Array, quads: np.ndarray) -> Array:
 
 
 def _split_quads(vertices: Array, quads: np.ndarray) -> np.ndarray:
-    """Returns two triangles a quad, split along its shorter diagonal."""
+    """Returns two triangles per quad, split along its shorter diagonal."""
     a, b, c, d = quads.T
     short = np.linalg.norm(vertices[a] - vertices[c], axis=1) <= np.linalg.norm(vertices[b] - vertices[d], axis=1)
     first = np.where(short[:, None], np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))

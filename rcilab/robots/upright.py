@@ -1,7 +1,7 @@
 """Upright link frames, parallel to the base frame at zero pose.
 
-Denavit-Hartenberg frames are for computing. For drawing, URDF, MJCF and rigid-body dynamics each link gets the frame
-its mass data are given in: parallel to the base when all joint angles are zero, origin in the base's xz plane (that of
+Denavit-Hartenberg frames are used for kinematics. For drawing, URDF, MJCF and rigid-body dynamics each link has the
+frame of its mass data: parallel to the base when all joint angles are zero, origin in the base's xz plane (that of
 the xMates on the base z axis).
 """
 
@@ -16,7 +16,7 @@ from rcilab.core.errors import ModelError
 from rcilab.core.spatial import Pose
 from rcilab.robots.description import RobotDescription
 
-_TOLERANCE = 1e-12  # [m] and axis components: the tables put axes and origins on the base z axis exactly.
+_TOLERANCE = 1e-12  # [m] and axis components: axes and origins of the tables are exactly on the base z axis.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
     """Returns the joints between upright link frames, base to flange; the last origin is the flange's.
 
     Raises:
-        ModelError: The arm does not stand upright at zero, as with the manual's 6-axis table taken literally.
+        ModelError: The arm is not upright at zero, as with the manual's 6-axis table taken literally.
     """
     T = np.eye(4)
     joints: list[UprightJoint] = []
@@ -45,7 +45,7 @@ def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
             ahead = f"{link.origin_ahead} m ahead of " if link.origin_ahead else ""
             raise ModelError(
                 f"{description.name}: joint {number} does not pass through {ahead}the base axis at "
-                f"{link.origin_height} m at zero pose; the theta offsets must make the arm stand upright"
+                f"{link.origin_height} m at zero pose; the theta offsets must make the arm upright"
             )
         joints.append(UprightJoint(readonly_copy(origin - below), readonly_copy(np.round(axis, 12) + 0.0)))
         below = origin
@@ -56,7 +56,7 @@ def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
 
 
 def upright_flange(description: RobotDescription) -> Pose:
-    """Returns the pose of the flange in the last link's frame: turned where it does not look up at zero pose."""
+    """Returns the pose of the flange in the last link's frame; rotated if it does not face up at zero pose."""
     T = np.eye(4)
     for row in description.dh:
         T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
@@ -66,7 +66,7 @@ def upright_flange(description: RobotDescription) -> Pose:
 
 
 def _is_square(R: np.ndarray) -> bool:
-    """Returns whether a rotation only swaps and reverses axes, up to rounding."""
+    """Returns whether a rotation only permutes and reverses axes, within rounding."""
     return bool(np.abs(R - np.round(R)).max() < _TOLERANCE)
 
 

@@ -1,8 +1,8 @@
 """An arm as URDF: link frames of `upright.py`, inertias and limits of the description, meshes and capsules of `shapes`.
 
-URDF has no capsule, so each collision capsule stands as a cylinder with a sphere at either end. Numbers are written
-so that reading them back gives the same floats. The extra `mujoco` element makes MuJoCo keep mesh paths, visuals and
-the links fixed to the flange; other readers skip it.
+URDF has no capsule, so each collision capsule is a cylinder with a sphere at both ends. Numbers are written so that
+reading them gives the same floats. The additional `mujoco` element makes MuJoCo keep mesh paths, visuals and the links
+fixed to the flange; other readers ignore it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def build_urdf(description: RobotDescription, *, mesh_dir: str | None = None, T_
 
 
 def build_meshes(description: RobotDescription) -> dict[str, bytes]:
-    """Returns the binary STL files that `build_urdf` and `build_mjcf` name, by file name."""
+    """Returns the binary STL files to which `build_urdf` and `build_mjcf` refer, by file name."""
     shape = build_shapes(description, "coarse")
     names = ["base", *(f"link{number}" for number in range(1, description.n + 1))]
     return {
@@ -66,12 +66,12 @@ def mesh_file(link: str, role: str) -> str:
 
 
 def number_text(value: float) -> str:
-    """Returns a float so that reading it gives the same float; zero has no sign."""
+    """Returns a float as text that reads as the same float; zero has no sign."""
     return repr(float(value) + 0.0)
 
 
 def vector_text(values: Iterable[float]) -> str:
-    """Returns numbers with spaces between them."""
+    """Returns numbers as text, separated by spaces."""
     return " ".join(number_text(value) for value in values)
 
 
@@ -105,7 +105,7 @@ def _capsule(capsule: Capsule) -> list[str]:
     middle = (capsule.start + capsule.end) / 2.0
     x, y, z = (capsule.end - capsule.start).tolist()
     radius = number_text(capsule.radius)
-    rpy = (math.atan2(-y, math.hypot(x, z)), math.atan2(x, z), 0.0)  # turns z onto the line from start to end
+    rpy = (math.atan2(-y, math.hypot(x, z)), math.atan2(x, z), 0.0)  # Rotates z onto the line from start to end.
     cylinder = f'<cylinder radius="{radius}" length="{number_text(math.sqrt(x * x + y * y + z * z))}"/>'
     sphere = f'<sphere radius="{radius}"/>'
     return [
