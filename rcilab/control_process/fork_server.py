@@ -8,15 +8,18 @@ user's `__main__`, so that a script without `if __name__ == "__main__"` does not
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import pickle
+import resource
 import signal
 import sys
 from collections.abc import Sequence
 from multiprocessing.forkserver import ForkServer
 
 _PRELOAD = "rcilab.control_process.forkserver_preload"
+_MIN_FILES = 20  # Open ones. With 15 the fork server cannot receive those of a process; it inherits the limit.
 
 
 def _new_server() -> ForkServer:
@@ -35,6 +38,7 @@ def fork_server_pid() -> int:
         OSError: It could not be started.
     """
     global _server
+    _require_files()
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Inherited until it ignores interrupts.
     try:
         try:
@@ -76,6 +80,14 @@ def fork(task: object, files: Sequence[int]) -> tuple[int, int]:
         os.close(pipe)
         raise
     return status, pipe
+
+
+def _require_files() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != resource.RLIM_INFINITY and soft < _MIN_FILES:
+        if hard != resource.RLIM_INFINITY and hard < _MIN_FILES:
+            raise OSError(errno.EMFILE, f"only {hard} files may be open, {_MIN_FILES} are needed: raise ulimit -n")
+        resource.setrlimit(resource.RLIMIT_NOFILE, (_MIN_FILES, hard))
 
 
 def kill_fork_server() -> None:

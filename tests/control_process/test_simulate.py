@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -253,3 +255,15 @@ def test_a_controller_that_is_killed_in_mid_motion_is_noticed_although_it_keeps_
         assert len(lost.value.record) > 0
     finally:
         controller.end()
+
+
+@pytest.mark.parametrize("files", [8, 14, 15, 19])
+def test_too_few_open_files_are_said_in_one_sentence(files):
+    """With 14 and 15 the fork server fails while it receives the files of a process."""
+    script = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))\n"
+        "import rcilab; rcilab.simulate(rcilab.load_model('xMatePro7'))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert f"only {files} files may be open, 20 are needed: raise ulimit -n" in done.stderr.splitlines()[-1]
+    assert "forkserver" not in done.stderr
