@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rcilab.core.command import Command
-from rcilab.core.errors import InvalidValueError, RcilabError
+from rcilab.core.errors import DeadlineError, InvalidValueError, RcilabError
+from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState
 from rcilab.makers.configuration import RobotConfiguration
@@ -25,7 +27,6 @@ from rcilab.makers.rokae.driver.controller_parameters import send_configuration
 from rcilab.makers.rokae.driver.fault_report import describe_faults
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there, with_tool_of
 from rcilab.makers.rokae.driver.identify import identify_robot
-from rcilab.makers.rokae.driver.recovery import recover
 from rcilab.makers.rokae.driver.refusal import Refusal
 from rcilab.makers.rokae.driver.session_commands import RciSessionCommands
 from rcilab.makers.rokae.driver.transport import SocketTransport
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 __all__ = ["RciDriver", "open_driver", "parse_address"]
 
 _MOST_JOINTS = 7
+_RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them.
+_FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
 _MOTION_MODES = {
     ControllerMode.JOINT_POSITION: StartMotionMode.JOINT,
     ControllerMode.JOINT_IMPEDANCE: StartMotionMode.JOINT,
@@ -137,7 +140,21 @@ class RciDriver:
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone."""
-        recover(self._commands, self.connection)
+        self._commands.automatic_error_recovery()
+        link, deadline = self.connection, time.monotonic() + _RECOVERY_TIMEOUT
+        faults = link.latest.faults if link.latest is not None else ()
+        while time.monotonic() < deadline:
+            states = link.poll(_FRESH)
+            link.on_states(states)
+            if states:
+                faults = states[-1].faults
+                if not faults:
+                    return
+        names = name_faults(faults)
+        raise DeadlineError(
+            f"{link.name}: {names or 'the faults'} did not clear within {_RECOVERY_TIMEOUT:g} s; remove the cause first"
+            + (f": {faults[0].remedy}" if faults else "")
+        ).coded("not_cleared", faults=names, seconds=f"{_RECOVERY_TIMEOUT:g}")
 
     def configure(self, configuration: RobotConfiguration) -> None:
         """Sends a configuration."""
