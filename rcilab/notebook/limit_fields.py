@@ -25,7 +25,7 @@ from rcilab.notebook.style import block, problem, soft, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 from rcilab.robots import describe_robot
 
-_WIDTHS = ("8em", "3.4em", "2.6em")  # So that both ends of a joint stand in a row.
+_WIDTHS = ("9.2em", "3.4em", "2.6em")  # So that both ends of a joint stand in a row.
 
 
 class LimitFields:

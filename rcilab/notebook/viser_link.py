@@ -13,6 +13,7 @@ from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.views.access_control import AccessPolicy
 from rcilab.views.arm_view import ArmView
+from rcilab.views.viser_ext.client_messages import run_javascript
 from rcilab.views.viser_scene import ViserScene
 from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.views.viser_stage import add_environment, place_camera
@@ -20,6 +21,8 @@ from rcilab.views.viser_stage import add_environment, place_camera
 LOOPBACK = "127.0.0.1"
 _TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
 _HOLD = 1.0  # [s] The arm rests at the goal before the motion starts again.
+_HIDE_WARNING = """document.head.insertAdjacentHTML("beforeend",
+"<style>#webgl-software-rendering { display: none }</style>")"""  # viser's box covers the arm in a small frame.
 _MARKUP = """<p>viser: <a href="{url}" target="_blank">{url}</a></p>
 <iframe src="{url}" style="width: 100%; height: {height}px; border: none"></iframe>"""
 
@@ -136,4 +139,5 @@ def open_page(port: int) -> tuple[GuardedServer, int]:
     door.viser.gui.configure_theme(show_logo=False, show_share_button=False)
     place_camera(door.viser)
     add_environment(door.viser, full=False)
+    door.viser.on_client_connect(lambda client: run_javascript(client, _HIDE_WARNING))
     return door, number

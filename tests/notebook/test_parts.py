@@ -443,6 +443,14 @@ def test_a_lab_keeps_the_soft_limits_tool_and_load_that_its_session_sets_later()
         assert not state.now.plan.report.ok, "it leaves the soft range"
 
 
+def test_a_soft_limit_of_six_characters_fits_its_field() -> None:
+    with notebook.RunPanel(PRO7) as panel:
+        panel.limits._on_open({"new": 0})
+        box = panel.limits.fields[0][0].box
+        width, label = (float(em.removesuffix("em")) for em in (box.layout.width, box.style.description_width))
+        assert width - label >= 5.6  # [em] "-170.0", and what surrounds it in a field.
+
+
 def test_a_slip_in_the_name_of_an_attribute_is_not_taken_in_silence():
     panel = notebook.TargetPanel(rcilab.load_model("xMatePro7"))
     with pytest.raises(AttributeError, match=r"TargetPanel has no languge; "):

@@ -5,6 +5,7 @@ import socket
 import time
 import urllib.request
 from collections.abc import Iterator
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -51,6 +52,15 @@ def test_a_foreign_origin_is_refused(page: PreviewPage, origin: str | None) -> N
 
 def test_our_own_origin_is_let_in(page: PreviewPage) -> None:
     assert handshake(page, f"http://127.0.0.1:{page.port}") == 101
+
+
+def test_a_page_is_sent_what_hides_visers_notice_of_software_rendering(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[str] = []
+    monkeypatch.setattr("rcilab.notebook.viser_link.run_javascript", lambda client, source: sent.append(source))
+    with serve_preview(MOTION, PRO7) as page:
+        for act in page._door.viser._client_connect_cb:  # viser calls them once a page has drawn.
+            act(MagicMock())
+    assert any("#webgl-software-rendering { display: none }" in source for source in sent)
 
 
 def test_it_plays_by_itself_to_the_end(page: PreviewPage) -> None:
