@@ -1,4 +1,4 @@
-"""What a client commands for one cycle, as a virtual arm takes it: plain floats, no maker's packet."""
+"""A client's command for one cycle, as plain floats, independent of the maker's packets."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ class ArmCommand(NamedTuple):
     """A command of any control mode; a motion generator reads the fields of its mode."""
 
     number: int
-    """The cycle whose state it answers."""
+    """Number of the cycle whose state it answers."""
     q: tuple[float, ...] = ()
     """Joint angles, n numbers, [rad]."""
     T_base_tool: tuple[float, ...] = ()

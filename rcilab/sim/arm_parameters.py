@@ -1,4 +1,4 @@
-"""What can be configured on a virtual arm, in neutral terms; a maker's settings build on it."""
+"""The configuration of a virtual arm, independent of the maker; the settings of a maker extend it."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ Floats = tuple[float, ...]
 
 
 class ForceAxesKind(Enum):
-    """Whose directions the axes of the force-control frame have."""
+    """Directions of the axes of the force-control frame."""
 
     WORLD = "world"
-    """Those of the base."""
+    """The axes of the base."""
     TOOL = "tool"
-    """Those of the frame itself."""
+    """The axes of the frame itself."""
     PATH = "path"
     """x along the commanded velocity of the tool."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmParameters:
-    """Values that a client configures; vectors have n plain floats."""
+    """The configuration from a client; vectors have n plain floats."""
 
     joint_lower: Floats
     """Soft limits, [rad]."""
@@ -43,12 +43,12 @@ class ArmParameters:
     cartesian_stiffness: Floats
     """Three translations [N/m], three rotations [N m/rad]."""
     desired_wrench: Floats = (0.0,) * 6
-    """What Cartesian impedance presses with, [N, N m]."""
+    """Desired wrench of Cartesian impedance, [N, N m]."""
     T_flange_tool: Pose = IDENTITY
     load: Payload = NO_LOAD
     joint_filter: float = SAMPLING_RATE
-    """Cut-off frequency of the low pass on commanded joint angles, [Hz]. Off after power-up: a client that filters
-    before it sends is not filtered twice, one that does not is followed exactly."""
+    """Cut-off frequency of the low-pass filter of commanded joint angles, [Hz]. Off after power-up, so that commands
+    are not filtered twice."""
     cartesian_filter: float = SAMPLING_RATE
     """The same for commanded poses, [Hz]."""
     torque_filter: float = SAMPLING_RATE
@@ -58,13 +58,13 @@ class ArmParameters:
     """Force-control frame."""
     force_axes: ForceAxesKind = ForceAxesKind.WORLD
     virtual_guide: bool = False
-    """Whether walls push the tool back into the active safety box wherever the arm is compliant."""
+    """Whether walls push the tool back into the active safety box while the arm is compliant."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits instead of violating them."""
 
     @classmethod
     def of(cls, arm: RobotDescription) -> Self:
-        """Returns what an arm has after power-up: the widest limits, the highest thresholds and stiffness."""
+        """Returns the configuration after power-up: the widest limits, the highest thresholds and stiffness."""
         joint, cartesian = arm.limits.joint, arm.limits.cartesian
         return cls(
             joint_lower=tuple(joint.lower.tolist()),
@@ -80,5 +80,5 @@ class ArmParameters:
 
     @property
     def guiding_box(self) -> SafetyBox | None:
-        """The box whose walls push; None when there are no such walls."""
+        """The box whose walls push the tool back; None without such walls."""
         return active_box(self.safety_box) if self.virtual_guide else None

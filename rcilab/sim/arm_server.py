@@ -180,7 +180,7 @@ class ArmServer:
         notice_left = 0
         is_ready = has_served = False
         while True:
-            stall = self._stalls.take(self._clock.now())
+            stall = self._stalls.pop(self._clock.now())
             if stall > 0.0:
                 self._stall(stall)
             if self._is_ending and end_deadline is None:

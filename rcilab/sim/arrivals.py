@@ -1,4 +1,4 @@
-"""What arrives at the sockets of a virtual controller, as values."""
+"""Events at the sockets of a virtual controller."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ClientConnected:
 
 @dataclass(frozen=True, slots=True)
 class ClientDisconnected:
-    """The connection is over."""
+    """A connection ended."""
 
     peer: Peer
     reason: str
@@ -26,7 +26,7 @@ class ClientDisconnected:
 
 @dataclass(frozen=True, slots=True)
 class FrameArrived:
-    """A whole TCP frame."""
+    """A complete TCP frame."""
 
     peer: Peer
     frame: bytes
@@ -34,23 +34,23 @@ class FrameArrived:
 
 @dataclass(frozen=True, slots=True)
 class DatagramArrived:
-    """A UDP datagram of the client's."""
+    """A UDP datagram of the client."""
 
     datagram: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class StrangerDetected:
-    """The first UDP datagram on a connection that is not from its client; it is ignored, as all later ones are."""
+    """The first UDP datagram that is not from the client; it is ignored, like all later ones."""
 
     address: str
     client: str
-    """Address of the client; "" while none is connected."""
+    """Address of the client; "" without one."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClientRefused:
-    """One client more than a channel takes tried to connect."""
+    """A channel refused a client because of its limit."""
 
     address: str
     holder: str
@@ -58,7 +58,7 @@ class ClientRefused:
 
 @dataclass(frozen=True, slots=True)
 class ExtraSocketsReady:
-    """Sockets of other parts, watched along with the controller's, have something to read."""
+    """Additional sockets are readable."""
 
     sockets: list[socket.socket]
 

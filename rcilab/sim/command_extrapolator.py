@@ -1,38 +1,38 @@
-"""The stream of commands as it comes: what the next one would be, when it is not there."""
+"""Extrapolation of a command stream over missing commands."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-_CLEARLY = 4.0  # Times nearer, so that an unforeseen jerk does not decide; a tuning value.
+_CLEARLY = 4.0  # Ratio of distances that decides, so that a jerk does not; a tuning value.
 
 
 class CommandExtrapolator:
     """The last three commands of a motion, as vectors of numbers. Owned by a motion generator.
 
     Attributes:
-        last: The last command, or what was played in its place.
+        last: The last command, or its replacement.
 
     Args:
-        start: Where the arm is when the motion begins; it has been there for ever.
+        start: The stationary arm at the start of the motion.
     """
 
     def __init__(self, start: Sequence[float]) -> None:
         self.last = self._before = self._oldest = list(start)
 
     def take(self, values: Sequence[float]) -> None:
-        """Takes the command of this cycle, or what was played in its place."""
+        """Appends the command of this cycle, or its replacement."""
         self._oldest, self._before, self.last = self._before, self.last, list(values)
 
     def predict(self, steps: int, target: Sequence[float] | None = None, target_steps: int = 1) -> list[float]:
-        """Returns what is commanded in a number of cycles when nothing new comes.
+        """Returns the extrapolated command after a number of cycles.
 
-        Without a target the acceleration goes on as it is. With one, the jerk is what leads there.
+        Without a target the acceleration is constant. With one, the jerk is constant and leads to it.
 
         Args:
             steps: Cycles from now.
-            target: A command that is known for a later cycle.
-            target_steps: How many cycles from now that is.
+            target: A known command of a later cycle.
+            target_steps: Cycles from now to the target.
         """
         bend = steps * (steps + 1) / 2.0
         even = [
@@ -52,8 +52,8 @@ class CommandExtrapolator:
         Args:
             values: The command.
             steps: More than 1.
-            in_doubt: The answer where neither is clearly nearer. A step too small for the time harms a motion less than
-                one too large, so it is false unless something else speaks for one step.
+            in_doubt: The result if neither is clearly nearer. A step that is too small disturbs a motion less than one
+                that is too large, so it is false unless there is another reason for one step.
         """
         near, far = self.predict(1), self.predict(steps)
         off_near = sum(abs(a - b) for a, b in zip(values, near, strict=True))

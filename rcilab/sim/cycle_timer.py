@@ -1,16 +1,15 @@
-"""When cycles are due, and what becomes of those that this process missed. It reads no clock: the time is an argument.
+"""Schedule of cycles, and handling of missed ones. It reads no clock: the time is an argument.
 
-A real controller's clock never stops; this one does whenever the machine gives the process no core. Such cycles are
-left out and counted. What stopped the controller has mostly stopped a client on the same machine as well, which may
-resume later. So for as long as the pause lasted, a cycle without a command is put off and its command does not count as
-lost; after that it does.
+The clock of a real controller never stops; this one stops when the process gets no CPU time. Such cycles are skipped
+and counted. A client on the same machine has usually been stopped as well, and may resume later. Therefore, for as long
+as the pause lasted, a cycle without a command is postponed and its command does not count as lost.
 """
 
 from __future__ import annotations
 
 from rcilab.core.clock import CYCLE_TIME
 
-LONGEST_PATIENCE = 250  # [cycles] However long the pause was: no client streams commands through more.
+LONGEST_PATIENCE = 250  # [cycles] Also after a longer pause: no client continues its stream after that.
 
 
 class CycleTimer:
@@ -18,7 +17,7 @@ class CycleTimer:
 
     Attributes:
         deadline: When the current cycle is due, [s].
-        missed: Cycles that were left out or put off.
+        missed: Cycles that were skipped or postponed.
 
     Args:
         now: The time, [s].
@@ -36,7 +35,7 @@ class CycleTimer:
         self.deadline = now
 
     def next(self, now: float) -> float:
-        """Returns when the next cycle is due, [s], at most a cycle ago; those before it are left out."""
+        """Returns the time at which the next cycle is due, [s], at most a cycle ago; earlier ones are skipped."""
         self.deadline += self._period
         self._patience = max(0, self._patience - 1)
         skipped = int((now - self.deadline) / self._period)
@@ -47,10 +46,10 @@ class CycleTimer:
         return self.deadline
 
     def puts_off(self, is_starved: bool) -> bool:
-        """Returns whether this cycle is put off.
+        """Returns whether this cycle is postponed.
 
         Args:
-            is_starved: Whether a motion runs whose next command is not there.
+            is_starved: Whether a motion is in progress whose next command has not arrived.
         """
         if not is_starved or self._patience == 0:
             return False

@@ -1,10 +1,10 @@
-"""The motor side of the joints: what the encoders and currents of the drives would say.
+"""The motor side of the joints: motor angles and torques.
 
-    theta = N (q + tau / k)         the gear is a spring: under torque the motor runs ahead of the joint
+    theta = N (q + tau / k)         the gear is a spring: under torque the motor leads the joint
     motor_tau = (tau + B ddq + d dq) / N      joint torque, rotor inertia B and viscous friction d, seen at the motor
 
-No table gives the figures of these drives. Ratio and stiffness here are choices typical of strain-wave gears of this
-size; rotor inertia and friction are those that the MuJoCo arm moves with.
+The manual has no values for these drives. Ratio and stiffness are typical of strain-wave gears of this size; rotor
+inertia and friction are those of the MuJoCo plant.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ class DriveModel:
     def __init__(self, model: RobotModel) -> None:
         torque = model.limits.joint.torque
         self.ratio: JointVector = readonly_copy(np.full(model.n, GEAR_RATIO))
-        """Motor turns a joint turn, shape (n,)."""
+        """Gear ratio, motor turns per joint turn, shape (n,)."""
         self.gear_stiffness: JointVector = readonly_copy(STIFFNESS_PER_TORQUE * torque)
         """Shape (n,), [N m/rad]."""
         self.rotor_inertia: JointVector = readonly_copy(ARMATURE_PER_TORQUE * torque / GEAR_RATIO**2)
-        """Of the motor itself, shape (n,), [kg m^2]; N^2 times that is seen at the joint."""
+        """Of the motor, shape (n,), [kg m^2]; at the joint it is N^2 times larger."""
         self.friction: JointVector = readonly_copy(DAMPING_PER_TORQUE * torque)
-        """Viscous, seen at the joint, shape (n,), [N m s/rad]."""
+        """Viscous friction at the joint, shape (n,), [N m s/rad]."""
         q, dq, tau, ddq, dtau = np.split(np.eye(5 * model.n), 5, axis=1)
         columns = self.theta(q, tau), self.dtheta(dq, dtau), self.motor_tau(tau, dq, ddq)
         self.matrix: Matrix = readonly_copy(np.concatenate(columns, axis=1).T)

@@ -1,7 +1,7 @@
-"""What the state says of the drives: their motor side, and torques filtered for the eye of the user.
+"""The values of the drives in the state: motor side, and low-pass filtered torques.
 
-All of it is linear in what the sensors say now, in how that has changed since the last cycle, and in the filtered
-torques so far. So a single product makes it, where one operation after the other would take three times as long.
+They are linear in the sensor values, in their changes since the last cycle, and in the previous filtered torques. A
+single matrix product computes them in a third of the time of separate operations.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from rcilab.sim.drive_model import DriveModel
 from rcilab.sim.filters import low_pass_gain
 from rcilab.sim.plant import Measurement
 
-_SETTLED_TORQUE = 1e-6  # [N m] A filtered torque this close to the true one takes its value, so that rest is rest.
+_SETTLED_TORQUE = 1e-6  # [N m] Difference below which a filtered torque is set to the true one.
 
 
 class DriveReport:
-    """Follows the drives cycle by cycle. Owned by the reporter.
+    """Computes the values of the drives cycle by cycle. Owned by the reporter.
 
     Attributes:
-        is_settled: Whether the filtered torques are the true ones.
+        is_settled: Whether the filtered torques equal the true ones.
 
     Args:
         model: The arm.
@@ -40,7 +40,7 @@ class DriveReport:
         """Returns theta, dtheta, motor_tau, and filtered both tau and motor_tau, each of shape (n,), in SI.
 
         Args:
-            measured: What the sensors say; the very same object again means that nothing has changed.
+            measured: The measurement; the same object means that nothing has changed.
             is_stationary: Whether the reference is stationary, so that the filter may settle.
         """
         last = self._last or measured
@@ -48,20 +48,20 @@ class DriveReport:
         report = self._matrix.dot(np.concatenate((q, dq, tau, dq - last.dq, tau - last.tau, self._filtered)))
         n = len(q)
         true, filtered = report[2 * n : 4 * n], report[4 * n :]
-        self.is_settled = self._last is None or self._gain == 1.0 or (is_stationary and _is_one(true, filtered))
+        self.is_settled = self._last is None or self._gain == 1.0 or (is_stationary and _is_close(true, filtered))
         self._last, self._filtered = measured, true if self.is_settled else filtered
         return report[:n], report[n : 2 * n], true[n:], self._filtered[:n], self._filtered[n:]
 
 
-def _is_one(true: Array, filtered: Array) -> bool:
+def _is_close(true: Array, filtered: Array) -> bool:
     return bool(np.abs(true - filtered).max() < _SETTLED_TORQUE)
 
 
 def _report_matrix(motor_side: Matrix, gain: float) -> Matrix:
-    """Returns what makes a report, shape (6 n, 7 n).
+    """Returns the matrix of a report, shape (6 n, 7 n).
 
-    From q, dq, tau, the changes of the last two in a cycle, and the filtered tau and motor_tau, it makes theta,
-    dtheta, tau, motor_tau, and the filtered ones anew: x += gain (u - x).
+    It maps q, dq, tau, the changes of the last two in a cycle, and the filtered tau and motor_tau to theta, dtheta,
+    tau, motor_tau, and the next filtered values: x += gain (u - x).
     """
     n = len(motor_side) // 3
     motor_side = np.concatenate((motor_side[:, : 3 * n], motor_side[:, 3 * n :] / CYCLE_TIME), axis=1)

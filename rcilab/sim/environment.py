@@ -1,7 +1,7 @@
-"""What surrounds a virtual robot: forces, boxes, buttons, wires, the network and the clock; and requests to change it.
+"""The environment of a virtual robot: forces, boxes, buttons, signals, network, clock; and requests to change it.
 
-Everything is done in the thread of the controller between two cycles, so a request takes effect at the next cycle, and
-in lock-step every run with the same requests at the same cycles comes out the same.
+Requests are handled in the thread of the controller between two cycles and take effect in the next cycle. In lock-step,
+runs with the same requests at the same cycles have the same result.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from rcilab.sim.maker_server import SimulatedController
 
 @dataclass(frozen=True, slots=True)
 class ServerCounters:
-    """What the server counts: cycles left out, datagrams of a wrong size, and datagrams of strangers."""
+    """Counters of the server: skipped cycles, malformed datagrams, and foreign datagrams."""
 
     missed: int
     bad_datagrams: int
@@ -54,14 +54,14 @@ class ServerCounters:
 
 
 class Environment:
-    """Carries out world requests. Owned by the thread that runs the controller.
+    """Handles requests of the simulation port. Owned by the thread that runs the controller.
 
     Args:
         controller: The controller.
         network: Its network.
-        stalls: Pauses of its clock.
-        clock: What these pauses are measured with.
-        counters: What the server has counted so far.
+        stalls: Stalls of its clock.
+        clock: Clock for the stalls.
+        counters: Returns the counters of the server.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Environment:
         self._walls: SafetyBox | None = None
 
     def handle(self, request: WorldRequest) -> WorldAnswer:
-        """Carries a request out, or returns why not."""
+        """Carries out a request and returns the response."""
         if isinstance(request, GetStatus):
             return self._status()
         try:

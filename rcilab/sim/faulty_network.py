@@ -1,7 +1,7 @@
-"""The sockets of a virtual controller behind a network with faults: it loses, delays and corrupts what passes.
+"""The sockets of a virtual controller behind a simulated network that loses, delays and corrupts data.
 
-Without faults everything passes directly. Time is the machine's own here, in lock-step too: the simulated
-millisecond waits for a command, however late it is, but not for one that is known to be lost.
+Without faults all data passes directly. Delays are in real time, also in lock-step: the simulated millisecond waits for
+a delayed command, but not for one that is known to be lost.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from rcilab.sim.network_impairment import DelayedDatagrams, SlowStream
 
 
 class FaultyNetwork:
-    """Stands between a controller and its sockets: the `Link` of a maker's server. Owned by the controller's thread.
+    """The simulated network between a controller and its sockets: a maker's `Link`. Owned by the controller's thread.
 
     Attributes:
-        has_lost: Whether the newest state, or a command since, is lost: this state may never be answered.
-        log: Takes a line for the operator, and never waits.
+        has_lost: Whether the newest state, or a command since then, is lost: this state may never be answered.
+        log: Receives a line for the operator; does not block.
 
     Args:
         endpoint: The sockets.
-        clock: What delays are measured with.
+        clock: Clock for the delays.
         commands: Faults towards the controller.
         states: Faults towards the client; they apply to TCP, too.
         log: As the attribute.
@@ -46,8 +46,8 @@ class FaultyNetwork:
         self._commands = DelayedDatagrams(commands, "commands")
         self._states = DelayedDatagrams(states, "states")
         self._tcp_faults = states
-        self._answers: dict[Peer, SlowStream] = {}  # Of the clients that have been answered under faults.
-        self._drop_reasons: dict[Peer, str] = {}  # Of those that go once their answers are out.
+        self._answers: dict[Peer, SlowStream] = {}  # Clients with delayed responses.
+        self._drop_reasons: dict[Peer, str] = {}  # Connections to end after their last response.
         self.has_lost = False
 
     @property
@@ -56,7 +56,7 @@ class FaultyNetwork:
         return self._commands.faults, self._states.faults
 
     def replace(self, faults: NetworkFaults, direction: Direction) -> None:
-        """Changes the faults from now on. A connection whose byte budget is used up breaks at once."""
+        """Replaces the faults. A connection whose byte limit is exceeded breaks at once."""
         if direction != "states":
             self._commands.replace(faults)
         if direction != "commands":
@@ -67,54 +67,54 @@ class FaultyNetwork:
             self._answers = {peer: answers for peer, answers in self._answers.items() if not answers.is_clean}
 
     def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
-        """Returns what has come through; see `Endpoint.poll`. Delayed data is sent meanwhile."""
+        """Returns the arrivals that passed the network; see `Endpoint.poll`. Delayed data is sent meanwhile."""
         if self.is_clean:
             return self._endpoint.poll(timeout, extra_sockets)
         deadline = self._clock.now() + timeout
         had_lost = self.has_lost
         while True:
-            self._send_what_is_due()
+            self._send_due()
             now = self._clock.now()
             answers = (stream.next_due for stream in self._answers.values())
             due = min(deadline, self._commands.next_due, self._states.next_due, *answers)
             arrivals = self._let_through(self._endpoint.poll(due - now, extra_sockets))
             if arrivals or self.has_lost is not had_lost or self._clock.now() >= deadline:
-                self._send_what_is_due()
+                self._send_due()
                 return arrivals
 
     def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram on its way."""
+        """Sends a datagram, with the faults."""
         if self._states.is_clean:
             self.has_lost = False
             self._endpoint.send_datagram(datagram)
         else:
             self.has_lost = not self._states.put(datagram, self._clock.now())
-            self._send_what_is_due()
+            self._send_due()
 
     def send_frame(self, peer: Peer, frame: bytes) -> None:
-        """Sends an answer on its way."""
+        """Sends a response, with the faults."""
         if self._is_tcp_clean:
             self._endpoint.send_frame(peer, frame)
         else:
             self._answers_to(peer).put(frame, self._clock.now())
-            self._send_what_is_due()
+            self._send_due()
 
     def direct_datagrams(self, peer: Peer, port: int) -> bool:
-        """Has datagrams go to a port of this client's; returns False for a port that may not be."""
+        """Directs datagrams to a port of this client; returns False for a port that is not allowed."""
         return self._endpoint.direct_datagrams(peer, port)
 
     def drop(self, peer: Peer, reason: str) -> None:
-        """Ends a connection once its answers are out; the next `poll` reports it."""
+        """Ends a connection after its last response; the next `poll` reports it."""
         if self._is_tcp_clean:
             self._endpoint.drop(peer, reason)
         else:
             self._answers_to(peer)
             self._drop_reasons[peer] = reason
-            self._send_what_is_due()
+            self._send_due()
 
     @property
     def is_clean(self) -> bool:
-        """Whether there is no fault in effect."""
+        """Whether no fault is in effect."""
         return self._commands.is_clean and self._states.is_clean and self._is_tcp_clean
 
     @property
@@ -127,7 +127,7 @@ class FaultyNetwork:
             self._answers[peer] = SlowStream(self._tcp_faults)
         return self._answers[peer]
 
-    def _send_what_is_due(self) -> None:
+    def _send_due(self) -> None:
         now = self._clock.now()
         for datagram in self._states.take(now):
             self._endpoint.send_datagram(datagram)
@@ -141,7 +141,7 @@ class FaultyNetwork:
                 self._endpoint.drop(peer, self._drop_reasons.pop(peer))
 
     def _let_through(self, arrivals: list[Arrival]) -> list[Arrival]:
-        """Returns the arrivals without the datagrams that are not there yet, and with those that are now."""
+        """Returns the arrivals without datagrams that are delayed, and with delayed ones that are due."""
         now = self._clock.now()
         passed: list[Arrival] = []
         for arrival in arrivals:

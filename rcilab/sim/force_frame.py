@@ -11,15 +11,17 @@ from rcilab.core.spatial import Pose, Rotation9, rotation_between, rotation_from
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.arm_parameters import ArmParameters, ForceAxesKind
 
-_TURN_STEP = 2.0 * math.pi * CYCLE_TIME  # [rad] in a cycle: half a turn takes 0.5 s, as long as the largest wrench does
-# to be reached; a path at 1 m/s is followed without delay round any arc wider than 16 cm. A tuning value.
-_STANDING = 1e-6  # [m/s] Below this the tool has no direction of its path.
+_TURN_STEP = (
+    2.0 * math.pi * CYCLE_TIME
+)  # [rad] Per cycle: half a turn takes 0.5 s, like the ramp to the largest wrench;
+# a path at 1 m/s is followed without delay on arcs with a radius above 16 cm. A tuning value.
+_STANDSTILL = 1e-6  # [m/s] Below this the path of the tool has no direction.
 _ORIGIN = (0.0, 0.0, 0.0)
 _ALONG = 0.999  # Cosine of an angle above which two directions count as parallel.
 
 
 class PosedTool(Protocol):
-    """A tool that computes its pose on demand, as most cycles do not need it."""
+    """A tool that computes its pose on demand: most cycles do not need it."""
 
     @property
     def pose(self) -> Pose:
@@ -28,20 +30,20 @@ class PosedTool(Protocol):
 
 
 class ForceAxes:
-    """Follows the axes of the force-control frame. Owned by one reader, which calls `follow` once a cycle.
+    """Computes the axes of the force-control frame. Owned by one reader, which calls `follow` once per cycle.
 
-    WORLD: those of the base. TOOL: those of the frame itself. PATH: x along the commanded velocity of the tool (where
-    it stands still, its last direction), z as near to the frame's z as that allows. Where a path begins, reverses or
-    has a corner, its axes turn there by `_TURN_STEP` a cycle: a force or a soft direction that went round in one cycle
-    would throw the arm.
+    WORLD: the axes of the base. TOOL: the axes of the frame itself. PATH: x along the commanded velocity of the tool,
+    or at standstill its last direction, z as close as possible to the frame's z. Where a path begins, reverses or has a
+    corner, its axes rotate by `_TURN_STEP` per cycle: a sudden rotation of a force or a soft direction would accelerate
+    the arm.
 
     Attributes:
         T_tool_force: The force-control frame in the tool's.
-        is_settled: Whether the axes are where the path has them.
+        is_settled: Whether the axes have reached those of the path.
 
     Args:
         model: The arm with its tool.
-        parameters: What the client has configured.
+        parameters: The configuration from the client.
     """
 
     def __init__(self, model: RobotModel, parameters: ArmParameters) -> None:
@@ -49,13 +51,13 @@ class ForceAxes:
         self.configure(model, parameters)
 
     def configure(self, model: RobotModel, parameters: ArmParameters) -> None:
-        """Takes another tool or force-control frame; the direction of the path stays."""
+        """Sets another tool or force-control frame; the direction of the path is kept."""
         self.T_tool_force = model.T_flange_tool.inverse() @ parameters.T_flange_force
         self._kind = parameters.force_axes
         self.begin()
 
     def begin(self) -> None:
-        """Lets the axes be where the path has them from the next cycle on: nothing acts along them yet."""
+        """Resets the axes to those of the path in the next cycle: nothing acts along them yet."""
         self._axes: Rotation9 | None = None
         self.is_settled = True
 
@@ -65,17 +67,17 @@ class ForceAxes:
         return self._kind is ForceAxesKind.WORLD
 
     def follow(self, velocity: Sequence[float], tool: PosedTool) -> None:
-        """Takes how the tool's origin is commanded to move in this cycle, base axes, [m/s], and where the tool is."""
+        """Updates the axes from the commanded velocity of the tool, base axes, [m/s], and its pose."""
         speed = math.hypot(*velocity)
-        if speed > _STANDING:
+        if speed > _STANDSTILL:
             x, y, z = velocity
             self._path = (x / speed, y / speed, z / speed)
         if self._kind is ForceAxesKind.PATH:
-            wanted = _path_axes(self._path, self._frame(tool.pose))
-            self._axes, self.is_settled = (wanted, True) if self._axes is None else _approach(self._axes, wanted)
+            requested = _path_axes(self._path, self._frame(tool.pose))
+            self._axes, self.is_settled = (requested, True) if self._axes is None else _approach(self._axes, requested)
 
     def rotation(self, T_base_tool: Pose) -> Rotation9:
-        """Returns the axes in base, as the columns of a rotation; the base's own need not be asked for."""
+        """Returns the axes in base, as the columns of a rotation; not needed for WORLD."""
         if self._kind is ForceAxesKind.PATH and self._axes is not None:
             return self._axes
         return self._frame(T_base_tool)
@@ -84,12 +86,12 @@ class ForceAxes:
         return (T_base_tool @ self.T_tool_force).parts[0]
 
 
-def _approach(now: Rotation9, wanted: Rotation9) -> tuple[Rotation9, bool]:
-    """Returns axes a cycle later on their way to those that are wanted, and whether they have arrived."""
-    x, y, z = rotation_between(now, wanted)
+def _approach(now: Rotation9, requested: Rotation9) -> tuple[Rotation9, bool]:
+    """Returns the axes one cycle closer to the requested ones, and whether they have reached them."""
+    x, y, z = rotation_between(now, requested)
     angle = math.hypot(x, y, z)
     if angle <= _TURN_STEP:
-        return wanted, True
+        return requested, True
     scale = math.sin(_TURN_STEP / 2.0) / angle
     step = Pose.from_parts(rotation_from_wxyz((math.cos(_TURN_STEP / 2.0), scale * x, scale * y, scale * z)), _ORIGIN)
     return (step @ Pose.from_parts(now, _ORIGIN)).parts[0], False
@@ -98,7 +100,7 @@ def _approach(now: Rotation9, wanted: Rotation9) -> tuple[Rotation9, bool]:
 def _path_axes(x: tuple[float, float, float], r: Rotation9) -> Rotation9:
     """Returns axes with x along a path and z as near as possible to the force frame's z, or its y if that is along x.
 
-    Before the first motion there is no path, and the axes are those of the force frame.
+    Before the first motion the axes are those of the force frame.
     """
     ax, ay, az = x
     if not any(x):

@@ -1,8 +1,8 @@
-"""Hand guiding and the walls of the safety box: torques that let a person lead the arm, and where they end.
+"""Hand guiding and the walls of the safety box: the torques on a guided arm.
 
-A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. What is not free
-is held with the stiffest springs of the Cartesian impedance: TRANSLATION holds the orientation of the tool, ROTATION
-its position. Before a joint limit a spring pushes back with the joint's torque limit.
+A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. Directions that are not
+free are held with the stiffest springs of the Cartesian impedance: TRANSLATION holds the orientation of the tool,
+ROTATION its position. Close to a joint limit a spring pushes back, up to the joint's torque limit.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _DAMPED_OUTWARD = 1e-6  # [rad/s] walls damp nothing along themselves
 
 
 class GuidedFreedom(Enum):
-    """What a person may change while guiding the arm."""
+    """Free directions of a guided arm."""
 
     ALL = "all"
     """Every joint."""
@@ -49,11 +49,11 @@ def guide_torque(
     """Returns the torque on a guided arm, without gravity, shape (n,), [N m].
 
     Args:
-        model: The arm as the controller knows it.
-        measured: Where the arm is.
-        freedom: What the person may change.
+        model: The controller's model of the arm.
+        measured: The measurement.
+        freedom: Free directions.
         T_held: Pose of the tool in base at the start of guiding.
-        limits: Where the joints end; the arm's own limits when absent.
+        limits: Joint limits; None: those of the arm.
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
     stiffness, spring = _limit_springs(measured.q, model.limits.joint if limits is None else limits)
@@ -72,9 +72,9 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     """Returns the torque that pushes the tool back into an active box, shape (n,), [N m]; zeros inside it.
 
     Args:
-        model: The arm as the controller knows it, with its tool.
-        measured: Where the arm is.
-        box: The box that the tool shall stay in.
+        model: The controller's model of the arm, with its tool.
+        measured: The measurement.
+        box: The safety box of the tool.
         stiffness6: Cartesian stiffness; the first three act along the axes of the box, [N/m].
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
@@ -95,7 +95,7 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
 
 
 def _held(model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: Pose) -> tuple[float, Array]:
-    """Returns stiffness and error of what guiding holds, the error of shape (3,) in base axes."""
+    """Returns stiffness and error of the held directions; the error has shape (3,), in base axes."""
     cartesian = model.limits.cartesian
     if freedom is GuidedFreedom.ROTATION:
         return cartesian.translation_stiffness, T_held.position - terms.pose.position
@@ -103,7 +103,7 @@ def _held(model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: P
 
 
 def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:
-    """Returns stiffness, shape (n, n), and torque of the springs before the joint limits."""
+    """Returns stiffness, shape (n, n), and torque of the springs at the joint limits."""
     excess = q - np.clip(q, limits.lower + STOP_ZONE, limits.upper - STOP_ZONE)
     if not excess.any():
         return np.zeros((len(q), len(q))), np.zeros(len(q))

@@ -1,11 +1,11 @@
-"""The arm of theory: it is exactly at its setpoint, and torques move it as the rigid-body model says.
+"""The ideal plant: it is exactly at its setpoint, and torques move it by the rigid-body model.
 
-    POSITION   q = q_c; the joints carry what that takes: tau = M ddq_c + C dq_c + g - J^T w
+    POSITION   q = q_c; with the joint torques tau = M ddq_c + C dq_c + g - J^T w
     TORQUE     M ddq + C dq + g = tau_c + g_model + J^T w, integrated over 1 ms; no friction, no limit of torque
-    BRAKED     stands still at once, whatever presses
+    BRAKED     stops at once, with any external force
 
-w presses from outside (`push`). g_model is gravity as the controller knows it, g that of the load that is really
-there (`mount`): the same, until a wrong load is configured. Nothing solid stands in the way of this arm.
+w is the external wrench (`push`). g_model is the gravity of the controller's model, g that of the physical load
+(`mount`); they differ if a wrong load is configured. This plant has no obstacles.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _CYCLE, _HALF = scalar(CYCLE_TIME), scalar(CYCLE_TIME / 2.0)  # [s]
 
 
 class IdealPlant:
-    """The arm that follows exactly.
+    """An arm that follows its setpoints exactly.
 
     Args:
         model: The arm with its tool and load.
@@ -45,44 +45,44 @@ class IdealPlant:
         self.reset(model.home)
 
     def configure(self, model: RobotModel) -> None:
-        """Takes a new tool or load; the arm stays where it is, at rest."""
+        """Sets a new tool or load; the arm keeps its position, at standstill."""
         self._model = model
         self._push = self._push.on(model)
         self.mount(self._mounted)
 
     def mount(self, load: Payload | None) -> None:
-        """Fixes a payload to the flange that the controller need not know of; None: the one that setLoad says."""
+        """Attaches a physical payload to the flange; None: that of setLoad."""
         self._mounted = load
         model = self._model
         self._body = model.rigid_body if load is None else RigidBody(model.description, load, model.T_flange_tool)
-        self._rests = False
+        self._is_stationary = False
 
     def reset(self, q: JointVector) -> Measurement:
-        """Puts the arm at `q`, shape (n,), [rad], at rest."""
-        return self._rest_at(readonly_copy(q))
+        """Places the arm at `q`, shape (n,), [rad], at standstill."""
+        return self._stop_at(readonly_copy(q))
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
         """Applies an external force until the next call; see `Plant.push`."""
         self._push = Push(self._model, wrench, link, point)
-        self._rests = False
+        self._is_stationary = False
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Refuses: nothing is solid here."""
+        """Refuses: this plant does not simulate contact."""
         raise UsageError(f"box {name!r}: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def remove_box(self, name: str) -> None:
-        """Refuses: nothing is solid here."""
+        """Refuses: this plant does not simulate contact."""
         raise UsageError(f"box {name!r}: the ideal plant knows no contact and has no boxes; use plant='mujoco'").coded(
             "no_contact"
         )
 
     def set_floor(self, on: bool) -> None:
-        """Refuses a floor; to have none is granted."""
+        """Refuses a floor."""
         if on:
             raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
     def set_walls(self, box: SafetyBox | None) -> None:
-        """Refuses walls; to have none is granted."""
+        """Refuses walls."""
         if box is not None:
             raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
 
@@ -90,36 +90,36 @@ class IdealPlant:
         """Advances by one cycle."""
         last = self._measurement
         if setpoint.drive is Drive.TORQUE:
-            return self._fall(self._zeros if setpoint.tau is None else np.asarray(setpoint.tau))
+            return self._move_by_torque(self._zeros if setpoint.tau is None else np.asarray(setpoint.tau))
         if setpoint.drive is Drive.BRAKED:
-            if self._rests:
+            if self._is_stationary:
                 return last
             if not last.dq.any():
-                return self._rest_at(last.q)
-            return self._measure(last.q, self._zeros, last.dq / -CYCLE_TIME)  # What stopping at once takes.
+                return self._stop_at(last.q)
+            return self._measure(last.q, self._zeros, last.dq / -CYCLE_TIME)  # The torque of an immediate stop.
         stays = not any(setpoint.dq) and not any(setpoint.ddq) and last.q.tolist() == list(setpoint.q)
         if stays:
-            return last if self._rests else self._rest_at(last.q)
+            return last if self._is_stationary else self._stop_at(last.q)
         return self._measure(*setpoint.as_arrays())
 
-    def _rest_at(self, q: JointVector) -> Measurement:
+    def _stop_at(self, q: JointVector) -> Measurement:
         measurement = self._measure(q, self._zeros, self._zeros)
-        self._rests = True
+        self._is_stationary = True
         return measurement
 
     def _measure(self, q: JointVector, dq: JointVector, ddq: JointVector) -> Measurement:
         tau = self._body.shared_torque(q, dq, ddq)
         if self._push.is_active:
             tau = make_readonly(tau - self._push.torque(q))
-        self._rests = False
+        self._is_stationary = False
         self._measurement = Measurement(q, dq, tau)
         return self._measurement
 
-    def _fall(self, tau_c: JointVector) -> Measurement:
-        """Lets torques move the arm.
+    def _move_by_torque(self, tau_c: JointVector) -> Measurement:
+        """Moves the arm by torques.
 
-        Accelerations are those of the middle of the millisecond, so that a free swing keeps its energy; the step in q
-        is the new velocity's, so that measured velocities are the backward differences of measured angles.
+        Accelerations are evaluated in the middle of the millisecond, so that a free swing keeps its energy; q advances
+        by the new velocity, so that measured velocities are the backward differences of measured angles.
         """
         q, dq = self._measurement.q, self._measurement.dq
         outside = self._push.torque(q) if self._push.is_active else None
@@ -129,12 +129,12 @@ class IdealPlant:
         ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)
         dq = dq + _CYCLE * ddq
         q = q + _CYCLE * dq
-        self._rests = False
+        self._is_stationary = False
         self._measurement = Measurement(
             make_readonly(q), make_readonly(dq), make_readonly(tau_c + self._model.rigid_body.gravity(q))
         )
         return self._measurement
 
     def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
-        """Returns how a load moves that the controller takes for another: gravity is not what it compensates."""
+        """Returns the acceleration with a load that differs from the controller's gravity compensation."""
         return self._body.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))

@@ -1,12 +1,12 @@
-"""Impedance control: the torque of springs between the commanded and the measured arm.
+"""Impedance control: the torques of springs between the commanded and the measured arm.
 
 Both laws are computed from measurement and model alone and act through `Drive.TORQUE`, where gravity and friction are
 compensated already, so M ddq + C dq = tau + J^T w. They give
 
     tau = springs + dampers + M ddq_c + C dq
 
-so that an arm that nothing touches follows, but for what steps of 1 ms and the soft spring of the elbow leave, and one
-that something presses on yields by force over stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see
+so that a free arm follows its reference, except for effects of the 1 ms step and the soft spring of the elbow, and an
+external force deflects it by force over stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see
 `compliance`.
 """
 
@@ -26,7 +26,7 @@ from rcilab.sim.plant import Measurement
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a tuning value
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
 _PULL, _DRAG = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
-_DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] keeps feed-forward finite at a singularity; off it, it costs below 0.1 %
+_DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] Keeps feed-forward finite at a singularity; error elsewhere below 0.1 %.
 
 
 def joint_impedance(
@@ -41,13 +41,13 @@ def joint_impedance(
     """Returns the torque of a spring at every joint, without gravity, shape (n,), [N m].
 
     Args:
-        model: The arm as the controller knows it.
+        model: The controller's model of the arm.
         q_c: Commanded joint angles, shape (n,), [rad].
         dq_c: Their velocities, shape (n,), [rad/s].
         ddq_c: Their accelerations, shape (n,), [rad/s^2].
-        measured: Where the arm is.
+        measured: The measurement.
         stiffness: n numbers, [N m/rad].
-        damper: The one of the cycles before; None designs another.
+        damper: The damper of the previous cycles; None designs another.
     """
     body, q, dq = model.rigid_body, measured.q, measured.dq
     K = np.array(stiffness)
@@ -77,17 +77,17 @@ def cartesian_impedance(
     at the tool's origin, along the axes of setFcCoor.
 
     Args:
-        model: The arm as the controller knows it, with its tool.
+        model: The controller's model of the arm, with its tool.
         T_c: Commanded pose of the tool in base.
         twist_c: Its velocity, base axes, linear first, shape (6,), [m/s, rad/s].
         acc_c: Its acceleration, shape (6,), [m/s^2, rad/s^2].
         null: Joint angles whose arm angle a 7-axis arm keeps, their velocities and accelerations, each of shape (n,),
-            [rad], [rad/s], [rad/s^2]. Other arms have no choice.
-        measured: Where the arm is.
+            [rad], [rad/s], [rad/s^2]. Without effect for other arms.
+        measured: The measurement.
         stiffness6: Three translations [N/m], three rotations [N m/rad].
-        desired_wrench6: Force and moment that the arm exerts on its surroundings in addition, [N, N m].
+        desired_wrench6: Additional force and moment of the arm on its environment, [N, N m].
         axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3); None: the base's.
-        damper: The one of the cycles before; None designs another.
+        damper: The damper of the previous cycles; None designs another.
     """
     body, q, dq = model.rigid_body, measured.q, measured.dq
     terms = body.tool_terms(q, dq)
@@ -113,7 +113,7 @@ def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
 
 
 def _turned(rows: Array, axes: Matrix) -> Array:
-    """Returns what is linear in its first three rows and angular in the other three, given in base, in other axes."""
+    """Returns rows, three linear and three angular ones in base axes, in other axes."""
     return np.concatenate((axes.T @ rows[:3], axes.T @ rows[3:]))
 
 
@@ -127,21 +127,21 @@ def _reference(
 ) -> tuple[JointVector, JointVector]:
     """Returns the joint velocities and accelerations that move the tool as commanded, shape (n,), [rad/s], [rad/s^2].
 
-    Of all that do, they are those of least kinetic energy. With Khatib's inertia at the tool, L = (J M^-1 J^T)^-1,
+    They are those of least kinetic energy. With Khatib's inertia at the tool, L = (J M^-1 J^T)^-1,
 
         dq_c = M^-1 J^T L twist        ddq_c = M^-1 J^T L (acc - dJ/dt dq - J free) + free
 
-    With more than 6 joints `free` is the acceleration of a damped spring at `null`, which moves along, and dq_c has the
-    part of its velocity of which the tool feels nothing, as it does of the spring.
+    With more than 6 joints, `free` is the acceleration of a damped spring at the moving `null`, and dq_c includes the
+    part of its velocity in the null space. Neither affects the tool.
     """
     J = terms.jacobian
-    wanted = np.array([*twist, *acc])
+    desired = np.array([*twist, *acc])
     along = free = np.zeros(model.n)
     if model.n > 6:
         q_null, along, ddq_null = null
         free = _PULL * (q_null - measured.q) + _DRAG * (along - measured.dq) + ddq_null
-        wanted[:6] -= J.dot(along)
-    wanted[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
+        desired[:6] -= J.dot(along)
+    desired[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
     back = terms.mass_inverse.dot(J.T)
-    joints = back.dot(model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, wanted.reshape(2, 6).T))
+    joints = back.dot(model.rigid_body.tool_solver.solve(J.dot(back) + _DAMPED_INVERSE, desired.reshape(2, 6).T))
     return joints[:, 0] + along, joints[:, 1] + free

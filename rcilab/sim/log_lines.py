@@ -1,4 +1,4 @@
-"""Lines for a person, from a loop that must never wait: a thread of their own writes them, as long as they are read."""
+"""Log lines from a loop that must not block: a separate thread writes them."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-_MOST = 200  # Lines that wait; a tuning value: what a stream takes at once, and a person reads.
-_SELDOM = 10.0  # [s] A line that anybody can cause is written once in this time, and then counted; a tuning value.
-_GRACE = 0.5  # [s] For the last lines, when the controller ends and they are not read.
+_MAX_QUEUED = 200  # Lines; a tuning value: as many as a person reads.
+_PERIOD = 10.0  # [s] Between two lines of a kind that any peer can cause; others are counted. A tuning value.
+_CLOSE_TIMEOUT = 0.5  # [s] For the last lines at the end of the controller, if they are not read.
 
 
 class LineHandler(logging.Handler):
-    """Hands what the controller's own parts log to a writer of lines, instead of to a stream.
+    """Passes the log records of the simulation to a writer of lines.
 
     Args:
-        write: Takes a line and never waits.
+        write: Writes a line; does not block.
     """
 
     def __init__(self, write: Callable[[str], None]) -> None:
@@ -25,72 +25,72 @@ class LineHandler(logging.Handler):
         self._write = write
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Takes one entry."""
+        """Writes one record."""
         self._write(record.getMessage())
 
 
 class SeldomLines:
-    """Writes lines that anybody who connects can cause: one of a kind in a while, which says how many came between.
+    """Limits the rate of lines that any peer can cause: one of a kind per period, with the number of skipped ones.
 
     Args:
-        write: Takes a line and never waits.
+        write: Writes a line; does not block.
         clock: Returns the time, [s].
     """
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float]) -> None:
         self._write, self._clock = write, clock
-        self._next: dict[str, float] = {}  # Kind -> when it is written again, [s].
+        self._next: dict[str, float] = {}  # Kind -> earliest time of the next line, [s].
         self._counted: dict[str, int] = {}
 
     def write(self, kind: str, line: str, more: str) -> None:
         """Writes a line, or counts it.
 
         Args:
-            kind: One of a few names: lines of a kind are counted together.
-            line: What to write.
-            more: What happened to those that were counted, such as "were refused".
+            kind: Kind of line; lines of a kind are counted together.
+            line: The line.
+            more: Text for the counted ones, such as "were refused".
         """
         now = self._clock()
         if now < self._next.get(kind, now):
             self._counted[kind] = self._counted.get(kind, 0) + 1
             return
-        self._next[kind] = now + _SELDOM
+        self._next[kind] = now + _PERIOD
         count = self._counted.pop(kind, 0)
         self._write(f"{line} ({count} more {more} since the last line)" if count else line)
 
 
 class LogLines:
-    """Writes lines to a descriptor. `write` may be called from one thread, and never waits.
+    """Writes lines to a descriptor. `write` may be called from one thread, and does not block.
 
     Args:
-        descriptor: Where to, such as 2. It is written to directly: a stream's own lock would hold up the interpreter's
-            end for as long as they are not read.
+        descriptor: Descriptor, such as 2. It is used directly: the lock of a stream would delay the end of the
+            interpreter while its reader is blocked.
     """
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._lines: deque[str] = deque()
-        self._left_out = 0
+        self._skipped = 0
         self._wake, self._is_ending = threading.Event(), False
         self._thread = threading.Thread(target=self._run, name="log", daemon=True)
         self._thread.start()
 
     def write(self, line: str) -> None:
-        """Has a line written; where too many wait already it is left out, and a later one says how many were."""
-        if len(self._lines) >= _MOST:
-            self._left_out += 1
+        """Queues a line; a full queue skips it, and a later line reports the number of skipped lines."""
+        if len(self._lines) >= _MAX_QUEUED:
+            self._skipped += 1
             return
-        if self._left_out:
-            self._lines.append(f"{self._left_out} lines were left out: the stream was not read")
-            self._left_out = 0
+        if self._skipped:
+            self._lines.append(f"{self._skipped} lines were left out: the stream was not read")
+            self._skipped = 0
         self._lines.append(line)
         self._wake.set()
 
     def close(self) -> None:
-        """Waits a moment for the last lines to be written. May be called twice."""
+        """Waits briefly until the last lines are written. May be called twice."""
         self._is_ending = True
         self._wake.set()
-        self._thread.join(_GRACE)
+        self._thread.join(_CLOSE_TIMEOUT)
 
     def _run(self) -> None:
         while True:
@@ -101,7 +101,7 @@ class LogLines:
                 try:
                     while data:
                         data = data[os.write(self._descriptor, data) :]
-                except OSError:  # The reader is gone.
+                except OSError:  # The reader has closed it.
                     return
             if self._is_ending:
                 return

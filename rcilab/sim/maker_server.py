@@ -1,7 +1,7 @@
-"""What a maker brings of its virtual controller: the arm's behaviour, and a server for its wire. No sockets, no clock.
+"""The maker's part of a virtual controller: its behaviour, and a server for its protocol, without sockets or clock.
 
-`ArmServer` opens the channels, hands over what arrives, and calls `step`, `send_states` and `settle` once a cycle. A
-maker's server answers through the `Link`; what it finds out about the arm it has from `VirtualArm.step`.
+`ArmServer` opens the channels, passes arrivals on, and calls `step`, `send_states` and `settle` once per cycle. A
+maker's server sends through the `Link`; `VirtualArm.step` returns the violations.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 
 class SimulatedController(Protocol):
-    """A controller of any maker without its wire, as its surroundings and the clock see it."""
+    """A controller of any maker without its protocol, as used by the environment and the server."""
 
     ignored: int
-    """Commands that came while none was expected."""
+    """Number of commands that arrived while none was expected."""
 
     @property
     def loop_back(self) -> bool:
@@ -49,17 +49,17 @@ class SimulatedController(Protocol):
 
     @property
     def arm(self) -> VirtualArm:
-        """What moves, with its sensors and the queue of commands."""
+        """The arm, with its sensors and the queue of commands."""
         ...
 
     @property
     def cycle_number(self) -> int:
-        """The number of the last state."""
+        """Number of the last state."""
         ...
 
     @property
     def phase_name(self) -> str:
-        """What the robot is doing, such as "idle"."""
+        """Phase of the controller, such as "idle"."""
         ...
 
     @property
@@ -69,21 +69,21 @@ class SimulatedController(Protocol):
 
     @property
     def reason(self) -> Remark:
-        """Why the last fault was raised."""
+        """Reason for the last fault."""
         ...
 
     @property
     def safety_box(self) -> SafetyBox | None:
-        """The safety box that is configured."""
+        """The configured safety box."""
         ...
 
     @property
     def button(self) -> SafetyButton:
-        """Which emergency stop is pressed."""
+        """The pressed emergency stop."""
         ...
 
     def press_button(self, button: SafetyButton) -> None:
-        """Presses an emergency stop, or releases it."""
+        """Presses or releases an emergency stop."""
         ...
 
     def set_input(self, signal: int, level: bool) -> None:
@@ -92,27 +92,27 @@ class SimulatedController(Protocol):
 
     @property
     def is_moving(self) -> bool:
-        """Whether the arm moves, or follows commands that would move it."""
+        """Whether the arm moves or follows commands."""
         ...
 
     @property
     def wants_commands(self) -> bool:
-        """Whether a motion of the client's is in progress that needs a command a cycle; never for planned motions."""
+        """Whether a motion is in progress that needs one command per cycle; False for planned motions."""
         ...
 
     @property
     def is_starved(self) -> bool:
-        """Whether such a motion is in progress and its next command is not there."""
+        """Whether such a motion is in progress and its next command has not arrived."""
         ...
 
     @property
     def lacks_commands(self) -> bool:
-        """Whether a fault is set that a lack of commands raises."""
+        """Whether a fault is set that is caused by missing commands."""
         ...
 
 
 class MakerServer(Protocol):
-    """The virtual side of a maker's wire. Owned by the loop of `ArmServer`."""
+    """The server side of a maker's protocol. Owned by the loop of `ArmServer`."""
 
     @property
     def scheme(self) -> str:
@@ -121,7 +121,7 @@ class MakerServer(Protocol):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """What it listens on: at least one TCP channel, the main one first."""
+        """Its channels: at least one of TCP, the main one first."""
         ...
 
     @property
@@ -131,45 +131,45 @@ class MakerServer(Protocol):
 
     @property
     def is_quiet(self) -> bool:
-        """Whether nothing moves and no answer waits: a cycle may then be computed early, and answers come late."""
+        """Whether nothing moves and no response is pending: a cycle may then be computed early."""
         ...
 
     def attach(self, link: Link) -> None:
-        """Takes what it sends with; called once, before anything else."""
+        """Sets the link for sending; called once, before anything else."""
         ...
 
     def connect(self, peer: Peer) -> None:
-        """Takes a new client."""
+        """Handles a new client."""
         ...
 
     def disconnect(self, peer: Peer) -> bool:
-        """Takes that a client is gone; returns whether this ends a motion, or would have to."""
+        """Handles the end of a connection; returns whether this ends a motion."""
         ...
 
     def receive(self, peer: Peer, frame: bytes) -> None:
-        """Takes a frame, as the channel's framer cut it."""
+        """Handles a frame from the channel's framer."""
         ...
 
     def receive_datagram(self, datagram: bytes) -> bool:
-        """Takes a datagram of the client's; returns whether it is well formed."""
+        """Handles a datagram of the client; returns whether it is well formed."""
         ...
 
     def step(self, *, is_seen: bool = True) -> None:
         """Advances by one cycle.
 
         Args:
-            is_seen: Whether its state is sent. One that is not has no number of its own.
+            is_seen: Whether its state is sent; only such a cycle gets a number.
         """
         ...
 
     def send_states(self) -> None:
-        """Sends what is due in this cycle; called again in lock-step for a client that has not answered."""
+        """Sends the states of this cycle; called again in lock-step for a client that has not answered."""
         ...
 
     def settle(self) -> None:
-        """Gives the answers that had to wait for the state just sent."""
+        """Sends the responses that had to follow the state just sent."""
         ...
 
     def begin_shutdown(self) -> int:
-        """Stops the arm in a way that its client notices; returns for how many cycles states are still to be sent."""
+        """Stops the arm and notifies its client; returns the number of cycles for which states are still to be sent."""
         ...

@@ -1,4 +1,4 @@
-"""What follows from the sensors: the pose of the tool, the external forces, and the conditions that they violate."""
+"""Values derived from the sensors: the pose of the tool, the external forces, and violated conditions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LEAST = 1e-3  # [N m] Divisor for a threshold of zero; the client uses the same
 
 
 class MeasuredStateMonitor:
-    """Follows the measured arm. Owned by the virtual arm.
+    """Monitors the measured arm. Owned by the virtual arm.
 
     Attributes:
         measured: The last measurement.
@@ -39,7 +39,7 @@ class MeasuredStateMonitor:
         self.configure(model, measured)
 
     def configure(self, model: RobotModel, measured: Measurement) -> None:
-        """Takes another tool or load, or an arm that was placed elsewhere; only at standstill."""
+        """Sets another tool or load, or another position of the arm; only at standstill."""
         self._model = model
         self.tool = ToolKinematics(model, measured.q.tolist())
         self._observer = MomentumObserver(model)
@@ -66,10 +66,10 @@ class MeasuredStateMonitor:
 
         Args:
             limits: Bounds of the arm, soft limits included.
-            box: Where the tool must stay; None does not bound it.
-            thresholds: External joint torques that are a collision, n numbers, [N m].
-            checks_tool: Whether the motion is one of the tool, so that its speed and the arm angle's count.
-            is_compliant: Whether forces move the arm, and not its commands alone.
+            box: Safety box of the tool; None without one.
+            thresholds: External joint torques that count as a collision, n numbers, [N m].
+            checks_tool: Whether tool poses are commanded, so that tool speed and arm angle are checked.
+            is_compliant: Whether external forces move the arm.
         """
         self._monitor = MeasuredMonitor(compliant_limits(limits) if is_compliant else limits, box)
         self._monitor.reset(self.measured.q.tolist())
@@ -77,7 +77,7 @@ class MeasuredStateMonitor:
         self._checks_tool = checks_tool
 
     def observe(self, measured: Measurement, commanded: ReferenceTrajectory, tool_c: ToolKinematics) -> None:
-        """Takes the measurement of this cycle; where the joints are exactly at their reference, so is the tool."""
+        """Processes the measurement of this cycle; if the joints are exactly at their reference, so is the tool."""
         if measured is not self.measured or commanded.version != self._tool_version:
             self.measured, self._tool_version = measured, commanded.version
             self._q, self._dq = q, dq = measured.q.tolist(), measured.dq.tolist()
@@ -88,10 +88,10 @@ class MeasuredStateMonitor:
         self.tau_ext, self.wrench = self._observer.step(measured)
 
     def check(self, *, is_commanded: bool = True) -> Violations:
-        """Returns what the measurement of this cycle violates.
+        """Returns the violations of this cycle's measurement.
 
         Args:
-            is_commanded: Whether a client's commands are followed; without, tool speed and arm angle do not count.
+            is_commanded: Whether commands are followed; if not, tool speed and arm angle are not checked.
         """
         monitor, tool = self._monitor, self.tool
         assert monitor is not None
@@ -102,11 +102,11 @@ class MeasuredStateMonitor:
         return violations if collision is None else (*violations, ArmViolation(ArmCondition.NO_COLLISION, collision))
 
     def find_collision(self, thresholds: Sequence[float]) -> Remark | None:
-        """Returns which external torque is farthest above its threshold, as a sentence, or None."""
+        """Returns the external torque that is farthest above its threshold, as a remark, or None."""
         torques: list[float] = self.tau_ext.tolist()
         if not any(map(gt, map(abs, torques), thresholds)):
             return None
-        # As the client does: several joints pass theirs at once, and both ends name the same one.
+        # The same choice as in the client, so that both name the same joint.
         beyond = (i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
         joint = max(beyond, key=lambda i: abs(torques[i]) / max(thresholds[i], _LEAST))
         torque, threshold = torques[joint], thresholds[joint]

@@ -1,19 +1,19 @@
-"""The arm as MuJoCo moves it: torques, inertia, friction, contact, and drives that follow as well as they can.
+"""The MuJoCo plant: torques, inertia, friction, contact, and drives with limited torque.
 
-Each millisecond is one `mj_step`. What the drives put on the joints:
+Each millisecond is one `mj_step`. The drives apply to the joints:
 
     POSITION   M (ddq_c + K_d (dq_c - dq) + K_p (q_c - q)) + C dq + g + friction  computed torque
     TORQUE     tau_c + g_model + friction                               for M ddq + C dq = tau_c + J^T w
-    BRAKED     the brakes take the speed out within some 0.1 s and bear what presses, then the arm is rigid
+    BRAKED     the brakes stop the arm within about 0.1 s and hold external forces; then the arm is rigid
 
-w is what presses from outside. The position servo knows the load that is really there, as one with an integrating
-controller learns it; TORQUE compensates the gravity of the load that setLoad says (`g_model`). The drives compensate
-90 % of the friction. In TORQUE a joint torque loop hides the inertia of the rotors, so that the commanded torque is
-the one behind the gear; in POSITION the rotors are accelerated along with the links.
+w is the external wrench. The position servo uses the physical load, like one with integral action in steady state;
+TORQUE compensates the gravity of the load from setLoad (`g_model`). The drives compensate
+90 % of the friction. In TORQUE a joint torque loop compensates the inertia of the rotors, so that the commanded
+torque acts at the output of the gear; in POSITION the rotors are accelerated with the links.
 
-What a drive adds to the compensation is limited. The manual's torque figure is that of a torque command, and a drive
-must be able to do more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's
-accelerations need up to 3.9 times of it. The arm does not touch itself: the controller checks positions.
+The torque of a drive in addition to the compensation is limited. The manual's torque limit is that of a torque command;
+a drive needs more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's accelerations
+need up to 3.9 times that limit. Self-collision is not simulated: the controller checks positions.
 """
 
 from __future__ import annotations
@@ -38,33 +38,33 @@ from rcilab.sim.push import Push
 
 BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped, about 13 Hz; a tuning value
 KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
-FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; no drive knows it exactly.
-PEAK_TORQUE = 4.0  # Times the manual's torque limit, what a drive adds at most; see above
+FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; real drives do not know it exactly.
+PEAK_TORQUE = 4.0  # Largest torque of a drive, in units of the manual's torque limit; see above
 END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range: room to stop in
 BRAKE_TIME = 0.02  # [s] time constant of the brakes; a tuning value
 
 _KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
 _BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
-_BRAKES_HOLD = 1e-4  # [rad/s] below this closed brakes hold
-_STILL_SPEED = 1e-7  # [rad/s] below this a resting arm is said to rest
-_STILL_ERROR = 1e-9  # [rad] nearer than this to its setpoint a resting arm is said to be there
-_STILL_CYCLES = 100  # Cycles of stillness after which an arm that something keeps off its setpoint rests where it is.
+_BRAKES_HOLD = 1e-4  # [rad/s] Below this, engaged brakes hold the arm.
+_STILL_SPEED = 1e-7  # [rad/s] Below this, a joint counts as stationary.
+_STILL_ERROR = 1e-9  # [rad] A stationary joint nearer to its setpoint counts as being there.
+_STILL_CYCLES = 100  # Cycles of standstill until an arm off its setpoint counts as stationary.
 
 _log = logging.getLogger("rcilab.sim")
 
 
 class MuJoCoPlant:
-    """An arm with mass, friction and limited torque, among things it can bump into.
+    """An arm with mass, friction, limited torque and contact with obstacles.
 
     Args:
         model: The arm with its tool and load.
-        friction: Times the friction of the joints; 0 for an arm without any.
+        friction: Scale of the joint friction; 0: none.
     """
 
     kind = "mujoco"
 
     def __init__(self, model: RobotModel, *, friction: float = 1.0) -> None:
-        self._share_of_friction = friction
+        self._friction_scale = friction
         self._mounted: Payload | None = None
         self._obstacles = Obstacles()
         self._build(model)
@@ -72,58 +72,58 @@ class MuJoCoPlant:
         self._measurement = self.reset(model.home)
 
     def configure(self, model: RobotModel) -> None:
-        """Takes a new tool or load; the arm stays where it is, at rest."""
+        """Sets a new tool or load; the arm keeps its position, at standstill."""
         q = self._measurement.q
         self._build(model)
         self._push = self._push.on(model)
         self.reset(q)
 
     def mount(self, load: Payload | None) -> None:
-        """Fixes a payload to the flange that the controller need not know of; None: the one that setLoad says."""
+        """Attaches a physical payload to the flange; None: that of setLoad."""
         q, dq = self._q.copy(), self._dq.copy()
         self._mounted = load
         self._build(self._robot)
         self._q[:], self._dq[:] = q, dq
         self._mj.mj_step1(self._model, self._data)
-        self._rests = False
+        self._is_stationary = False
 
     def reset(self, q: JointVector) -> Measurement:
-        """Puts the arm at `q`, shape (n,), [rad], at rest."""
+        """Places the arm at `q`, shape (n,), [rad], at standstill."""
         self._mj.mj_resetData(self._model, self._data)
-        return self._come_to_rest(np.asarray(q).tolist())
+        return self._set_standstill(np.asarray(q).tolist())
 
     def push(self, wrench: ArrayLike, link: int | None = None, point: ArrayLike | None = None) -> None:
         """Applies an external force until the next call; see `Plant.push`."""
         self._push = Push(self._robot, wrench, link, point)
-        self._rests = False
+        self._is_stationary = False
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Puts a solid box into the arm's way, or moves it; see `Plant.place_box`."""
+        """Adds or moves a solid box; see `Plant.place_box`."""
         self._obstacles.place_box(name, size, pose, self._data)
-        self._rests = False
+        self._is_stationary = False
 
     def remove_box(self, name: str) -> None:
-        """Takes a box away; see `Plant.remove_box`."""
+        """Removes a box; see `Plant.remove_box`."""
         self._obstacles.remove_box(name)
-        self._rests = False
+        self._is_stationary = False
 
     def set_floor(self, on: bool) -> None:
-        """Lets the floor, the plane z = 0 of the base frame, be solid or not."""
+        """Adds or removes a solid floor, the plane z = 0 of the base frame."""
         self._obstacles.set_floor(on)
-        self._rests = False
+        self._is_stationary = False
 
     def set_walls(self, box: SafetyBox | None) -> None:
-        """Lets the faces of a safety box be solid walls for the links; None takes them away."""
+        """Makes the faces of a safety box solid walls for the links; None removes them."""
         self._obstacles.set_walls(box)
-        self._rests = False
+        self._is_stationary = False
 
     def step(self, setpoint: Setpoint) -> Measurement:
-        """Advances by one cycle with torques that aim to reach the setpoint at its end."""
-        if self._rests and self._keeps_resting(setpoint):
+        """Advances by one cycle with torques towards the setpoint at its end."""
+        if self._is_stationary and self._remains_stationary(setpoint):
             return self._measurement
-        self._rests = False
+        self._is_stationary = False
         mj, model, data = self._mj, self._model, self._data
-        self._let_rotors_be_felt(setpoint.drive is not Drive.TORQUE)
+        self._set_rotor_inertia(setpoint.drive is not Drive.TORQUE)
         dq, bias = self._dq.copy(), self._bias.copy()
         drive_torque = self._drive_torque(setpoint)
         np.minimum(drive_torque, self._peak, out=drive_torque)  # np.clip takes three times as long as both together.
@@ -134,24 +134,24 @@ class MuJoCoPlant:
         if self._push.is_active:
             self._applied += self._push_torque()
         mj.mj_step2(model, data)
-        mj.mj_step1(model, data)  # Forces and contacts of the place it has come to.
-        # What is left of the motor torque behind rotor and friction, brought to the end of the millisecond.
+        mj.mj_step1(model, data)  # Forces and contacts at the new position.
+        # The motor torque less rotor inertia and friction, at the end of the millisecond.
         loss = self._friction * self._dq
-        if self._rotors_are_felt:
+        if self._has_rotor_inertia:
             loss += self._rotors * ((self._dq - dq) / _STEP)
         self._measurement = self._measure(motor - loss + (self._bias - bias))
         self._settle(setpoint)
         return self._measurement
 
     def _drive_torque(self, setpoint: Setpoint) -> Array:
-        """Returns what the drives add to their compensation, shape (n,), [N m]."""
+        """Returns the torque of the drives in addition to their compensation, shape (n,), [N m]."""
         q, dq = self._q, self._dq
         if setpoint.drive is Drive.TORQUE:
             return np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
         if setpoint.drive is Drive.BRAKED:
             return self._times_inertia(dq * (-1.0 / BRAKE_TIME)) - self._push_torque()
-        # The setpoint is where the arm is to be at the end of this millisecond; q and dq are those of its beginning:
-        # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), with the two steps back taken out of the brackets.
+        # The setpoint is for the end of this millisecond; q and dq are those of its beginning:
+        # ddq_c + KD (dq_c - h ddq_c - dq) + KP (q_c - h dq_c - q), rearranged.
         q_c, dq_c, ddq_c = setpoint.as_arrays()
         return self._times_inertia(_KP * (q_c - q) + _KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
 
@@ -160,12 +160,12 @@ class MuJoCoPlant:
         return self._push.torque(self._q) if self._push.is_active else 0.0
 
     def _settle(self, setpoint: Setpoint) -> None:
-        """Puts an arm that has stopped at exact standstill: its last 1e-7 rad/s would otherwise never end."""
+        """Sets an arm that has stopped to exact standstill: its last 1e-7 rad/s would otherwise never decay."""
         speeds: list[float] = self._dq.tolist()
         speed = max(map(abs, speeds))
         if setpoint.drive is Drive.BRAKED:
             if speed < _BRAKES_HOLD:
-                self._come_to_rest(self._q.tolist())
+                self._set_standstill(self._q.tolist())
             return
         if speed > _STILL_SPEED or setpoint.drive is Drive.TORQUE or any(setpoint.dq) or any(setpoint.ddq):
             self._still_for = 0
@@ -173,34 +173,34 @@ class MuJoCoPlant:
         self._still_for += 1
         if not self._push.is_active and self._data.nefc == 0:  # Neither contact nor joint limit.
             if np.abs(self._q - setpoint.q).max() < _STILL_ERROR:
-                self._come_to_rest(list(setpoint.q))
+                self._set_standstill(list(setpoint.q))
         elif self._still_for > _STILL_CYCLES:
             self._dq[:] = 0.0
             self._measurement = self._measure(self._measurement.tau)
-            self._rests, self._rest_q = True, list(setpoint.q)
+            self._is_stationary, self._stationary_q = True, list(setpoint.q)
 
-    def _come_to_rest(self, q: Sequence[float]) -> Measurement:
+    def _set_standstill(self, q: Sequence[float]) -> Measurement:
         self._q[:] = q
         self._dq[:] = 0.0
         self._mj.mj_step1(self._model, self._data)
         self._measurement = self._measure(self._bias - self._push_torque())
-        self._rests, self._rest_q = True, q
+        self._is_stationary, self._stationary_q = True, q
         return self._measurement
 
-    def _keeps_resting(self, setpoint: Setpoint) -> bool:
+    def _remains_stationary(self, setpoint: Setpoint) -> bool:
         if setpoint.drive is Drive.BRAKED:
             return True
         stays = setpoint.drive is Drive.POSITION and not any(setpoint.dq) and not any(setpoint.ddq)
-        return stays and list(setpoint.q) == self._rest_q
+        return stays and list(setpoint.q) == self._stationary_q
 
     def _measure(self, tau: Array) -> Measurement:
         n, rows = self._n, make_readonly(np.concatenate((self._q, self._dq, tau)))  # One copy for all three.
         return Measurement(rows[:n], rows[n : 2 * n], rows[2 * n :])
 
-    def _let_rotors_be_felt(self, are_felt: bool) -> None:
-        if are_felt is not self._rotors_are_felt:
-            self._rotors_are_felt = are_felt
-            self._armature[:] = self._rotors if are_felt else 0.0
+    def _set_rotor_inertia(self, on: bool) -> None:
+        if on is not self._has_rotor_inertia:
+            self._has_rotor_inertia = on
+            self._armature[:] = self._rotors if on else 0.0
             self._mj.mj_step1(self._model, self._data)
 
     def _times_inertia(self, ddq: Array) -> Array:
@@ -211,17 +211,17 @@ class MuJoCoPlant:
         import mujoco  # pyright: ignore[reportMissingTypeStubs]
 
         mj: Any = mujoco
-        mj.set_mju_user_warning(_pass_on)  # Else MuJoCo would write a file into the user's directory.
+        mj.set_mju_user_warning(_log_warning)  # Otherwise MuJoCo writes a file into the user's directory.
         load = model.load if self._mounted is None else self._mounted
         spec: Any = mj.MjSpec.from_string(build_mjcf(model.description, T_flange_tool=model.T_flange_tool, load=load))
         self._obstacles.add_to(spec, mj)
         self._mj, self._robot, self._n = mj, model, model.n
         self._model: Any = spec.compile()
         self._obstacles.install(self._model, mj)
-        self._model.dof_damping *= self._share_of_friction
+        self._model.dof_damping *= self._friction_scale
         self._model.jnt_range[: self._n] += [-END_STOP, END_STOP]
         self._data: Any = mj.MjData(self._model)
-        self._q: Array = self._data.qpos  # These are windows into MuJoCo's memory, not copies.
+        self._q: Array = self._data.qpos  # Views of MuJoCo's memory, not copies.
         self._dq: Array = self._data.qvel
         self._bias: Array = self._data.qfrc_bias
         self._applied: Array = self._data.qfrc_applied
@@ -230,13 +230,13 @@ class MuJoCoPlant:
         self._peak: Array = PEAK_TORQUE * torque
         self._trough = -self._peak
         self._rotors: Array = ARMATURE_PER_TORQUE * torque
-        self._friction: Array = self._share_of_friction * DAMPING_PER_TORQUE * torque
+        self._friction: Array = self._friction_scale * DAMPING_PER_TORQUE * torque
         self._known_friction = FRICTION_KNOWN * self._friction
         self._product = np.zeros(model.n)
-        self._rotors_are_felt = True
+        self._has_rotor_inertia = True
         self._still_for = 0
 
 
-def _pass_on(warning: str) -> None:
-    """Takes what MuJoCo finds odd about a simulation; it says each thing once an arm."""
+def _log_warning(warning: str) -> None:
+    """Logs a warning of MuJoCo, which reports each kind once per simulation."""
     _log.warning("MuJoCo: %s", warning)

@@ -1,8 +1,7 @@
 """The protocol of the arm behind the controller.
 
-Once a millisecond the controller hands its plant a `Setpoint` and gets a `Measurement` back. A plant knows neither
-sockets nor modes nor faults; it decides only how an arm answers a setpoint. Commands were checked before they come
-here, so a plant may trust them.
+Once a millisecond the controller passes a `Setpoint` to its plant and receives a `Measurement`. A plant has no sockets,
+modes or faults; it only simulates the response of an arm to a setpoint. Setpoints come from checked commands.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ from rcilab.model.robot_model import RobotModel
 
 
 class Drive(Enum):
-    """What the joints are driven with during one cycle."""
+    """Mode of the drives in one cycle."""
 
     BRAKED = "braked"
-    """Motors off, brakes closed. The arm stops by itself and stays; setpoints are ignored."""
+    """Motors off, brakes engaged. The arm stops and remains stationary; setpoints are ignored."""
     POSITION = "position"
-    """The servo follows `q` (with `dq` and `ddq` as feed-forward). Also how an arm stands still under power."""
+    """The servo follows `q` (with `dq` and `ddq` as feed-forward). Also used at standstill with power on."""
     TORQUE = "torque"
     """`tau` acts at the joints, on top of the compensation of gravity and friction: M ddq + C dq = tau."""
 
 
 class Setpoint(NamedTuple):
-    """What the drives shall do for one millisecond. All vectors are n plain floats; the arm is at them at its end."""
+    """Setpoint of the drives for one millisecond, valid at its end. All vectors are n plain floats."""
 
     drive: Drive
     q: Sequence[float]
-    """Commanded joint angles, [rad]; what the arm holds, in the drives that do not follow it."""
+    """Commanded joint angles, [rad]."""
     dq: Sequence[float]
     """Commanded joint velocities, [rad/s]."""
     ddq: Sequence[float]
@@ -45,7 +44,7 @@ class Setpoint(NamedTuple):
     tau: Sequence[float] | Array | None = None
     """Commanded joint torques without gravity and friction, [N m], for TORQUE."""
     arrays: tuple[JointVector, JointVector, JointVector] | None = None
-    """q, dq and ddq as arrays, if they are known already."""
+    """q, dq and ddq as arrays, if already available."""
 
     def as_arrays(self) -> tuple[JointVector, JointVector, JointVector]:
         """Returns q, dq and ddq as read-only arrays."""
@@ -56,7 +55,7 @@ class Setpoint(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """What the sensors of the arm say at the end of a millisecond. Read-only arrays."""
+    """Sensor values at the end of a millisecond. Read-only arrays."""
 
     q: JointVector
     """Joint angles, shape (n,), [rad]."""
@@ -67,27 +66,27 @@ class Measurement(NamedTuple):
 
 
 class Plant(Protocol):
-    """An arm that answers one setpoint a millisecond. Owned and called by the controller's cycle alone."""
+    """A simulated arm with one setpoint per millisecond. Owned by the controller's cycle."""
 
     @property
     def kind(self) -> str:
-        """One word for it, such as "ideal"."""
+        """Name of the plant, such as "ideal"."""
         ...
 
     def configure(self, model: RobotModel) -> None:
-        """Takes a new tool or load, as set by the client; only while the arm is at rest."""
+        """Sets a new tool or load, as configured by the client; only at standstill."""
         ...
 
     def reset(self, q: JointVector) -> Measurement:
-        """Puts the arm at `q`, shape (n,), [rad], at rest, without passing through anything, and measures."""
+        """Places the arm at `q`, shape (n,), [rad], at standstill, and measures."""
         ...
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Advances by one cycle with `setpoint` and measures at its end.
 
         For a stationary arm with a stationary setpoint (BRAKED, or POSITION with an unchanged `q` and no velocity) the
-        measurements must settle to equal numbers, so that a resting robot reports a resting state. It may then return
-        the same object: poses and torques are recomputed only for another one.
+        measurements must settle to equal numbers, so that a stationary robot reports a constant state. It may then
+        return the same object: poses and torques are recomputed only for another object.
         """
         ...
 
@@ -95,58 +94,58 @@ class Plant(Protocol):
         """Applies an external force until the next call; a new push replaces the last.
 
         Args:
-            wrench: Force and moment on the arm, base axes, shape (6,), [N, N m]; zeros let go.
-            link: Number of the link that is pressed on, from 1; the tool when absent.
-            point: Where the force acts, in the frame of that link (see `Link`), or of the tool, shape (3,), [m]; its
-                origin when absent. It moves along with the arm.
+            wrench: Force and moment on the arm, base axes, shape (6,), [N, N m]; zeros remove it.
+            link: Number of the link, from 1; None: the tool.
+            point: Where the force acts, in the frame of that link (see `Link`), or of the tool, shape (3,), [m];
+                None: its origin. It moves with the arm.
 
         Raises:
-            InvalidValueError: Not six and three finite numbers, or the arm has no such link.
+            InvalidValueError: The values are not six and three finite numbers, or the link does not exist.
         """
         ...
 
     def mount(self, load: Payload | None) -> None:
-        """Fixes a payload to the flange that the controller need not know of.
+        """Attaches a physical payload to the flange, which may differ from the controller's load.
 
         Args:
-            load: What is really there; None: what the model says (setLoad).
+            load: The physical payload; None: that of the model (setLoad).
         """
         ...
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
-        """Puts a solid box into the arm's way, or moves it when there is one of this name.
+        """Adds a solid box, or moves the box with this name.
 
         Args:
-            name: How `remove_box` will call it.
-            size: Edges along x, y and z of its frame, shape (3,), [m].
-            pose: Its centre and directions in the base frame.
+            name: Its name, for `remove_box`.
+            size: Edge lengths along x, y and z of its frame, shape (3,), [m].
+            pose: Its centre and orientation in base.
 
         Raises:
-            InvalidValueError: The size is not three positive finite numbers, or the arm stands in the box.
-            UsageError: This plant knows no contact.
+            InvalidValueError: The size is not three positive finite numbers, or the box overlaps the arm.
+            UsageError: This plant does not simulate contact.
         """
         ...
 
     def remove_box(self, name: str) -> None:
-        """Takes a box away.
+        """Removes a box.
 
         Raises:
-            InvalidValueError: There is no box of this name; the message lists those that exist.
+            InvalidValueError: The box does not exist; the message lists the existing ones.
         """
         ...
 
     def set_floor(self, on: bool) -> None:
-        """Lets the floor, the plane z = 0 of the base frame, be solid or not.
+        """Adds or removes a solid floor, the plane z = 0 of the base frame.
 
         Raises:
-            UsageError: This plant knows no contact.
+            UsageError: This plant does not simulate contact.
         """
         ...
 
     def set_walls(self, box: SafetyBox | None) -> None:
-        """Lets the faces of a safety box be solid walls for the links; None takes them away.
+        """Makes the faces of a safety box solid walls for the links; None removes them.
 
         Raises:
-            UsageError: This plant knows no contact.
+            UsageError: This plant does not simulate contact.
         """
         ...

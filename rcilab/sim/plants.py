@@ -1,4 +1,4 @@
-"""Which plants there are, by the name they are chosen by."""
+"""The plants by name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from rcilab.sim.plant import Plant
 
 
 def build_plant(kind: str, model: RobotModel) -> Plant:
-    """Returns the arm that a controller moves: "mujoco", or the ideal one."""
+    """Returns the plant of a kind: "mujoco" or "ideal"."""
     if kind == "mujoco":
         from rcilab.sim.mujoco_plant import MuJoCoPlant
 

@@ -12,16 +12,16 @@ from rcilab.robots.upright import upright_flange
 
 
 class Push:
-    """A wrench on the arm that goes along with the link it acts on, while its direction stays. Immutable.
+    """A wrench on the arm that moves with its link and keeps its direction. Immutable.
 
     Args:
         model: The arm with its tool.
         wrench: Force and moment on the arm, base axes, shape (6,), [N, N m].
-        link: Number of the link that is pressed on, from 1; the tool when absent.
-        point: Where the force acts, in the link's frame (or the tool's), shape (3,), [m]; its origin when absent.
+        link: Number of the link, from 1; None: the tool.
+        point: Where the force acts, in the link's frame (or the tool's), shape (3,), [m]; None: its origin.
 
     Raises:
-        InvalidValueError: Not six and three finite numbers, or the arm has no such link.
+        InvalidValueError: The values are not six and three finite numbers, or the link does not exist.
     """
 
     def __init__(
@@ -45,5 +45,5 @@ class Push:
         return Push(model, self.wrench, self.link, self._given)
 
     def torque(self, q: JointVector) -> JointVector:
-        """Returns what it does at the joints, J^T w, shape (n,), [N m]."""
+        """Returns the joint torques J^T w, shape (n,), [N m]."""
         return self._model.rigid_body.link_jacobian(q, self._body, self._point).T @ self.wrench

@@ -1,10 +1,10 @@
-"""`auto_limit` of setJointLimit: commanded angles are led to rest just inside the soft limits instead of a fault.
+"""`auto_limit` of setJointLimit: commanded angles stop just inside the soft limits instead of raising a fault.
 
-Each joint for itself follows its command as long as a stop with limited jerk would end inside the soft limits. The
-first command after which it would not is not taken: the joint stops instead, just short of the limit. From then on
-it chases its command, as far as that is inside, and takes it again when both are one.
+Each joint follows its command as long as a stop with limited jerk would end inside the soft limits. The first command
+after which it would not is rejected: the joint stops just before the limit. From then on it approaches its command, as
+far as that is inside, and follows it again once it has reached it.
 
-    following --the stop would end outside--> stopping --at rest--> chasing --caught up--> following
+    following --stop would end outside--> stopping --standstill--> chasing --command reached--> following
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import NamedTuple
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import JointLimits
 
-MARGIN = 1e-3  # [rad] Before the soft limit, where a joint is stopped; a tuning value.
-SHARE = 0.9  # Of velocity, acceleration and jerk, what fence and chase use: strict bounds need room for rounding.
-_PULL = 8.0  # [1/s] How fast a chase closes the gap; critically damped with the one below.
+MARGIN = 1e-3  # [rad] Distance from the soft limit at which a joint stops; a tuning value.
+SHARE = 0.9  # Share of the velocity, acceleration and jerk limits in use: the rest is for rounding.
+_PULL = 8.0  # [1/s] Gain of the approach; critically damped with the one below.
 _GRIP = 4.0 * _PULL  # [1/s]
-_FAR = 100.0  # [rad] A command beyond any turn is as good as one this far out; keeps absurd numbers finite.
-_CAUGHT = 1e-8  # [rad] One with the command: taking it then is a jerk of 10 rad/s^3.
+_FAR = 100.0  # [rad] Largest command beyond a limit; keeps extreme numbers finite.
+_CAUGHT = 1e-8  # [rad] Distance at which the command counts as reached: a jerk of 10 rad/s^3.
 
 
 class _Mode(Enum):
@@ -32,11 +32,11 @@ class _Mode(Enum):
 
 
 class SoftLimitGovernor:
-    """Leads commanded joint angles to rest inside soft limits. Pure of clocks and arms; owned by a motion generator.
+    """Stops commanded joint angles inside soft limits. Owned by a motion generator.
 
     Args:
         limits: Bounds of the joints, with the soft limits as position bounds.
-        q: Where the arm stands, n plain floats, [rad].
+        q: Joint angles of the stationary arm, n plain floats, [rad].
     """
 
     def __init__(self, limits: JointLimits, q: Sequence[float]) -> None:
@@ -57,7 +57,7 @@ class SoftLimitGovernor:
         return tuple(number for number, joint in enumerate(self._joints, 1) if not joint.is_following)
 
     def step(self, q: Sequence[float]) -> list[float]:
-        """Takes the commanded angles of this cycle and returns those to follow, [rad]."""
+        """Returns the angles to follow for the commanded angles of this cycle, [rad]."""
         return [joint.step(angle) for joint, angle in zip(self._joints, q, strict=True)]
 
 
@@ -65,16 +65,16 @@ class Stop(NamedTuple):
     """The fastest stop from a velocity v >= 0: three phases of constant jerk, down to -peak and back to zero."""
 
     times: tuple[float, float, float]
-    """How long each phase takes, [s]."""
+    """Duration of each phase, [s]."""
     distance: float
-    """How far it goes, [rad]."""
+    """Distance, [rad]."""
 
 
 def plan_fastest_stop(v: float, a: float, acceleration: float, jerk: float) -> Stop:
     """Returns the fastest stop with limited jerk from a velocity upwards.
 
-    A deceleration that is already too strong for the velocity left (v < a^2 / 2 jerk) is let go at once; the arm then
-    turns back a little, and that is counted as no distance.
+    A deceleration that is already too large for the velocity (v < a^2 / 2 jerk) is reduced at once; the joint then
+    reverses slightly, which counts as zero distance.
 
     Args:
         v: Velocity, 0 or more, [rad/s].
@@ -107,7 +107,7 @@ def _along(times: tuple[float, float, float], t: float, v: float, a: float, jerk
 
 
 class _Joint:
-    """The fence of one joint; x, v and a are the angle it gives out and its backward differences."""
+    """The governor of one joint; x, v and a are its output and the backward differences."""
 
     def __init__(
         self, lower: float, upper: float, velocity: float, acceleration: float, jerk: float, start: float
@@ -131,26 +131,26 @@ class _Joint:
         ddu = (du - self._du) / h
         self._u, self._du = u, du
         if self._mode is _Mode.STOPPING:
-            return self._go_on_stopping()
+            return self._continue_stop()
         x = u if self._mode is _Mode.FOLLOWING else self._chase(u, du, ddu)
-        if self._may_go(x):
+        if self._can_stop_from(x):
             self._advance(x)
             if abs(x - u) < _CAUGHT and abs(self._v - du) * h < _CAUGHT:
                 self._mode = _Mode.FOLLOWING
             return x
         self._begin_stop()
-        return self._go_on_stopping()
+        return self._continue_stop()
 
     def _advance(self, x: float) -> None:
         v = (x - self._x) / CYCLE_TIME
         self._a, self._x, self._v = (v - self._v) / CYCLE_TIME, x, v
 
-    def _may_go(self, x: float) -> bool:
-        """Whether the joint, once at x, could still stop inside."""
+    def _can_stop_from(self, x: float) -> bool:
+        """Returns whether the joint could still stop inside the limits from x."""
         h = CYCLE_TIME
         v = (x - self._x) / h
         a = (v - self._v) / h
-        up = v + a * h / 2.0  # The velocity at x, which the difference over the last cycle lags behind.
+        up = v + a * h / 2.0  # The velocity at x; the difference over the last cycle lags behind it.
         room = self._upper - x if up > 0.0 else x - self._lower
         speed = abs(up)
         if room > speed * (0.5 * speed / self._acceleration + 2.0 * self._acceleration / self._jerk + 0.01):
@@ -167,7 +167,7 @@ class _Joint:
         self._elapsed = 0.0
         self._mode = _Mode.STOPPING
 
-    def _go_on_stopping(self) -> float:
+    def _continue_stop(self) -> float:
         assert self._plan is not None
         stop, start, sign, v, a = self._plan
         self._elapsed += CYCLE_TIME
@@ -178,14 +178,14 @@ class _Joint:
         return self._x
 
     def _chase(self, u: float, du: float, ddu: float) -> float:
-        """Returns the next angle on the way to a command: velocity from the gap, acceleration from the velocity."""
+        """Returns the next angle of the approach: velocity from the distance, acceleration from the velocity."""
         h = CYCLE_TIME
         goal = min(max(u, self._lower), self._upper)
         if goal != u:
             du = ddu = 0.0
-        v_wanted = _clip(du + _PULL * (goal - self._x), self._velocity)
-        a_wanted = _clip(ddu + _GRIP * (v_wanted - self._v), self._acceleration)
-        a = self._a + _clip(a_wanted - self._a, self._jerk * h)
+        v_desired = _clip(du + _PULL * (goal - self._x), self._velocity)
+        a_desired = _clip(ddu + _GRIP * (v_desired - self._v), self._acceleration)
+        a = self._a + _clip(a_desired - self._a, self._jerk * h)
         return self._x + h * (self._v + h * a)
 
 

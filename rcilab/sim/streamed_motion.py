@@ -13,21 +13,21 @@ from rcilab.sim.violations import ArmCondition, ArmViolation
 PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
 # busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
 TORQUE_PREFILL = 2  # [cycles] The same for torques: the client closes the loop, and delay makes it oscillate.
-LOST_LIMIT = 20  # [cycles] Lost commands in a row that end a motion (RCI manual 4.6: usually 10 to 20).
+LOST_LIMIT = 20  # [cycles] Consecutive lost commands that end a motion (RCI manual 4.6: usually 10 to 20).
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after the end of the stream; longer than any queue.
 
 
 class StreamedMotion:
-    """The commands of a client, played one a cycle. Owned by the virtual arm.
+    """The commands of a client, played one per cycle. Owned by the virtual arm.
 
     Attributes:
         playout: The queue of commands, with its counts.
-        is_followed: Whether commands are played: from `begin` to `discard`, or until `drain` has played what is queued.
+        is_followed: Whether commands are played: from `begin` to `discard`, or until `drain` has played the queue.
 
     Args:
         prefill: Cycles between the first command and its play-out.
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
-        lost_limit: Lost cycles in a row that end the motion with a violation; None never does.
+        lost_limit: Consecutive lost cycles that end the motion with a violation; None: no limit.
     """
 
     def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
@@ -37,16 +37,16 @@ class StreamedMotion:
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
         self._generator: MotionGenerator | None = None
-        self._drain: int | None = None  # Cycles that are left for what is queued; None until the stream has ended.
+        self._drain: int | None = None  # Remaining cycles for the queue; None until the stream has ended.
 
     @property
     def law(self) -> ControlLaw:
         """The control law that follows the commands."""
-        is_over = self.mode.law.is_force_driven and self.playout.is_finished  # No command holds the arm any more.
+        is_over = self.mode.law.is_force_driven and self.playout.is_finished  # No further command holds the arm.
         return ControlLaw.POSITION if is_over else self.mode.law
 
     def prepare(self, mode: MotionMode) -> None:
-        """Forgets the last motion, ready for one in this mode."""
+        """Resets everything for a motion in this mode."""
         self.mode = mode
         self.playout.begin(most=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
 
@@ -56,16 +56,16 @@ class StreamedMotion:
         self.is_followed, self._drain = True, None
 
     def drain(self) -> None:
-        """Plays what is queued, and no more."""
+        """Plays the queued commands and ends."""
         self._drain = DRAIN_LIMIT
 
     def discard(self) -> None:
-        """Forgets what is queued; nothing is followed any more."""
+        """Clears the queue and ends."""
         self.is_followed = False
         self.playout.clear()
 
     def step(self) -> GeneratorOutput | None:
-        """Plays what is due in this cycle; None: nothing is. An output with violations must not be followed."""
+        """Plays the command that is due in this cycle; None without one. Do not follow an output with violations."""
         playout = self.playout
         if self._drain is not None:
             self._drain = self._drain - 1 if len(playout) else 0

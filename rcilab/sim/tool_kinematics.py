@@ -1,4 +1,4 @@
-"""How the tool and the elbow move when the joints do: pose, twist, acceleration and arm angle, one update a cycle."""
+"""Motion of the tool and the elbow: pose, twist, acceleration and arm angle, updated once per cycle."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ _REST: Twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class ToolKinematics:
     """Follows one motion of the joints, commanded or measured. Owned by the virtual arm.
 
-    The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
-    value stays, and at first 0. Without redundancy it is 0.
+    The arm angle is undefined if shoulder and wrist are aligned with the base axis or the arm is stretched: its last
+    value is kept, initially 0. Without redundancy it is 0.
 
     Attributes:
         matrix: Pose of the tool in base as a homogeneous transform, shape (4, 4), [m].
         twist: Its velocity in base axes, linear first, [m/s, rad/s]: Jacobian times joint velocity.
         acceleration: The twist's backward difference over one cycle, [m/s^2, rad/s^2].
         psi: Arm angle, [rad].
-        dpsi: Its backward difference over one cycle, the short way round, [rad/s].
+        dpsi: Its backward difference over one cycle, in the shorter direction, [rad/s].
         ddpsi: The second, [rad/s^2].
 
     Args:
         model: The arm with its tool.
-        q: Where it rests, n plain floats, [rad].
+        q: Joint angles of the stationary arm, n plain floats, [rad].
     """
 
     def __init__(self, model: RobotModel, q: Sequence[float]) -> None:
@@ -52,23 +52,23 @@ class ToolKinematics:
 
     @property
     def position(self) -> list[float]:
-        """Where the tool is in base, 3 plain floats, [m]."""
+        """Position of the tool in base, 3 plain floats, [m]."""
         return self.matrix[:3, 3].tolist()
 
     @property
     def is_stationary(self) -> bool:
-        """Whether nothing would change if the joints stayed where they are."""
+        """Whether nothing changes as long as the joints do not move."""
         return not (any(self.twist) or any(self.acceleration) or self.dpsi or self.ddpsi)
 
     def place(self, q: Sequence[float]) -> None:
-        """Puts the arm somewhere, at rest."""
+        """Sets a stationary arm."""
         self._terms = self._body.tool_motion(np.array(q), np.zeros(len(q)))
         self.matrix = self._terms.matrix
         self.twist = self.acceleration = _REST
         self.psi, self.dpsi, self.ddpsi = self._arm_angle(q), 0.0, 0.0
 
     def update(self, q: Sequence[float], motion: ToolTerms) -> None:
-        """Takes the joints of this cycle, n plain floats, [rad], and how the tool moves with them."""
+        """Updates from the joint angles of this cycle, n plain floats, [rad], and the motion of the tool."""
         h = CYCLE_TIME
         self._terms, self.matrix, twist = motion, motion.matrix, motion.twist
         a, b, c, d, e, f = twist
@@ -80,12 +80,12 @@ class ToolKinematics:
         self.psi, self.dpsi, self.ddpsi = psi, dpsi, (dpsi - self.dpsi) / h
 
     def observe(self, q: Sequence[float], motion: ToolTerms) -> None:
-        """Takes what `coincide` would, from measured joints, without differences."""
+        """Updates pose, twist and arm angle from measured joint angles, without differences."""
         self._terms, self.matrix, self.twist = motion, motion.matrix, motion.twist
         self.psi = self._arm_angle(q)
 
     def coincide(self, other: ToolKinematics) -> None:
-        """Copies another one: the joints are exactly at their reference."""
+        """Copies pose, twist and arm angle of another one, for joints that are exactly at their reference."""
         self._terms, self.matrix, self.twist, self.psi = other._terms, other.matrix, other.twist, other.psi
 
     def _arm_angle(self, q: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""What a virtual arm reports as wrong: rows of its maker's condition table, and conditions that need no table."""
+"""Violations reported by a virtual arm: of its maker's condition table, and of conditions of every arm."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from rcilab.i18n.translator import Remark
 
 
 class ArmCondition(Enum):
-    """What the virtual arm of every maker checks. The maker's controller maps each to a fault of its own."""
+    """Conditions of the virtual arm of every maker. The maker's controller maps each to one of its faults."""
 
     FINITE_ANGLES = "commanded joint angles are finite numbers"
     FINITE_TORQUES = "commanded joint torques are finite numbers"
     VALID_POSE = "a commanded pose is a pose that the arm can reach without a singularity"
     ARM_ANGLE_RANGE = "a commanded arm angle is within one turn"
     START_TOLERANCE = "a motion begins near the reference"
-    """No fault by itself: it explains the limits that the jump violates."""
+    """Not a fault by itself: it explains the limits that the jump violates."""
     COMMANDS_ARRIVE = "few commands in a row are lost, and the motion can go on without them"
     NO_COLLISION = "external joint torques stay below the collision thresholds"
 
@@ -28,7 +28,7 @@ class ArmViolation(NamedTuple):
 
     condition: ArmCondition
     remark: Remark
-    """The values that violate it, as a sentence."""
+    """The values of the violation, as a sentence."""
 
 
 CycleViolation: TypeAlias = LimitViolation | ArmViolation
@@ -38,5 +38,5 @@ Violations: TypeAlias = tuple[CycleViolation, ...]
 
 
 def describe_violations(violations: Iterable[CycleViolation]) -> Remark:
-    """Returns all of them in one line."""
+    """Returns the remarks of all violations as one."""
     return Remark.all(violation.remark for violation in violations)

@@ -1,10 +1,10 @@
-"""A virtual arm: reference, drives, plant and sensors, advanced together one cycle at a time. It knows no maker.
+"""A virtual arm: reference, drives, plant and sensors, advanced one cycle at a time, independent of the maker.
 
-Each `step` plays one command of the motion in progress, or goes on stopping, checks it, moves the plant and reads the
-sensors. What it finds wrong is in the result as violations; the maker's controller turns them into its own faults.
+Each `step` plays and checks one command of the motion in progress, or continues a stop, moves the plant and reads the
+sensors. Its result contains violations; the maker's controller maps them to its own faults.
 
-On a violation the arm reacts as a position controller does: the command that violates a condition is not followed,
-queued commands are forgotten, and the arm stops on one path, `ReferenceTrajectory.stop`, inside its acceleration and
+On a violation the arm reacts like a position controller: the violating command is not followed, queued commands are
+discarded, and the arm stops on one path, `ReferenceTrajectory.stop`, inside its acceleration and
 jerk limits, under the position servo; then the brakes engage. Where the arm followed its reference the stop begins at
 the last good command; where it was compliant (impedance, torque, hand guiding), at its measured position and velocity.
 """
@@ -34,8 +34,8 @@ from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, StreamedMotion
 from rcilab.sim.tool_kinematics import ToolKinematics
 from rcilab.sim.violations import Violations
 
-STANDSTILL = 1e-4  # [rad/s] A joint below it stands still, 0.006 deg/s: far below what an eye or a tool notices.
-SETTLE_LIMIT = 300  # [cycles] How long to wait for an arm that something keeps off its reference.
+STANDSTILL = 1e-4  # [rad/s] Below it a joint is stationary; 0.006 deg/s is far below what a tool resolves.
+SETTLE_LIMIT = 300  # [cycles] Timeout for an arm that an obstacle keeps off its reference.
 
 
 class CycleSignals(NamedTuple):
@@ -56,36 +56,36 @@ class CycleSignals(NamedTuple):
 
 
 class StepResult(NamedTuple):
-    """What went wrong in one cycle; both are empty in nearly every cycle."""
+    """The violations of one cycle."""
 
     command_violations: Violations = ()
-    """Of the command, or of its absence. Then no measurement is checked in this cycle."""
+    """Of the command, or of its absence. The measurement is then not checked."""
     measured_violations: Violations = ()
-    """Of the measurement: the command of this cycle has been followed."""
+    """Of the measurement; the command was followed."""
 
 
 _CLEAN = StepResult()
 
 
 class VirtualArm:
-    """One arm. Owned by the loop that calls `step`, once a cycle.
+    """One arm. Owned by the loop that calls `step` once per cycle.
 
     Attributes:
         model: The arm with the configured tool and load.
-        plant: What moves.
+        plant: The plant.
         commanded: The commanded joint angles.
         tool_c: The tool at the commanded joint angles.
         measured_state: The sensors.
-        resting_law: The control law while no command is followed. BRAKED engages the brakes once the arm stands still.
+        resting_law: The control law while no command is followed. BRAKED engages the brakes at standstill.
         is_monitored: Whether measurements are checked.
 
     Args:
         model: The arm.
-        plant: What moves.
-        parameters: What is configured; None: what an arm has after power-up.
+        plant: The plant.
+        parameters: The configuration; None: that after power-up.
         prefill: Cycles between the first command of a motion and its play-out.
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
-        lost_limit: Lost cycles in a row that end a motion; None never does.
+        lost_limit: Consecutive lost cycles that end a motion; None: no limit.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class VirtualArm:
 
     @property
     def can_engage_brakes(self) -> bool:
-        """Whether it stands still at its reference: servos settle, and a compliant arm may always move."""
+        """Whether the arm is stationary at its reference; never while it is compliant."""
         may_rest = self.commanded.is_stationary and not self._law.is_compliant
         return may_rest and (
             self._cycles_at_rest > SETTLE_LIMIT or self.measured_state.measured.q.tolist() == self.commanded.q
@@ -143,7 +143,7 @@ class VirtualArm:
 
     @property
     def has_settled(self) -> bool:
-        """Whether no count goes on here any more, and the control law stays what it is."""
+        """Whether the control law and all counters remain constant without commands."""
         return self._cycles_at_rest > SETTLE_LIMIT and self._current_law() is self._law
 
     @property
@@ -161,7 +161,7 @@ class VirtualArm:
         )
 
     def reset(self, q: JointVector) -> None:
-        """Places the stationary arm somewhere else."""
+        """Places the stationary arm at other joint angles."""
         measured = self.plant.reset(readonly_copy(q))
         self.commanded.place(measured.q.tolist())
         self.tool_c.place(self.commanded.q)
@@ -170,7 +170,7 @@ class VirtualArm:
         self.measured_state.configure(self.model, measured)
 
     def configure(self, parameters: ArmParameters) -> None:
-        """Takes new parameters; another tool or load only at standstill."""
+        """Sets new parameters; another tool or load only at standstill."""
         self._parameters = parameters
         tool, load = parameters.T_flange_tool, parameters.load
         if tool is not self.model.T_flange_tool or load is not self.model.load:
@@ -183,14 +183,14 @@ class VirtualArm:
         self._actuator.configure(self.model, parameters)
 
     def prepare_motion(self, mode: MotionMode) -> None:
-        """Forgets the last motion, ready for one in this mode."""
+        """Resets everything for a motion in this mode."""
         self._motion.prepare(mode)
 
     def begin_motion(self, limits: Limits) -> None:
         """Follows commands from now on, from the present reference.
 
         Args:
-            limits: Of the arm, as they apply to this motion; infinite where the maker checks nothing.
+            limits: Limits of the arm for this motion; infinite where the maker has no check.
         """
         mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
         tolerance = start_tolerance(mode.law, parameters)
@@ -210,15 +210,15 @@ class VirtualArm:
         self._tau_c = [0.0] * self.model.n if mode.law is ControlLaw.TORQUE else None
 
     def drain_motion(self) -> None:
-        """Plays what is queued, then stops."""
+        """Plays the queued commands, then stops."""
         self._motion.drain()
 
     def discard_motion(self) -> None:
-        """Forgets what is queued and stops."""
+        """Discards the queued commands and stops."""
         self._motion.discard()
 
     def begin_guiding(self, freedom: GuidedFreedom) -> None:
-        """Begins hand guiding at the present pose, as soon as `resting_law` is GUIDE."""
+        """Begins hand guiding at the present pose, once `resting_law` is GUIDE."""
         self._actuator.begin_guiding(freedom, self.measured_state.measured)
 
     def receive(self, command: ArmCommand) -> bool:
@@ -228,10 +228,10 @@ class VirtualArm:
         return self._motion.is_followed
 
     def step(self, command: ArmCommand | None = None) -> StepResult:
-        """Advances by one cycle: the reference goes on, the plant moves, the sensors are read.
+        """Advances by one cycle: the reference advances, the plant moves, the sensors are read.
 
         Args:
-            command: Queued first; None: nothing new.
+            command: A command to queue first; None: none.
         """
         if command is not None:
             self.receive(command)
@@ -252,7 +252,7 @@ class VirtualArm:
             self._tau_c = None
         self._move(law, has_moved=has_moved)
         if self.is_monitored:
-            # The arm's own stop is a motion of the joints: nothing is commanded of the tool's motion meanwhile.
+            # The arm's own stop is a motion of the joints: the tool has no commanded motion.
             violations = self.measured_state.check(is_commanded=self._motion.is_followed)
             if violations:
                 result = StepResult(measured_violations=violations)
@@ -262,8 +262,8 @@ class VirtualArm:
     def hold(self) -> bool:
         """Advances a settled arm by one cycle; returns whether its signals are those of the cycle before.
 
-        Only after a cycle with the signals of the one before, and `has_settled`: then `step` would come to the same
-        setpoint, and to the same signals unless the plant measures something else.
+        Only after a cycle with unchanged signals, and with `has_settled`: `step` would then compute the same setpoint,
+        and the same signals unless the measurement changes.
         """
         assert self._setpoint is not None
         measured = self.plant.step(self._setpoint)
@@ -286,12 +286,11 @@ class VirtualArm:
     def _move(self, law: ControlLaw, *, has_moved: bool) -> None:
         """Moves the plant by one cycle.
 
-        When a compliant arm is not to be compliant any more, the reference starts again from the measured position and
-        velocity.
+        When a compliant arm becomes position-controlled, the reference starts from the measured position and velocity.
 
         Args:
-            law: How the reference becomes a setpoint.
-            has_moved: Whether the commanded angles are those of this cycle already; otherwise they stop.
+            law: The control law.
+            has_moved: Whether the commanded angles are already those of this cycle; otherwise they stop.
         """
         commanded, last = self.commanded, self.measured_state.measured
         if self._law.is_compliant and not law.is_compliant:
@@ -307,7 +306,7 @@ class VirtualArm:
         self._take(law, self.plant.step(self._setpoint))
 
     def _take(self, law: ControlLaw, measured: Measurement) -> None:
-        """Takes the measurement of this cycle."""
+        """Processes the measurement of this cycle."""
         commanded, last = self.commanded, self.measured_state.measured
         if law.is_force_driven:
             commanded.move(measured.q.tolist())

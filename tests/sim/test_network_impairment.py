@@ -164,16 +164,16 @@ def test_a_value_out_of_range_is_refused_by_name(name: str, value: object) -> No
 
 def test_a_clock_stalls_once_at_its_time() -> None:
     plan = StallSchedule([Stall(duration=0.05, after=2.0)], now=10.0)
-    assert [plan.take(now) for now in (10.0, 11.999, 12.0, 12.1, 99.0)] == [0.0, 0.0, 0.05, 0.0, 0.0]
+    assert [plan.pop(now) for now in (10.0, 11.999, 12.0, 12.1, 99.0)] == [0.0, 0.0, 0.05, 0.0, 0.0]
     assert plan.count == 1
 
 
 def test_a_periodic_stall_comes_again_and_is_not_made_up_for() -> None:
     plan = StallSchedule([Stall(duration=0.5, period=1.0), Stall(duration=0.1, after=0.7)])
-    found = [(now / 10, plan.take(now / 10)) for now in range(40)]
+    found = [(now / 10, plan.pop(now / 10)) for now in range(40)]
     assert [entry for entry in found if entry[1]] == [(0.0, 0.5), (0.7, 0.1), (1.0, 0.5), (2.0, 0.5), (3.0, 0.5)]
     plan.replace([], 4.0)
-    assert not any(plan.take(now) for now in (4.0, 5.0, 6.0))
+    assert not any(plan.pop(now) for now in (4.0, 5.0, 6.0))
 
 
 def test_a_stall_longer_than_its_period_is_refused() -> None:

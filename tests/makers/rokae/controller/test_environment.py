@@ -104,6 +104,6 @@ def test_the_status_has_what_was_chosen_and_counted(place) -> None:
 def test_a_stall_counts_from_when_it_is_asked_for_and_can_be_taken_back(place) -> None:
     place.clock.advance(100.0)
     place.handle(world.StallClock(0.5, 2.0, 1.0))
-    assert [place.stalls.take(now) for now in (100.0, 101.9, 102.0, 102.9, 103.0)] == [0.0, 0.0, 0.5, 0.0, 0.5]
+    assert [place.stalls.pop(now) for now in (100.0, 101.9, 102.0, 102.9, 103.0)] == [0.0, 0.0, 0.5, 0.0, 0.5]
     place.handle(world.StallClock(0.0))
-    assert place.stalls.take(1e6) == 0.0
+    assert place.stalls.pop(1e6) == 0.0
