@@ -1,4 +1,4 @@
-"""Which angles of the held joint a pose leaves to an arm without closed form: looked for on a grid, edges bisected."""
+"""Feasible angles of the held joint for an arm without closed form: a grid search, with edges found by bisection."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs, Reason
 from rcilab.model.kinematics.solvers.newton import refine
 from rcilab.model.kinematics.solvers.numeric.search import NumericArm, search
 
-_GRID = 120  # Angles of the held joint: 3 degrees; smaller ranges may be overlooked.
-_SEEDS = 6  # Starts at each of them; solutions at neighbours are starts too.
-_SWEEPS = 60  # How often a solution is carried on to both neighbours: once around the circle.
+_GRID = 120  # Angles of the held joint, every 3 degrees; smaller ranges may be missed.
+_SEEDS = 6  # Starts at each angle, in addition to the solutions at its neighbours.
+_PASSES = 60  # Largest number of passes of solutions to both neighbours: once around the circle.
 _HALVINGS = 10  # Of a grid step at an edge: 5e-5 rad.
-_NOWHERE = 1 << 9
+_NO_SOLUTION = 1 << 9
 """Code of an angle without solution; otherwise a bit for each joint beyond its limit, and one for a singularity."""
 _SINGULAR = 1 << 8
 
 
 def numeric_arcs(
-    arm: NumericArm, nearness: Callable[[JointPath], Array], T: Pose, lower: Array, upper: Array, outside_box: bool
+    arm: NumericArm, closeness: Callable[[JointPath], Array], T: Pose, lower: Array, upper: Array, outside_box: bool
 ) -> FeasibleArcs:
     """Returns the feasible angles of the held joint at a pose; edges of feasible ranges are on the safe side.
 
     Args:
-        arm: With a held joint.
-        nearness: `KinematicsSolver.singularity_path`.
+        arm: The arm, with a held joint.
+        closeness: `KinematicsSolver.singularity_path`.
         T: Pose of the flange in base.
         lower: Smallest joint angles, shape (n,), [rad].
         upper: Largest joint angles, shape (n,), [rad].
-        outside_box: Whether the tool is outside the safety box. It is so at every angle or at none.
+        outside_box: Whether the tool is outside the safety box, which does not depend on the angle.
 
     Raises:
         UnreachableError: No solution was found at any angle.
     """
-    grid = _Grid(arm, nearness, T, lower, upper)
+    grid = _Grid(arm, closeness, T, lower, upper)
     psi = np.linspace(-pi, pi, _GRID, endpoint=False)
-    q, codes = grid.looked_at(psi)
-    if (codes == _NOWHERE).all():
+    q, codes = grid.solve_grid(psi)
+    if (codes == _NO_SOLUTION).all():
         raise UnreachableError(
             "no joint angles put the tool there at whatever angle of joint 3; turn the tool or move the target"
         ).coded("no_angles")
@@ -66,16 +66,16 @@ def numeric_arcs(
 
 class _Grid:
     def __init__(
-        self, arm: NumericArm, nearness: Callable[[JointPath], Array], T: Pose, lower: Array, upper: Array
+        self, arm: NumericArm, closeness: Callable[[JointPath], Array], T: Pose, lower: Array, upper: Array
     ) -> None:
-        self._arm, self._nearness, self._lower, self._upper = arm, nearness, lower, upper
+        self._arm, self._closeness, self._lower, self._upper = arm, closeness, lower, upper
         self._rotation, self._position = T.rotation, T.position
         self._bits = 1 << np.arange(arm.n)
         assert arm.held is not None
         self._held = arm.held
 
-    def looked_at(self, psi: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Returns the joint angles of the branch with least against it at each angle, and its code."""
+    def solve_grid(self, psi: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Returns the joint angles of the best branch at each angle, and its code."""
         seeds = np.tile(self._arm.seeds(_SEEDS), (len(psi), 1))
         seeds[:, self._held] = np.repeat(psi, _SEEDS)
         q, codes = self._coded(*search(self._arm, *self._poses(len(seeds)), seeds))
@@ -83,9 +83,9 @@ class _Grid:
         rows = np.arange(len(psi))
         best = _weight(codes).argmin(axis=1)
         q, codes = q[rows, best], codes[rows, best]
-        for _ in range(_SWEEPS):
+        for _ in range(_PASSES):
             guesses = np.concatenate([np.roll(q, step, axis=0) for step in (1, -1)])
-            found, found_codes = self._settled(np.tile(psi, 2), guesses)
+            found, found_codes = self._refined(np.tile(psi, 2), guesses)
             is_better = False
             for side in (slice(None, len(psi)), slice(len(psi), None)):
                 better = _weight(found_codes[side]) < _weight(codes)
@@ -98,24 +98,24 @@ class _Grid:
     def edges(
         self, psi: Array, q: Array, codes: NDArray[np.int64], next_q: Array, next_codes: NDArray[np.int64]
     ) -> Array:
-        """Returns where the code changes in grid steps that begin at psi, shape (m,), [rad]."""
+        """Returns the angles at which the code changes in the grid steps from psi, shape (m,), [rad]."""
         low, high = psi.copy(), psi + tau / _GRID
         q, next_q = q.copy(), next_q.copy()
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            found, found_codes = self._settled(np.tile(middle, 2), np.concatenate((q, next_q)))
+            found, found_codes = self._refined(np.tile(middle, 2), np.concatenate((q, next_q)))
             first, second = found_codes[: len(psi)], found_codes[len(psi) :]
             is_second = _weight(second) < _weight(first)
             best = np.where(is_second, second, first)
             angles = np.where(is_second[:, None], found[len(psi) :], found[: len(psi)])
-            # On the side of the lower code only what is as good: an edge of a feasible range is feasible.
+            # On the side of the lower code only equal codes, so that an edge of a feasible range is feasible.
             is_low = np.where(_weight(codes) < _weight(next_codes), best == codes, best != next_codes)
             low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
             keeps_low, keeps_high = is_low & (best == codes), ~is_low & (best == next_codes)
             q[keeps_low], next_q[keeps_high] = angles[keeps_low], angles[keeps_high]
         return np.where(_weight(codes) < _weight(next_codes), low, high)
 
-    def _settled(self, psi: Array, guesses: Array) -> tuple[Array, NDArray[np.int64]]:
+    def _refined(self, psi: Array, guesses: Array) -> tuple[Array, NDArray[np.int64]]:
         guesses = guesses.copy()
         guesses[:, self._held] = psi
         return self._coded(*refine(self._arm.chain, self._held, *self._poses(len(psi)), guesses))
@@ -126,19 +126,19 @@ class _Grid:
     def _coded(self, q: Array, good: NDArray[np.bool_]) -> tuple[Array, NDArray[np.int64]]:
         q = self._arm.placed(q)
         beyond = np.asarray(((q <= self._lower) | (q >= self._upper)) @ self._bits, dtype=np.int64)
-        return q, np.where(good, beyond + _SINGULAR * (self._nearness(q) >= 1.0), _NOWHERE)
+        return q, np.where(good, beyond + _SINGULAR * (self._closeness(q) >= 1.0), _NO_SOLUTION)
 
 
 def _weight(codes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Returns by how much branches are to be avoided: joints beyond their limits, then singularities, then none."""
+    """Returns the penalty of branches: joints beyond their limits, then singularities; largest without a solution."""
     count = sum((codes >> bit) & 1 for bit in range(8))
-    return np.asarray(16 * count + ((codes & _SINGULAR) > 0) + 1000 * ((codes & _NOWHERE) > 0), dtype=np.int64)
+    return np.asarray(16 * count + ((codes & _SINGULAR) > 0) + 1000 * ((codes & _NO_SOLUTION) > 0), dtype=np.int64)
 
 
 def _arc(start: float, end: float, code: int, outside_box: bool) -> Arc:
     joints = tuple(joint + 1 for joint in range(8) if code >> joint & 1)
     reasons: list[Reason] = []
-    if code == _NOWHERE:
+    if code == _NO_SOLUTION:
         reasons.append("reach")
     if joints:
         reasons.append("joint limits")

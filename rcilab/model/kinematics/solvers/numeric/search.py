@@ -1,4 +1,4 @@
-"""The search for joint angles of poses: damped least squares from given starts, polished by Newton's method."""
+"""Search for joint angles of poses: damped least squares from given starts, refined by Newton's method."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from rcilab.model.kinematics.forward import Chain
 from rcilab.model.kinematics.solvers.newton import cross, free_joints, jacobians, refine
 from rcilab.model.kinematics.solvers.solver import Angles
 
-_STEPS = 18  # Of damped least squares; a start that has not converged by then seldom does.
-_GAIN = 0.02  # Damping by the square of what is missing: more is slower, less jumps further.
-_DAMPING = 1e-3  # Least damping, lengths as shares of the reach: bounds steps close to singularities.
-_LONGEST = 0.7  # [rad] Of a step: longer ones leave the region in which the Jacobian says anything.
-_ALMOST = 1e-3  # What is missing, lengths as shares of the reach, when Newton's method takes over.
-_SAME = 1e-5  # [rad] Solutions that differ by less are one.
+_STEPS = 18  # Iterations of damped least squares; a start that has not converged by then rarely does.
+_GAIN = 0.02  # Damping relative to the squared error: more is slower, less makes larger jumps.
+_DAMPING = 1e-3  # Smallest damping, lengths as shares of the reach; bounds steps close to singularities.
+_MAX_STEP = 0.7  # [rad] Bound of a step: longer ones leave the region in which the Jacobian is valid.
+_CLOSE = 1e-3  # Error, lengths as shares of the reach, from which Newton's method continues.
+_TOLERANCE = 1e-5  # [rad] Solutions that differ by less are equal.
 
 
 class NumericArm:
-    """What the search needs of an arm. Immutable.
+    """The data of an arm for the search. Immutable.
 
     Args:
         chain: From `build_chain`.
-        held: Which joint, from 0, is held at the redundancy angle; None for none.
+        held: Index of the joint that is held at the redundancy angle; None for none.
         lower: Smallest joint angles, shape (n,), [rad].
         upper: Largest joint angles, shape (n,), [rad].
         reach: Length of the stretched arm, [m].
@@ -41,13 +41,13 @@ class NumericArm:
         self._half = np.minimum(0.5 * (upper - lower), pi)
 
     def seeds(self, count: int, attempt: int = 0) -> Array:
-        """Returns joint angles to start from, evenly spread over the joints' ranges, shape (count, n), [rad].
+        """Returns starts, evenly distributed over the joints' ranges, shape (count, n), [rad].
 
         Args:
-            count: How many.
-            attempt: Another number gives others.
+            count: Number of starts.
+            attempt: Index of the attempt; each has different starts.
         """
-        # Additive recurrence with the roots of x^(n+1) = x + 1 (Roberts 2018): no clusters, the same every time.
+        # Additive recurrence with the roots of x^(n+1) = x + 1 (Roberts 2018): no clusters, deterministic.
         root = 2.0
         for _ in range(40):
             root = (1.0 + root) ** (1.0 / (self.n + 1))
@@ -64,20 +64,20 @@ class NumericArm:
         return bool(((self._lower < q) & (q < self._upper)).all())
 
     def distinct(self, q: Array) -> list[Angles]:
-        """Returns solutions, shape (m, n), [rad], each once and within half a turn of the middles."""
+        """Returns the distinct solutions of those given, shape (m, n), [rad], within half a turn of the middles."""
         found: list[Array] = []
         for row in self.placed(q):
             turns = [row - other for other in found]
-            if all(np.abs(turn - tau * np.round(turn / tau)).max() > _SAME for turn in turns):
+            if all(np.abs(turn - tau * np.round(turn / tau)).max() > _TOLERANCE for turn in turns):
                 found.append(row)
         return [tuple(row.tolist()) for row in found]
 
 
 def search(arm: NumericArm, rotations: Array, positions: Array, q: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Returns joint angles that put the flange at poses, and which rows are solutions, shape (M,).
+    """Returns joint angles for poses of the flange, and whether each row is a solution, shape (M,).
 
-    Damped least squares, damped by what is missing (Sugihara, IEEE Transactions on Robotics 27(5), 2011, eq. 22): far
-    from the pose the steps are small and safe, close to it they are Newton's.
+    Damped least squares with damping by the error (Sugihara, IEEE Transactions on Robotics 27(5), 2011, eq. 22): far
+    from the pose the steps are small and safe, close to it they are Newton steps.
 
     Args:
         arm: The arm.
@@ -93,34 +93,36 @@ def search(arm: NumericArm, rotations: Array, positions: Array, q: Array) -> tup
     eye = np.eye(6)
     for _ in range(_STEPS):
         J, p, axes = jacobians(arm.chain, q[active])
-        miss = scale * np.concatenate((positions[active] - p.T, _turns(axes, rotations[active])), axis=1)
-        size = np.einsum("ij,ij->i", miss, miss)
-        is_close = size < _ALMOST * _ALMOST
+        error = scale * np.concatenate((positions[active] - p.T, _turns(axes, rotations[active])), axis=1)
+        size = np.einsum("ij,ij->i", error, error)
+        is_close = size < _CLOSE * _CLOSE
         close[active[is_close]] = True
-        J, miss, size, active = J[~is_close], miss[~is_close], size[~is_close], active[~is_close]
+        J, error, size, active = J[~is_close], error[~is_close], size[~is_close], active[~is_close]
         if not len(active):
             break
         J = scale[:, None] * J[:, :, free]
         damped = J @ J.transpose(0, 2, 1) + (_GAIN * size + _DAMPING * _DAMPING)[:, None, None] * eye
-        step = (J.transpose(0, 2, 1) @ np.linalg.solve(damped, miss[..., None]))[..., 0]
-        step *= np.minimum(1.0, _LONGEST / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
+        step = (J.transpose(0, 2, 1) @ np.linalg.solve(damped, error[..., None]))[..., 0]
+        step *= np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
         q[active[:, None], free] += step
-    good = np.zeros(len(q), dtype=np.bool_)
+    is_solution = np.zeros(len(q), dtype=np.bool_)
     if close.any():
-        q[close], good[close] = refine(arm.chain, arm.held, rotations[close], positions[close], q[close])
-        missed = close & ~good
-        if missed.any() and not good.any():  # Where solutions are about to meet, Newton's method halves its steps.
-            q[missed], good[missed] = refine(
+        q[close], is_solution[close] = refine(arm.chain, arm.held, rotations[close], positions[close], q[close])
+        missed = close & ~is_solution
+        if (
+            missed.any() and not is_solution.any()
+        ):  # Near the meeting point of two solutions Newton's method only halves the error.
+            q[missed], is_solution[missed] = refine(
                 arm.chain, arm.held, rotations[missed], positions[missed], q[missed], slowly=True
             )
-    return q, good
+    return q, is_solution
 
 
 def _turns(axes: tuple[Array, Array, Array], rotations: Array) -> Array:
-    """Returns the rotation vectors from the flange to its wanted rotations, base axes, shape (M, 3), [rad]."""
-    wanted = [rotations[:, :, i].T for i in range(3)]
-    sines = 0.5 * np.sum([cross(now, there) for now, there in zip(axes, wanted, strict=True)], axis=0)
-    cosine = 0.5 * (sum((now * there).sum(axis=0) for now, there in zip(axes, wanted, strict=True)) - 1.0)
+    """Returns the rotation vectors from the flange to its desired rotations, base axes, shape (M, 3), [rad]."""
+    desired = [rotations[:, :, i].T for i in range(3)]
+    sines = 0.5 * np.sum([cross(current, target) for current, target in zip(axes, desired, strict=True)], axis=0)
+    cosine = 0.5 * (sum((current * target).sum(axis=0) for current, target in zip(axes, desired, strict=True)) - 1.0)
     sine = np.sqrt((sines * sines).sum(axis=0))
-    factor = np.arctan2(sine, cosine) / np.maximum(sine, 1e-12)  # Half a turn has no axis here: a start is lost.
+    factor = np.arctan2(sine, cosine) / np.maximum(sine, 1e-12)  # Half a turn has no axis here; that start is lost.
     return np.where(sine > 1e-9, factor * sines, sines).T

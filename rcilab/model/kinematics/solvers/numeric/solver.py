@@ -1,4 +1,4 @@
-"""Any serial arm of up to 7 joints, by iteration: for arms that have no closed form."""
+"""Iterative solver for serial arms of up to 7 joints without closed form."""
 
 from __future__ import annotations
 
@@ -33,28 +33,28 @@ SINGULAR = 0.01
 """Smallest singular value of the Jacobian, lengths as shares of the reach, below which an arm counts as singular.
 Tuning value: typical poses have 0.1 to 0.3."""
 
-_HELD = 2  # Which joint, from 0, of a 7-axis arm is the redundancy angle: the roll of the upper arm, as Franka has it.
-_SEEDS, _ROUNDS = 48, 3  # Starts of the search, and how often others are tried while no solution is inside the limits.
-_BATCH_SEEDS, _BLOCK = 16, 128  # For many poses: starts for each, and poses at once, so that arrays stay in the cache.
+_HELD = 2  # Index of the held joint of a 7-axis arm: the roll of the upper arm, as at Franka.
+_SEEDS, _ATTEMPTS = 48, 3  # Starts per attempt, and attempts until a solution is inside the limits.
+_BATCH_SEEDS, _BLOCK = 16, 128  # Starts per pose, and poses computed together, so that arrays fit into the cache.
 
 
 class NumericSolver:
-    """Damped least squares from many starts, then Newton's method: every answer is exact, one may be missing.
+    """Damped least squares from many starts, then Newton's method: solutions are exact, but some may be missing.
 
-    A 7-axis arm is solved with joint 3 held: its angle is the redundancy angle.
+    A 7-axis arm is solved with joint 3 held at the redundancy angle.
 
     Args:
         description: The arm.
 
     Raises:
-        ModelError: It has more than 7 joints.
+        ModelError: The arm has more than 7 joints.
     """
 
     def __init__(self, description: RobotDescription) -> None:
         dh, joint = description.dh, description.limits.joint
         n = len(dh)
         if n > 7:
-            raise ModelError(f"{description.name}: no inverse for {n} joints; the numeric solver takes up to 7")
+            raise ModelError(f"{description.name}: no inverse for {n} joints; the numeric solver supports up to 7")
         self._held = _HELD if n == 7 else None
         self.redundancy = NO_REDUNDANCY if self._held is None else Redundancy("joint", _HELD + 1)
         half = 0.5 * (dh[0].a + sum(hypot(row.a, row.d) for row in dh[1:-1]) + dh[-1].a)
@@ -69,30 +69,30 @@ class NumericSolver:
 
     def redundancy_angle(self, q: Sequence[float]) -> float:
         """Returns the angle of the held joint, [rad]."""
-        return remainder(q[self._redundant()], tau)
+        return remainder(q[self._require_held_joint()], tau)
 
     def redundancy_angle_path(self, q: JointPath) -> Array:
         """Returns the angles of the held joint, [rad]."""
-        return q[:, self._redundant()]
+        return q[:, self._require_held_joint()]
 
     def singularity(self, q: Sequence[float]) -> str | None:
         """Returns the description of the singularity at a configuration, or None."""
         return "the arm loses a direction of motion" if self.is_singular(q) else None
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns how near the arm is along a path to losing a direction of motion, a redundant joint held."""
+        """Returns the closeness to a singularity along a path, with the redundant joint held."""
         J = jacobian_path(moving_frame(self._arm.chain, q, len(self._arm.chain), IDENTITY))
         values = np.linalg.svd(J[:, :, self._free] * self._scale[:, None], compute_uv=False)
         with np.errstate(divide="ignore"):
             return np.asarray(SINGULAR / values[:, -1], dtype=np.float64)
 
     def is_singular(self, q: Sequence[float]) -> bool:
-        """Returns whether the arm counts as there."""
+        """Returns whether the arm counts as singular."""
         J = tool_jacobian(self._arm.chain, q)[0][:, self._free] * self._scale[:, None]
         return float(np.linalg.svd(J, compute_uv=False)[-1]) <= SINGULAR
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
-        """Returns the solutions at N poses, shape (N, M, n), M as many as the pose with most of them has."""
+        """Returns the solutions at N poses, shape (N, M, n), M from the pose with the most."""
         arm, count = self._arm, len(T_base_flange)
         angles = np.broadcast_to(psi, (count,))
         found: list[list[Angles]] = []
@@ -129,12 +129,12 @@ class NumericSolver:
         return refine_near(self._arm.chain, self._held, rotation, position, psi, near)
 
     def arcs(self, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool) -> FeasibleArcs:
-        """Returns the feasible redundancy angles, looked for on a grid."""
-        self._redundant()
-        _check_reach(self.envelope, T_base_flange)
+        """Returns the feasible redundancy angles, found on a grid."""
+        self._require_held_joint()
+        _require_reach(self.envelope, T_base_flange)
         return numeric_arcs(self._arm, self.singularity_path, T_base_flange, lower, upper, outside_box)
 
-    def _redundant(self) -> int:
+    def _require_held_joint(self) -> int:
         if self._held is None:
             raise KinematicsError(f"an arm with {self._arm.n} axes has no arm angle").coded("no_psi")
         return self._held
@@ -146,9 +146,9 @@ class _NumericPose:
 
     def branches(self, psi: float) -> list[Angles]:
         arm, pose = self._arm, self._pose
-        _check_reach(self._envelope, pose)
+        _require_reach(self._envelope, pose)
         found: list[Angles] = []
-        for attempt in range(_ROUNDS):
+        for attempt in range(_ATTEMPTS):
             seeds = arm.seeds(_SEEDS, attempt)
             if self._near is not None and not attempt:
                 seeds = np.concatenate((np.array(self._near)[None], seeds))
@@ -163,18 +163,18 @@ class _NumericPose:
         return found
 
 
-def _check_reach(envelope: Envelope, pose: Pose) -> None:
-    """Refuses a pose whose wrist centre is farther from the shoulder than the stretched links are long.
+def _require_reach(envelope: Envelope, pose: Pose) -> None:
+    """Requires a wrist centre within the length of the stretched links from the shoulder.
 
     Raises:
-        UnreachableError: It is.
+        UnreachableError: It is farther.
     """
     r, (x, y, z) = pose.parts
-    hand, longest = envelope.hand, envelope.upper + envelope.fore
+    hand, max_length = envelope.hand, envelope.upper + envelope.fore
     length = hypot(x - hand * r[2], y - hand * r[5], z - hand * r[8] - envelope.shoulder)
-    if length > longest + REACH_TOLERANCE:
+    if length > max_length + REACH_TOLERANCE:
         raise UnreachableError(
-            f"out of reach by {1e3 * (length - longest):.1f} mm: the wrist centre would be {length:.3f} m from the "
-            f"shoulder, the arm reaches {longest:.3f} m at most; move the target closer",
-            distance=length - longest,
-        ).coded("too_far", distance=length - longest)
+            f"out of reach by {1e3 * (length - max_length):.1f} mm: the wrist centre would be {length:.3f} m from the "
+            f"shoulder, the arm reaches {max_length:.3f} m at most; move the target closer",
+            distance=length - max_length,
+        ).coded("too_far", distance=length - max_length)

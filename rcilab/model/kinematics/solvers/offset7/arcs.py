@@ -1,7 +1,7 @@
 """The feasible arm angles of an arm with offsets, from its self-motion, piece by piece.
 
-There is no closed form for where a joint passes its limit here. Pieces of the self-motion in which that happens, and
-those between two branches, are cut into shorter ones until the place is known well enough.
+The angle at which a joint passes its limit has no closed form here. Pieces of the self-motion that contain one, and
+those between two branches, are divided until the angle is known with sufficient accuracy.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from rcilab.model.kinematics.solvers.newton import refine
 from rcilab.model.kinematics.solvers.offset7.arm import ELBOW, OffsetGeometry, SelfMotion, wrapped
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
 
-_CUTS = 8  # Into how many a piece is cut at once; tuning value.
-_ROUNDS = 4  # How often: a piece of 0.1 rad then is 2e-5 rad long.
-_LONG = 0.1  # [rad] Between two branches a piece is not straight: cut it once in any case.
+_CUTS = 8  # Number of parts of a divided piece; tuning value.
+_ROUNDS = 4  # Number of divisions: a piece of 0.1 rad then is 2e-5 rad long.
+_LONG = 0.1  # [rad] A longer piece between two branches is curved and divided once in any case.
 _SLIVER = 1e-4  # [rad] Shorter arcs are merged.
-_GRID = 1e-9  # [rad] Ends of pieces that differ by less meet.
+_GRID = 1e-9  # [rad] Ends of pieces that differ by less are equal.
 _SINGULAR = 1 << 7
 """Bit of a singularity, after the bits of the joints."""
 _NOWHERE = 1 << 8
@@ -33,14 +33,14 @@ _NOWHERE = 1 << 8
 def feasible_offset_arcs(
     arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array, outside_box: bool = False
 ) -> FeasibleArcs:
-    """Returns the feasible arm angles of a pose; the ends of its arcs are known to about 1e-4 rad, on the safe side.
+    """Returns the feasible arm angles of a pose; the ends of its arcs are accurate to about 1e-4 rad, on the safe side.
 
     Args:
         arm: From `build_offset_geometry`.
         T_base_flange: Pose of the flange in base.
         lower: Smallest joint angles, shape (7,), [rad].
         upper: Largest joint angles, shape (7,), [rad].
-        outside_box: Whether the tool is outside the safety box. It is so at every arm angle or at none.
+        outside_box: Whether the tool is outside the safety box, which does not depend on the arm angle.
 
     Raises:
         UnreachableError: The pose is out of reach at every arm angle.
@@ -50,12 +50,12 @@ def feasible_offset_arcs(
     high = np.round(np.maximum(starts, ends) / _GRID) * _GRID
     turns = tau * np.floor((low + pi) / tau)
     low, high = low - turns, high - turns
-    over = high > pi  # Across pi: the rest begins at -pi.
+    over = high > pi  # Beyond pi: the rest begins at -pi.
     low = np.concatenate((low, np.full(int(over.sum()), -pi)))
     high, codes = np.concatenate((np.minimum(high, pi), high[over] - tau)), np.concatenate((codes, codes[over]))
     breaks = np.unique(np.concatenate((low, high, (-pi, pi))))
     best = np.full(len(breaks) - 1, _NOWHERE)
-    # What is wrong in the branch in which least is; of two alike a singularity, as that one has joint angles.
+    # The code of the best branch; of equal ones a singularity, because it has joint angles.
     for code in sorted(set(codes.tolist()), key=lambda code: (-code.bit_count(), code & _SINGULAR, -code)):
         change = np.zeros(len(breaks))
         chosen = codes == code
@@ -66,7 +66,9 @@ def feasible_offset_arcs(
     begins = breaks[first].tolist()
     arcs: list[Arc] = []
     for start, end, i in zip(begins, [*begins[1:], pi], first.tolist(), strict=True):
-        if arcs and end - start < _SLIVER and best[i] and not arcs[-1].ok:  # What cutting left between two reasons.
+        if (
+            arcs and end - start < _SLIVER and best[i] and not arcs[-1].ok
+        ):  # Remainder of a division between two reasons.
             arcs[-1] = replace(arcs[-1], end=end)
         else:
             arcs.append(_arc(start, end, int(best[i]), outside_box))
@@ -76,7 +78,7 @@ def feasible_offset_arcs(
 def _pieces(
     arm: OffsetGeometry, T_base_flange: Pose, lower: Array, upper: Array
 ) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Returns arm angles at both ends of pieces, and what is wrong in each: joints beyond their limits, singular."""
+    """Returns arm angles at both ends of pieces, and the code of each: joints beyond their limits, singularity."""
     motion = SelfMotion(arm, T_base_flange)
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
@@ -87,7 +89,7 @@ def _pieces(
         return beyond + _SINGULAR * (nearness >= 1.0)
 
     starts, ends, branches = motion.starts, motion.ends, motion.branches
-    half = len(starts) // 2  # The others are their twins, whose determinants are the same.
+    half = len(starts) // 2  # The other half are twins with the same determinants.
     nearness = held_singularity_path(arm, np.concatenate((starts[:half], ends[:half]))).reshape(2, half)
     before, after = (broken(q, np.tile(near, 2)) for q, near in zip((starts, ends), nearness, strict=True))
     cut = (before != after) | ((branches < 0) & (np.abs(ends - starts).max(axis=1) > _LONG))
@@ -113,7 +115,7 @@ def _pieces(
 def _placed(
     arm: OffsetGeometry, motion: SelfMotion, T_base_flange: Pose, guesses: Array, branches: NDArray[np.intp]
 ) -> Array:
-    """Returns the points of the self-motion next to guesses, shape (m, 7), [rad], or not a number."""
+    """Returns the points of the self-motion near guesses, shape (m, 7), [rad]; NaN without one."""
     whole = np.full_like(guesses, np.nan)
     on = branches >= 0
     whole[on] = motion.on_branches(guesses[on], branches[on])

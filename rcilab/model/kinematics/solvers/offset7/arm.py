@@ -1,12 +1,12 @@
-"""An arm with offsets at elbow and wrist, as the Panda has them: all joint angles for one pose, by joint 7.
+"""An arm with offsets at elbow and wrist, such as the Panda: all joint angles for one pose, as functions of joint 7.
 
-Axes 1 to 3 meet in the shoulder S, axes 5 and 6 in the wrist W; axis 7 passes W at a distance, and the elbow stands off
-the line of both arms. For a given angle of joint 7 everything else follows in closed form (He and Liu, IEEE Robotics
-and Automation Letters 6(4), 2021): W is known, the triangle of shoulder, elbow and wrist gives two angles of joint 4,
-the plane of that triangle through axis 5 two of joint 6, and the shoulder two groups of joints 1 to 3.
+Axes 1 to 3 meet in the shoulder S, axes 5 and 6 in the wrist W; axis 7 passes W at a distance, and the elbow is offset
+from upper arm and forearm. For a given angle of joint 7 everything else follows in closed form (He and Liu, IEEE
+Robotics and Automation Letters 6(4), 2021): W is known, the triangle of shoulder, elbow and wrist gives two angles of
+joint 4, the plane of that triangle through axis 5 two of joint 6, and the shoulder two groups of joints 1 to 3.
 
-But the arm angle of such an arm is its maker's: the elbow of the Panda is joint 3. So the self-motion of the arm at a
-pose is traced by joint 7; `inverse.py` finds where joint 3 is at a given angle.
+The arm angle of such an arm is defined by its maker: for the Panda the angle of joint 3. The self-motion of the arm at
+a pose is therefore traced by joint 7; `inverse.py` finds the points with joint 3 at a given angle.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
 from rcilab.robots.description import RobotDescription
 
 ELBOW = 2
-"""Which joint, from 0, is the arm angle."""
+"""Index of the joint whose angle is the arm angle."""
 
 _QUARTER = pi / 2
 _TURNS = (-_QUARTER, _QUARTER, _QUARTER, -_QUARTER, _QUARTER, _QUARTER, 0.0)
-_EXACT = 1e-12  # [rad] and [m] In which the table must have the shape.
+_EXACT = 1e-12  # [rad] and [m] Tolerance of the table's shape.
 _TRACE = 360
-"""Angles of joint 7 at which the self-motion is looked at. Tuning value: a degree; smaller loops may be overlooked."""
-_PARTS, _HUNTS = 16, 4  # An end of a branch is looked for in 16 parts of a piece, four times over.
-_DENSE = 6  # Angles put next to it; tuning value.
+"""Number of angles of joint 7 on the self-motion. Tuning value: one per degree; smaller loops may be missed."""
+_PARTS, _HUNTS = 16, 4  # The end of a branch is searched in 16 parts of a piece, four times.
+_DENSE = 6  # Angles added near an end; tuning value.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class OffsetGeometry:
     upper: float
     """Along the upper arm, shoulder to elbow."""
     elbow: float
-    """How far the elbow stands off the upper arm and off the forearm."""
+    """Offset of the elbow from the upper arm and from the forearm."""
     fore: float
     """Along the forearm, elbow to wrist."""
     wrist: float
@@ -55,11 +55,11 @@ class OffsetGeometry:
     chain: Chain
     """From `build_chain`."""
     middles: tuple[float, ...]
-    """Middles of the joints' ranges, [rad]: angles are given within half a turn of them."""
+    """Middles of the joints' ranges, [rad]; angles are within half a turn of them."""
 
     @property
     def flip(self) -> float:
-        """Angle of joint 4 with the arm stretched, [rad]: the elbow flips there."""
+        """Angle of joint 4 of the stretched arm, [rad], at which the elbow flips."""
         return atan2(self.upper, self.elbow) + atan2(self.fore, self.elbow) - pi
 
     @property
@@ -73,7 +73,7 @@ def build_offset_geometry(description: RobotDescription) -> OffsetGeometry:
     """Returns the lengths that this inverse needs.
 
     Raises:
-        ModelError: The table does not have the shape it knows.
+        ModelError: The table does not have the required shape.
     """
     dh = description.dh
     lengths = {0: "d", 2: "da", 3: "a", 4: "d", 5: "a", 6: "d"}
@@ -97,7 +97,7 @@ def build_offset_geometry(description: RobotDescription) -> OffsetGeometry:
 
 
 class SelfMotion:
-    """All joint angles that put the flange at one pose.
+    """All joint angles for one pose of the flange.
 
     Args:
         arm: From `build_offset_geometry`.
@@ -119,15 +119,15 @@ class SelfMotion:
         table, beyond = trace(arm, self._rotation, self._position, angles)
         exists = np.isfinite(table[..., 0])
         self.starts, self.ends, self.branches = _segments(table, exists, beyond > 0.0)
-        """Ends of short pieces of the self-motion, each of shape (m, 7), [rad]; each end within half a turn. And which
-        branch of `trace` each is on, 4 more where joint 2 is negative, -1 from one to another, shape (m,)."""
+        """Starts and ends of short pieces of the self-motion, shape (m, 7) each, [rad], and their branches of `trace`,
+        plus 4 if joint 2 is negative, -1 between two branches, shape (m,)."""
 
     def on_branches(self, guesses: Array, branches: NDArray[np.intp]) -> Array:
-        """Returns the joint angles at the guesses' angles of joint 7, whole turns counted as there; or not a number.
+        """Returns the joint angles at the guesses' angles of joint 7, with their full turns; NaN without a solution.
 
         Args:
-            guesses: Joint angles close by, shape (m, 7), [rad].
-            branches: Which branch each is on, 0 to 7, shape (m,).
+            guesses: Joint angles close to the solutions, shape (m, 7), [rad].
+            branches: Branch of each, 0 to 7, shape (m,).
         """
         table = trace(self._arm, self._rotation, self._position, guesses[:, 6])[0].reshape(4, len(guesses), 7)
         found = table[branches % 4, np.arange(len(guesses))]
@@ -136,9 +136,9 @@ class SelfMotion:
         return guesses + wrapped(found - guesses)
 
     def _with_ends(self, angles: Array, exists: NDArray[np.bool_]) -> Array:
-        """Returns the angles of joint 7, and more of them where branches end, the closer to the end the denser.
+        """Returns the angles of joint 7 with more of them where branches end, denser towards the end.
 
-        There the others turn with the square root of the distance.
+        Near an end the other joints change with the square root of the distance.
         """
         side, place = np.nonzero(exists != np.roll(exists, -1, axis=1))
         if not len(place):
@@ -168,7 +168,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
 
     Returns:
         Shape (2, 2, K, 7), [rad], NaN without a solution: joint 4 above the flip or below, cos q5 positive
-        or negative, joint 2 positive; and how far the wrist is out of reach, shape (K,), [m], below zero within.
+        or negative, joint 2 positive; and the distance of the wrist out of reach, shape (K,), [m], negative inside.
     """
     c7, s7 = np.cos(q7)[:, None], np.sin(q7)[:, None]
     x7, y7, z7 = rotation[..., 0], rotation[..., 1], rotation[..., 2]
@@ -178,7 +178,7 @@ def trace(arm: OffsetGeometry, rotation: Array, position: Array, q7: Array) -> t
     square = (to_shoulder * to_shoulder).sum(axis=1)
     distance = np.sqrt(square)
     beyond = np.maximum(distance - longest, shortest - distance)
-    # Angle at the elbow between shoulder and wrist, by half angles: no difference of close numbers at its ends.
+    # Angle at the elbow between shoulder and wrist, by half angles, to avoid cancellation at its ends.
     opening = 2.0 * np.arctan2(
         np.sqrt(np.maximum(square - shortest * shortest, 0.0)), np.sqrt(np.maximum(longest * longest - square, 0.0))
     )
@@ -218,10 +218,10 @@ def wrapped(angle: Array) -> Array:
 def _segments(
     table: Array, exists: NDArray[np.bool_], is_beyond: NDArray[np.bool_]
 ) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Returns short pieces of the self-motion, both ends each, and their branches, see `SelfMotion`.
+    """Returns starts and ends of short pieces of the self-motion and their branches, see `SelfMotion`.
 
-    Most go from one angle of joint 7 to the next. Where a branch ends, the self-motion turns back into its twin: out of
-    reach to the other side of the flip, otherwise to the other sign of cos q5.
+    Most pieces connect adjacent angles of joint 7. At the end of a branch the self-motion continues on its twin: at the
+    limit of reach on the other side of the flip, otherwise with the other sign of cos q5.
     """
     goes_on = exists & np.roll(exists, -1, axis=2)
     pieces = [(table[goes_on], np.roll(table, -1, axis=2)[goes_on])]
@@ -244,7 +244,7 @@ def _segments(
 
 
 def _turned(q: Array) -> Array:
-    """Returns the twins of joint angles, shape (m, 7), [rad]: the shoulder turned by half a turn, joint 2 mirrored."""
+    """Returns the twins of joint angles, shape (m, 7), [rad]: joints 1 and 3 turned by pi, joint 2 mirrored."""
     twins = q.copy()
     twins[:, [0, 2]] += pi
     twins[:, 1] *= -1.0
@@ -252,7 +252,7 @@ def _turned(q: Array) -> Array:
 
 
 def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:
-    """Returns the error that says by how much a pose is out of reach, or that the wrist cannot turn so far."""
+    """Returns the error for a pose out of reach, with the distance, or for an impossible orientation of the wrist."""
     excess = float(beyond.min())
     shortest, longest = arm.reach
     if excess <= 0.0:
@@ -262,6 +262,6 @@ def _unreachable(arm: OffsetGeometry, beyond: Array) -> UnreachableError:
         )
     return UnreachableError(
         f"out of reach by {1e3 * excess:.1f} mm: the wrist has to be {shortest:.3f} to {longest:.3f} m from the "
-        "shoulder, at whatever angle of joint 7; move the target",
+        "shoulder, at any angle of joint 7; move the target",
         distance=excess,
     )

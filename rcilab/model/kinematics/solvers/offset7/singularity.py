@@ -1,8 +1,8 @@
-"""Distance of an arm with offsets from configurations at which a held elbow no longer determines the joints.
+"""Closeness of an arm with offsets to configurations at which a held elbow no longer determines the joints.
 
 With joint 3 held, six joints are left for six directions. Where the determinant of their Jacobian is zero, two
 solutions of the inverse meet, and commands of pose and elbow no longer select one of them. The maker of the Panda has
-no such condition. It is rcilab's own, as the corresponding one of the other arms, for the same reason.
+no such condition. It is rcilab's own, like that of the other arms, for the same reason.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FREE = [joint for joint in range(7) if joint != ELBOW]
 
 
 def held_singularity_path(arm: OffsetGeometry, q: JointPath) -> Array:
-    """Returns how near N configurations are to a singularity with joint 3 held, shape (N,): from 1 on they are at one.
+    """Returns the closeness of N configurations to a singularity with joint 3 held, shape (N,); singular from 1 on.
 
     Args:
         arm: From `build_offset_geometry`.
@@ -38,6 +38,6 @@ def held_singularity_path(arm: OffsetGeometry, q: JointPath) -> Array:
 
 
 def held_singularity(arm: OffsetGeometry, q: Sequence[float]) -> float:
-    """Returns the same for one configuration, 7 plain floats, [rad]."""
+    """Returns the closeness of one configuration, 7 plain floats, [rad]."""
     volume = abs(float(np.linalg.det(tool_jacobian(arm.chain, q)[0][:, _FREE])))
     return HELD_SINGULAR / volume if volume else inf

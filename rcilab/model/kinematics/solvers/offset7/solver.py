@@ -1,4 +1,4 @@
-"""7 axes with offsets at elbow and wrist, as the Panda; the redundancy is joint 3."""
+"""Solver for 7 axes with offsets at elbow and wrist, such as the Panda; the redundancy is joint 3."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rcilab.model.kinematics.solvers.solver import Angles, BranchEnd, Envelope, 
 
 
 class OffsetSeven:
-    """7 axes with offsets at elbow and wrist, as the Panda; the arm angle is joint 3's, as its maker counts it."""
+    """7 axes with offsets at elbow and wrist, such as the Panda; the arm angle is the angle of joint 3."""
 
     redundancy = Redundancy("joint", ELBOW + 1)
 
@@ -42,7 +42,7 @@ class OffsetSeven:
         return remainder(q[ELBOW], tau)
 
     def redundancy_angle_path(self, q: JointPath) -> Array:
-        """Returns the angles of joint 3, [rad], as they are: this joint makes no whole turn."""
+        """Returns the angles of joint 3, [rad], not wrapped: this joint makes no full turn."""
         return q[:, ELBOW]
 
     def singularity(self, q: Sequence[float]) -> str | None:
@@ -50,11 +50,11 @@ class OffsetSeven:
         return "with joint 3 held, the other joints are singular" if self.is_singular(q) else None
 
     def singularity_path(self, q: JointPath) -> Array:
-        """Returns how near the arm is along a path to where joint 3, held, no longer decides the other joints."""
+        """Returns the closeness to a singularity with joint 3 held, along a path."""
         return held_singularity_path(self.geometry, q)
 
     def is_singular(self, q: Sequence[float]) -> bool:
-        """Returns whether the arm counts as there."""
+        """Returns whether the arm counts as singular."""
         return held_singularity(self.geometry, q) >= 1.0
 
     def batch(self, T_base_flange: Array, psi: Array) -> Array:
