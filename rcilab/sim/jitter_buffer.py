@@ -1,4 +1,4 @@
-"""The play-out buffer: commands arrive as the network likes, one is played per controller cycle.
+"""The jitter buffer: commands arrive at irregular times, and one is played per controller cycle.
 
     waiting --first command, then `prefill` cycles--> playing --empty queue--> losing cycles --next command--> playing
 
@@ -39,14 +39,14 @@ LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (ma
 
 
 class Playback(NamedTuple):
-    """What one cycle gets from the buffer."""
+    """The output of the buffer for one cycle."""
 
     command: ArmCommand | None
     """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None: no command."""
     steps: int
     """Cycles from now to when `command` is due, 1 for now."""
     is_lost: bool
-    """The motion runs and this cycle has no command."""
+    """Whether a motion is in progress and this cycle has no command."""
     skipped: int = 0
     """Commands before this one that were skipped for being too old."""
 
@@ -100,7 +100,7 @@ class JitterBuffer:
         self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
 
     def clear(self) -> None:
-        """Drops what is queued; what was counted stays."""
+        """Clears the queue; the counters are kept."""
         self._queue.clear()
 
     def __len__(self) -> int:
@@ -117,7 +117,7 @@ class JitterBuffer:
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
 
     def push(self, command: ArmCommand) -> None:
-        """Takes a command from the network."""
+        """Queues a command from the network."""
         queue, newest = self._queue, self._newest
         if command == newest:
             self.copies += 1
@@ -147,7 +147,7 @@ class JitterBuffer:
         return True
 
     def take(self, is_next: Callable[[ArmCommand, int, bool], bool]) -> Playback:
-        """Returns what this cycle plays.
+        """Returns the output for this cycle.
 
         Args:
             is_next: Asked about a command whose id is a few cycles ahead, `(command, steps, in_doubt)`: does it
@@ -196,7 +196,7 @@ class JitterBuffer:
         return 1 if is_next(command, unexplained, False) else unexplained
 
     def _is_late(self, command: ArmCommand) -> bool:
-        """Returns whether the cycle that a command is for has passed already."""
+        """Returns whether the cycle of a command has already passed."""
         behind = self._last_id - command.number
         if command.number in self._passed_over:
             return False
@@ -235,7 +235,7 @@ class JitterBuffer:
         return Playback(command, 1, False, skipped)
 
     def _advance_to(self, played: int) -> None:
-        """Takes note of the id that is played now."""
+        """Stores the id that is played now."""
         last, self._was_lost = self._last_id, False
         if played in self._passed_over:
             self._passed_over.remove(played)

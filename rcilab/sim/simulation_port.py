@@ -30,7 +30,7 @@ class SimulationPort:
     Args:
         host: Address of the controller; the world port is there, too, if that is a loopback address.
         port: TCP port; 0 takes any free one.
-        handle: Carries a request out.
+        handle: Handles a request.
         clock: Returns the time, [s].
 
     Raises:
@@ -49,16 +49,16 @@ class SimulationPort:
         self._guests: dict[socket.socket, LineReader] = {}
         self._heard: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
         self.sockets: Sequence[socket.socket] = (self._listener,)
-        """What to watch; another object whenever it changes."""
+        """Sockets to poll; another object whenever it changes."""
 
     @property
     def address(self) -> tuple[str, int]:
-        """Where it listens."""
+        """Address of the listener."""
         host, port = self._listener.getsockname()
         return host, port
 
     def serve(self, readable: Sequence[socket.socket]) -> None:
-        """Reads from these sockets and carries out what they ask for."""
+        """Reads from these sockets and handles the requests."""
         for sock in readable:
             if sock is self._listener:
                 self._accept()
@@ -116,7 +116,7 @@ class SimulationPort:
                 self._drop(guest)
 
     def _answer(self, guest: socket.socket, answer: WorldAnswer, request_id: int) -> bool:
-        """Returns whether the guest is still there."""
+        """Sends a response; returns whether the client is still connected."""
         line = encode_world_answer(answer, request_id)
         try:
             is_sent = guest.send(line) == len(line)
@@ -127,7 +127,7 @@ class SimulationPort:
         return is_sent
 
     def _drop_idle(self) -> None:
-        """Lets go of the guest that has been silent the longest, if that was long."""
+        """Drops the client that has been idle for the longest time, if longer than `IDLE`."""
         guest = min(self._heard, key=self._heard.__getitem__)
         if self._clock() - self._heard[guest] > IDLE:
             self._drop(guest)

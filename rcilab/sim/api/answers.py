@@ -1,4 +1,4 @@
-"""What the virtual controller answers over its world port."""
+"""Responses of the simulation port."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """The request was understood and not carried out."""
+    """The request was valid but refused."""
 
     reason: str
     """One English sentence: what, why, what to do."""
@@ -43,13 +43,13 @@ class WorldStatus:
     faults: tuple[str, ...] = ()
     """Names of the error bits that are set."""
     reason: str = ""
-    """Why the last fault was raised, in words and numbers; a `Remark` where faces have words of their own for it."""
+    """Reason for the last fault; a `Remark` if user interfaces can translate it."""
     button: str = "none"
     """Which safety stop is pressed: none, estop, gstop."""
     q: tuple[float, ...] = ()
     """Measured joint angles, [rad]."""
     lost: int = 0
-    """Cycles of the last motion whose command did not come in time."""
+    """Cycles of the last motion whose command did not arrive in time."""
     lost_in_row: int = 0
     """The most of them that followed one another; 10 to 20 end a motion."""
     success_rate: float = 1.0
@@ -61,11 +61,11 @@ class WorldStatus:
     strangers: int = 0
     """Datagrams that did not come from the client."""
     ignored: int = 0
-    """Commands that came while none was wanted."""
+    """Commands that arrived while none was expected."""
     pushed: bool = False
-    """Whether something presses on the arm."""
+    """Whether an external force acts on the arm."""
     stalls: int = 0
-    """How often the clock has stood still on request."""
+    """Number of simulated stalls of the clock."""
     auto_limit: bool | None = None
     """Whether commands are led to a standstill inside the soft limits; None: an older controller does not say."""
     commands: NetworkFaults = field(default_factory=NetworkFaults)

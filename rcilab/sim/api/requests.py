@@ -1,4 +1,4 @@
-"""What can be done to a virtual robot from outside, one value a request. Nothing of it exists on a real one."""
+"""Requests of the simulation port, which only virtual robots have."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Release:
-    """Nothing presses on the arm any more."""
+    """Removes the external force."""
 
     name: ClassVar[str] = "release"
 
@@ -191,7 +191,7 @@ class PlaceBox:
 
 @dataclass(frozen=True, slots=True)
 class RemoveBox:
-    """Takes a box away."""
+    """Removes a box."""
 
     name: ClassVar[str] = "remove_box"
     box: str
@@ -247,7 +247,7 @@ class Mount:
 
 @dataclass(frozen=True, slots=True)
 class GetStatus:
-    """Asks how the controller is."""
+    """Requests the status."""
 
     name: ClassVar[str] = "status"
 
