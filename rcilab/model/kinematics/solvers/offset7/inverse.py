@@ -10,7 +10,7 @@ along the forearm. What is left is the angle of joint 6, which turns f in a plan
 
 Both are linear in the sine and cosine of joint 6, whose squares add up to 1. That leaves H0 + H1 S = 0, hence
 H0^2 - (1 - C^2) H1^2 = 0, where H0, H1 and the cosine C are trigonometric polynomials in joint 7. The whole is one of
-degree 8, as it has to be with 16 solutions: what is above cancels (found by evaluation, and held by a test). Its values
+degree 8, as required for 16 solutions: higher terms cancel (found by evaluation, and covered by a test). Its values
 at a few angles of joint 7 give its coefficients, and its sign changes on a fine grid bracket the roots.
 """
 
@@ -41,17 +41,17 @@ _ROUNDING = 1e-13  # How far a polynomial may miss zero, by the sum of its coeff
 _STEP = 1e-5  # [rad] Of joint 7, by which derivatives are formed.
 _NEAR, _FAR = 1e-4, 0.05  # [rad] How far from psi joint 3 may be at a root: every branch, and the nearest one.
 _SMALL = 1e-8  # [rad] What a joint may still have to turn so that a straight line is exact to rounding.
-_SAME = 1e-6  # [rad] Solutions that differ by less are one.
-_SPREAD = 64  # Solutions to take where there are endlessly many; tuning value.
+_SAME = 1e-6  # [rad] Solutions that differ by less are equal.
+_SPREAD = 64  # Number of solutions to return if there are infinitely many; tuning value.
 _COLUMNS = 8  # At least, as many as the other arms have branches.
-_BLOCK = 512  # Poses worked on together, so that intermediate arrays stay in the cache; tuning value.
+_BLOCK = 512  # Poses computed together, so that intermediate arrays fit into the cache; tuning value.
 
 _HARMONICS = np.arange(DEGREE + 1)
 _ANGLES: Array = np.arange(_NODES, dtype=np.float64) * (tau / _NODES)
 
 
 def solve_held(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array) -> tuple[NDArray[np.intp], Array]:
-    """Returns every solution at many poses, joint 3 held, without regard to joint limits.
+    """Returns every solution at many poses, joint 3 held, also outside the joint limits.
 
     Args:
         arm: From `build_offset_geometry`.
@@ -74,7 +74,7 @@ def solve_held(arm: OffsetGeometry, rotations: Array, positions: Array, psi: Arr
 def inverse_held(
     arm: OffsetGeometry, T_base_flange: Pose, psi: float, near: Sequence[float] | None
 ) -> list[tuple[float, ...]]:
-    """Returns every solution at one pose, [rad], joint 3 held, without regard to joint limits.
+    """Returns every solution at one pose, [rad], joint 3 held, also outside the joint limits.
 
     Args:
         arm: From `build_offset_geometry`.
@@ -99,7 +99,7 @@ def inverse_held(
 
 
 def _without_a_crossing(arm: OffsetGeometry, T_base_flange: Pose, psi: float) -> Array:
-    """Returns some solutions of a pose at which joint 3 stays as it is all along, as on an axis of symmetry.
+    """Returns some solutions of a pose with constant joint 3 on the whole self-motion, as on an axis of symmetry.
 
     Raises:
         UnreachableError: The pose is out of reach at every angle of joint 3.
@@ -115,7 +115,7 @@ def _without_a_crossing(arm: OffsetGeometry, T_base_flange: Pose, psi: float) ->
 
 
 def inverse_held_batch(arm: OffsetGeometry, T_base_flange: Array, psi: Array) -> Array:
-    """Returns every solution at many poses, joint 3 held, without regard to joint limits.
+    """Returns every solution at many poses, joint 3 held, also outside the joint limits.
 
     Args:
         arm: From `build_offset_geometry`.
@@ -123,7 +123,7 @@ def inverse_held_batch(arm: OffsetGeometry, T_base_flange: Array, psi: Array) ->
         psi: Angles of joint 3, shape (N,), [rad].
 
     Returns:
-        Shape (N, M, 7), [rad], M from the pose with the most; not a number behind the last solution of a pose.
+        Shape (N, M, 7), [rad], M from the pose with the most; NaN after the last solution of a pose.
     """
     rows, q = solve_held(arm, T_base_flange[:, :3, :3], T_base_flange[:, :3, 3], psi)
     counts = np.bincount(rows, minlength=len(psi))
@@ -206,7 +206,7 @@ def _roots(c: NDArray[np.complex128]) -> tuple[NDArray[np.intp], Array]:
     table[:, :, :-1] = np.fft.irfft(spectrum, _GRID, axis=2)
     table[:, :, -1] = table[:, :, 0]
     rows, low, high = _steps(c, np.arange(len(c)), np.zeros(len(c)), _CELL, table)
-    # Where a polynomial is flat, several roots may be close together: look there again.
+    # Where a polynomial is flat, several roots may be close together; refine there.
     sizes = np.abs(table[0])
     flat, places = np.nonzero(np.maximum(sizes[:, 1:], sizes[:, :-1]) < _FLAT * np.abs(c).sum(axis=1, keepdims=True))
     if len(flat):
@@ -276,7 +276,7 @@ def _evaluated(c: NDArray[np.complex128], t: Array) -> tuple[Array, Array]:
 def _joint_angles(
     arm: OffsetGeometry, rotations: Array, positions: Array, psi: Array, rows: NDArray[np.intp], q7: Array
 ) -> tuple[NDArray[np.intp], Array]:
-    """Returns the solutions next to roots; each root gives one, or none if it is of rounding."""
+    """Returns the solutions near roots; each root gives one, or none if it is caused by rounding."""
     table = trace(arm, rotations, positions, q7)[0].reshape(4, len(q7), 7)
     size = np.nan_to_num(np.abs(wrapped(2.0 * (table[..., ELBOW] - psi))), nan=pi)  # The twin is half a turn away.
     branch, root = np.nonzero((size < _NEAR) | ((size == size.min(axis=0)) & (size < _FAR)))

@@ -1,10 +1,10 @@
 """The feasible arm angles of an arm without offsets, in closed form.
 
-At a fixed pose the elbow E = S + e goes round the shoulder-wrist line, e = e0 + ec cos(psi) + es sin(psi). Every joint
+At a fixed pose the elbow E = S + e circles the shoulder-wrist line, e = e0 + ec cos(psi) + es sin(psi). Every joint
 angle follows as atan2(Y, X), or as an angle between 0 and pi of known cosine, where X, Y and that cosine are linear in
 (1, cos(psi), sin(psi)) (Shimizu et al., IEEE Transactions on Robotics 24(5), 2008, write the same with
 tangents). So a joint passes a limit L only where X sin(L) - Y cos(L) = 0 or where the cosine is cos(L): two arm angles
-each, in closed form. Between neighbours of all of these nothing changes, and the middle decides for the arc.
+each, in closed form. Between adjacent ones of these nothing changes, so the middle determines the whole arc.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rcilab.model.kinematics.solvers.spherical.inverse import ALL_FLIPS, ArmGeom
 from rcilab.model.kinematics.solvers.spherical.singularity import SINGULAR
 
 _TINY = 1e-9  # Of a sine or a length in [m]: below it the elbow has no circle, or the circle no upper side.
-_SAME = 1e-12  # [rad] Arm angles that differ by rounding alone.
+_SAME = 1e-12  # [rad] Rounding of arm angles.
 _TURNS = {0: 0, 2: 1, 4: 2, 6: 3}  # Joints that turn about z, counted from 0: which form is their X; Y is 4 further.
 _BENDS = {1: 8, 5: 9}  # Joints that bend about y, whose bend changes on the circle: which form is their cosine.
 _TURNING, _BENDING = slice(0, None, 2), slice(1, None, 4)  # The same joints, in the order of their forms.
@@ -43,9 +43,9 @@ _TURNED = np.stack(  # Shape (7, 8): which branches turn or mirror each joint, s
 )
 _TWINS = 2 * np.arange(7)[:, None] + _TURNED  # Which of every joint's two angles, counted through, a branch has.
 _MEMBERS = tuple(tuple(i for i in range(8) if bits >> i & 1) for bits in range(256))
-"""By a number: which of its bits are set, counted from 0."""
+"""By number: the indices of its set bits, from 0."""
 _NUMBERS = tuple(tuple(i + 1 for i in members) for members in _MEMBERS)
-"""The same, counted from 1."""
+"""The same, from 1."""
 _SIZES = np.array([len(members) for members in _MEMBERS])
 _WHY: list[Reason] = ["joint limits", "singularity", "safety box"]
 _REASONS: dict[tuple[bool, ...], tuple[Reason, ...]] = {
@@ -60,14 +60,14 @@ def feasible_arcs(
 ) -> FeasibleArcs:
     """Returns the feasible arm angles of a pose.
 
-    Singular are the arm angles at which `find_singularity` names one.
+    An arm angle is singular if `find_singularity` finds a singularity at it.
 
     Args:
         arm: Of 7 axes, from `build_geometry`.
         T_base_flange: Pose of the flange in base.
         lower: Smallest joint angles, shape (7,), [rad].
         upper: Largest joint angles, shape (7,), [rad].
-        outside_box: Whether the tool is outside the safety box. It is so at every arm angle or at none.
+        outside_box: Whether the tool is outside the safety box, which does not depend on the arm angle.
 
     Raises:
         UnreachableError: The wrist centre is out of reach.
@@ -195,10 +195,10 @@ def _broken(both: Array, lower: Array, upper: Array) -> NDArray[np.uint8]:
 
 
 def _arcs(starts: Array, broken: NDArray[np.uint8], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
-    """Returns arcs without neighbours that are alike."""
+    """Returns arcs, with equal neighbours merged."""
     best = broken[_SIZES.take(broken).argmin(axis=0), np.arange(len(starts))]
     possible = np.packbits(broken == 0, axis=0, bitorder="little")[0]
-    looks = best + 256 * possible.astype(np.intp) + 65536 * lost  # All that an arc says.
+    looks = best + 256 * possible.astype(np.intp) + 65536 * lost  # Everything an arc reports.
     is_new = np.empty(len(starts), dtype=np.bool_)
     np.not_equal(looks[1:], looks[:-1], out=is_new[1:])
     is_new[0] = looks[0] != looks[-1] or not is_new[1:].any()

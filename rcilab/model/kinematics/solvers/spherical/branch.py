@@ -1,8 +1,8 @@
-"""The closed-form inverse along a whole path at once: one branch, followed without a jump.
+"""The closed-form inverse along a whole path, on one branch and without jumps.
 
-The same mathematics as `inverse.py`, an array for every row. The path starts where the arm is, and that chooses the
+The same mathematics as `inverse.py`, with arrays over all rows. The joint angles at the start of the path select the
 branch. A turn about z before a turn about y is known up to half a turn (Rz(a) Ry(-b) = Rz(a + pi) Ry(b) Rz(pi)); here
-each is continuous with the row before, and the tilt gets the matching sign. So a path exactly through a singularity,
+each is continuous with the previous row, and the tilt has the matching sign. So a path exactly through a singularity,
 such as those in the vertical plane of the arm, continues smoothly and is distinguished from one that passes close by.
 """
 
@@ -22,30 +22,33 @@ Column: TypeAlias = Array
 """Shape (N,): one number for every row of the path."""
 Vec: TypeAlias = tuple[Column, Column, Column]
 
-_AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is rounding, and the one before is kept.
+_AXIS_LOST = 1e-12  # As in `inverse.py`: below it the azimuth is undefined, and the previous one is used.
 _VERTICAL = 1e-6  # sin of the angle to the vertical below which the arm angle's reference turns too fast to follow.
-_BESIDE = 1e-5  # sin of how far beside the axis a path still counts as through it: ten times the error of `_miss`.
+_BESIDE = (
+    1e-5  # sin of the distance from the axis up to which a path passes through it: ten times the error of `_miss`.
+)
 
 
 def follow_branch(
     arm: ArmGeometry, rotations: Array, positions: Array, psi: Column | None, start: JointVector
 ) -> tuple[JointPath, BranchEnd | None]:
-    """Returns the joint angles along a path of the flange, each row next to the one before; limits are not checked.
+    """Returns the joint angles along a path of the flange, on one branch; limits are not checked.
 
     Args:
         arm: From `build_geometry`.
         rotations: Flange in base, shape (N, 3, 3).
         positions: Flange in base, shape (N, 3), [m].
         psi: Arm angles, shape (N,), [rad]; None for 6 axes.
-        start: Joint angles at row 0, shape (n,), [rad]: they choose the branch.
+        start: Joint angles at row 0, shape (n,), [rad]; they select the branch.
 
     Returns:
-        Joint angles, shape (N, n), [rad], meaningless from the first row without solution on, and that row, or None.
+        Joint angles, shape (N, n), [rad], and the first row without a solution, or None. From that row on the angles
+        have no meaning.
     """
     tracker = _Tracker()
     offsets = np.array(arm.offsets)
     guess = (start - offsets).tolist()
-    # Contiguous columns: every step below walks along them.
+    # Contiguous columns, because every step below uses them.
     r = [[np.ascontiguousarray(rotations[:, i, j]) for j in range(3)] for i in range(3)]
     x, y, z = (positions[:, i] - arm.hand * r[i][2] for i in range(3))
     z -= arm.shoulder
@@ -55,7 +58,7 @@ def follow_branch(
     if unreachable.any():
         row = int(unreachable.argmax())
         tracker.lose(row, reach_error(arm, float(length[row])))
-    # cos of the elbow angle from the haversine form: no difference of close numbers at the stretched arm.
+    # cos of the elbow angle from the haversine form, to avoid cancellation at the stretched arm.
     half = np.clip((length - (upper - fore)) * (length + (upper - fore)) / (4.0 * upper * fore), 0.0, 1.0)
     elbow = 2.0 * np.arctan2(np.sqrt(1.0 - half), np.sqrt(half))
     if psi is None:
@@ -72,7 +75,7 @@ def follow_branch(
     mx, my, mz = c * bx - s * ax, c * by - s * ay, c * bz - s * az
     sine, cosine = (mx * r[0][j] + my * r[1][j] + mz * r[2][j] for j in (0, 1))
     third = _continued(np.arctan2(sine, cosine), guess[-1])
-    # One joint after the other in memory, since what follows goes along the path.
+    # Each joint contiguous in memory, because later computations run along the path.
     return (np.stack((*head, first, np.arctan2(tilt, zz), third)) + offsets[:, np.newaxis]).T, tracker.loss
 
 
@@ -90,13 +93,13 @@ def _seven(
     vertical = horizontal < _VERTICAL
     if vertical.any():
         reason = (
-            "the wrist is straight above or below the shoulder, where the arm angle has no reference; lead the tool "
-            "around it, or go there in joint space"
+            "the wrist is straight above or below the shoulder, where the arm angle has no reference; move the tool "
+            "around it, or use a joint motion"
         )
         tracker.lose(int(vertical.argmax()), SingularError(reason).coded("vertical"))
     cx, cy = ux / np.maximum(horizontal, _VERTICAL), uy / np.maximum(horizontal, _VERTICAL)
     cp, sp = aside * np.cos(psi), aside * np.sin(psi)
-    # Shoulder to elbow as a direction; from there on sines and cosines of the joints need no angles.
+    # Direction from shoulder to elbow; sines and cosines of the joints follow without angles.
     ex = (along * ux - cp * uz * cx + sp * cy) / arm.upper
     ey = (along * uy - cp * uz * cy - sp * cx) / arm.upper
     c2 = (along * uz + cp * horizontal) / arm.upper
@@ -127,7 +130,7 @@ def _six(
 
 
 class _Tracker:
-    """Follows azimuths row by row and stores the first row at which one is lost."""
+    """Makes azimuths continuous along the rows and stores the first row at which one is undefined."""
 
     def __init__(self) -> None:
         self.loss: BranchEnd | None = None
@@ -137,13 +140,13 @@ class _Tracker:
             self.loss = BranchEnd(row, reason)
 
     def azimuth(self, x: Column, y: Column, guess: float, axes: str) -> tuple[Column, Column, Column, Column]:
-        """Returns the angle about z, continuous, the tilt with the sign that goes with it, and the angle's cos and sin.
+        """Returns the continuous angle about z, the tilt with the matching sign, and the angle's cosine and sine.
 
         Args:
-            x: Of a direction.
-            y: Of the same direction; the root of the sum of squares is the sine of its tilt.
+            x: Component of a direction.
+            y: Component of the same direction; the root of the sum of squares is the sine of its tilt.
             guess: Angle before the first row, [rad].
-            axes: The joints that are lost where there is no tilt.
+            axes: The joints that are undefined without a tilt, for the message.
         """
         tilt = _hypot(x, y)
         known = tilt > _AXIS_LOST
@@ -157,7 +160,7 @@ class _Tracker:
             if beside.size:
                 reason = SingularError(
                     f"{axes} would have to jump by half a turn, because a singularity is in the way; "
-                    "lead the tool around it, or go there in joint space"
+                    "move the tool around it, or use a joint motion"
                 ).coded("half_turn")
                 self.lose(int(beside[0]) + 1, reason)
         tilt *= 1.0 - 2.0 * odd
@@ -167,7 +170,7 @@ class _Tracker:
 
 
 def _miss(angle: Column, tilt: Column, swaps: np.ndarray) -> Column:
-    """Returns how far beside the axis a path passes where its tilt changes sign, as a sine.
+    """Returns the distance from the axis, as a sine, at which a path passes where its tilt changes sign.
 
     On a path through the axis the azimuth is smooth. One that passes at a distance e between rows with tilts a and b
     turns by e / a + e / b more there than in the steps before and after.
@@ -179,7 +182,7 @@ def _miss(angle: Column, tilt: Column, swaps: np.ndarray) -> Column:
 
 
 def _filled(values: Column, known: np.ndarray, first: float) -> Column:
-    """Returns the values with those that are not known replaced by the last one known before."""
+    """Returns the values, with unknown ones replaced by the last known one."""
     if known.all():
         return values
     last = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
@@ -187,12 +190,12 @@ def _filled(values: Column, known: np.ndarray, first: float) -> Column:
 
 
 def _continued(angles: Column, guess: float) -> Column:
-    """Returns the angles plus whole turns, so that none jumps and the first is next to the guess."""
+    """Returns the angles plus full turns, without jumps and with the first closest to the guess."""
     return angles + tau * _turns(angles, guess, tau)
 
 
 def _turns(angles: Column, guess: float, period: float) -> Column:
-    """Returns how many periods to add to each angle so that each is next to the one before, the first to the guess."""
+    """Returns the number of periods to add to each angle so that it is closest to the previous one, or the guess."""
     steps = np.empty_like(angles)
     steps[0] = angles[0] - guess
     np.subtract(angles[1:], angles[:-1], out=steps[1:])
@@ -202,7 +205,7 @@ def _turns(angles: Column, guess: float, period: float) -> Column:
 def _hypot(x: Column, y: Column) -> Column:
     """Returns the root of the sum of squares.
 
-    Nothing here is so large or small that `np.hypot` were needed, which costs five times as much.
+    `np.hypot`, which is safe for very large and small values, takes five times as long.
     """
     return np.sqrt(x * x + y * y)
 

@@ -1,12 +1,12 @@
 """Closed-form inverse kinematics: every branch of the two geometries.
 
-Both arms, stood upright, are chains of turns about z and y: Rz Ry Rz Ry Rz Ry Rz for 7 axes, Rz Ry Ry Rz Ry Rz for 6.
+Both arms, when upright, are chains of turns about z and y: Rz Ry Rz Ry Rz Ry Rz for 7 axes, Rz Ry Ry Rz Ry Rz for 6.
 Because Rz(a) Ry(-b) Rz(c) = Rz(a + pi) Ry(b) Rz(c - pi), one solution of a Rz Ry Rz group gives its twin by a flip of
 the middle angle and half a turn on both sides. The 7-axis arm has three such groups, hence 8 branches at one arm
 angle; the 6-axis arm has a wrist of that kind and up to 4 solutions of the first three joints, hence also 8.
 
-Angles come from atan2 of both components, never from acos, so that nothing is lost next to a singularity. At a
-singularity, where only the sum of two angles counts, the first of them is taken from `near`.
+Angles are computed by atan2 of both components, never by acos, and thus accurate close to a singularity. At a
+singularity, where only the sum of two angles is determined, the first of them is that of `near`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rcilab.model.kinematics.arm_angle import reference_frame
 from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE, Angles
 from rcilab.robots.description import DhRow, RobotDescription
 
-_AXIS_LOST = 1e-12  # sin of an angle below which the axes beside it are parallel within rounding.
+_AXIS_LOST = 1e-12  # sin of an angle below which the axes before and after it are parallel within rounding.
 _STRETCHED = 1e-15  # 1 - cos of the elbow angle that rounding alone can cause; it moves the wrist by less than 1e-15 m.
 _QUARTER = pi / 2
 _SEVEN = (-_QUARTER, _QUARTER, -_QUARTER, _QUARTER, -_QUARTER, _QUARTER, 0.0)
@@ -49,10 +49,10 @@ class ArmGeometry:
 
 
 def build_geometry(description: RobotDescription) -> ArmGeometry:
-    """Returns the lengths the closed form needs.
+    """Returns the lengths for the closed form.
 
     Raises:
-        ModelError: The table does not have one of the two shapes the closed form knows.
+        ModelError: The table does not have one of the two required shapes.
     """
     dh = description.dh
     if len(dh) == 7 and _has_shape(dh, _SEVEN, d=(0, 2, 4, 6), a=()):
@@ -75,21 +75,21 @@ def inverse_seven(
     near: Sequence[float] | None,
     flips: Sequence[Angles] = ALL_FLIPS,
 ) -> list[Angles]:
-    """Returns the 8 branches of a 7-axis arm at one arm angle, [rad], without regard to joint limits.
+    """Returns the 8 branches of a 7-axis arm at one arm angle, [rad], also outside the joint limits.
 
     Args:
         arm: From `build_geometry`.
         T_base_flange: Pose of the flange in base.
-        psi: Arm angle, [rad]. Where the shoulder-wrist line is vertical it is counted from base x instead.
+        psi: Arm angle, [rad]. If the shoulder-wrist line is vertical, it is measured from base x.
         near: Joint angles, [rad], that resolve the ambiguity at a singularity; None means zeros.
-        flips: Which branches: pi where upright joint 2, 4 or 6 shall be negative, 0 where not.
+        flips: The branches: pi for a negative upright joint 2, 4 or 6, otherwise 0.
 
     Raises:
         UnreachableError: The wrist centre is out of reach.
     """
     r, x, y, z, length, c4 = wrist_centre(arm, T_base_flange)
     guess = near or (0.0,) * 7
-    if length < REACH_TOLERANCE:  # Upper and fore arm of one length, folded up: any elbow will do.
+    if length < REACH_TOLERANCE:  # Upper arm and forearm of equal length, folded: any elbow is valid.
         ux, uy, uz, along, aside = 0.0, 0.0, 1.0, 0.0, arm.upper
     else:
         ux, uy, uz = x / length, y / length, z / length
@@ -131,7 +131,7 @@ def inverse_seven(
 
 
 def inverse_six(arm: ArmGeometry, T_base_flange: Pose, near: Sequence[float] | None) -> list[Angles]:
-    """Returns the 8 branches of a 6-axis arm, [rad], without regard to joint limits.
+    """Returns the 8 branches of a 6-axis arm, [rad], also outside the joint limits.
 
     Args:
         arm: From `build_geometry`.
@@ -183,7 +183,7 @@ def wrist_centre(arm: ArmGeometry, T: Pose) -> tuple[Rotation9, float, float, fl
 
 
 def reach_error(arm: ArmGeometry, length: float) -> UnreachableError:
-    """Returns the error that says how far a wrist centre at this distance from the shoulder, [m], is out of reach."""
+    """Returns the error for a wrist centre out of reach at this distance from the shoulder, [m]."""
     longest, shortest = arm.upper + arm.fore, abs(arm.upper - arm.fore)
     if length > longest:
         return UnreachableError(

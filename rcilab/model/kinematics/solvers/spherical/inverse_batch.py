@@ -1,8 +1,8 @@
 """The closed-form inverse for many poses at once: the branches of `spherical.inverse`, in numpy.
 
-The same mathematics with one array element a pose; sines and cosines come from normalised vectors instead of from the
-angles. The few poses at a singularity, where angles are left open, are handed to the scalar form, so that both agree
-there too.
+The same mathematics with one array element per pose; sines and cosines are those of normalised vectors instead of
+angles. The few poses at a singularity, where angles are not determined, use the scalar form, so that both agree there
+too.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from rcilab.model.kinematics.solution_batch import Columns, cross, dot
 from rcilab.model.kinematics.solvers.solver import REACH_TOLERANCE
 from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry, inverse_seven, inverse_six
 
-_BLOCK = 2048  # Poses worked on together, so that intermediate arrays stay in the cache.
-_OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form decides what a singularity leaves open.
+_BLOCK = 2048  # Poses computed together, so that intermediate arrays fit into the cache.
+_OPEN = 1e-7  # Sine of an angle, or length in [m], below which the scalar form is used.
 
 
 def inverse_batch(arm: ArmGeometry, T_base_flange: Array, psi: ArrayLike = 0.0) -> Array:
-    """Returns the 8 branches of the inverse at many poses, without regard to joint limits.
+    """Returns the 8 branches of the inverse at many poses, also outside the joint limits.
 
     Args:
         arm: From `build_geometry`.
         T_base_flange: Poses of the flange in base, shape (N, 4, 4).
-        psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); of no meaning for 6 axes.
+        psi: Arm angle of a 7-axis arm, [rad], one number or shape (N,); not used for 6 axes.
 
     Returns:
-        Shape (N, 8, n), [rad]; not a number where the wrist centre is out of reach.
+        Shape (N, 8, n), [rad]; NaN if the wrist centre is out of reach.
     """
     count = len(T_base_flange)
     angles = np.broadcast_to(np.asarray(psi, dtype=np.float64), (count,))
-    found = np.empty((arm.n, 8, count))  # One row an angle: every write below is to memory in one piece.
+    found = np.empty((arm.n, 8, count))  # One row per angle, so that every write below is contiguous.
     for start in range(0, count, _BLOCK):
         part = slice(start, min(start + _BLOCK, count))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -74,7 +74,7 @@ def _seven(arm: ArmGeometry, T: Array, psi: Array, found: Array) -> tuple[NDArra
     vx, vy, vz = c2 * forward - s2 * fz, c1 * fy - s1 * fx, s2 * forward + c2 * fz
     side = np.sqrt(vx * vx + vy * vy)
     c3, s3, c4, s4 = vx / side, vy / side, vz / fore, side / fore
-    # Axes of the frame behind joint 4: the upper arm's, turned by joint 3, then by joint 4.
+    # Axes of the frame after joint 4: the upper arm's, turned by joint 3, then by joint 4.
     x3 = c3 * c2 * c1 - s3 * s1, c3 * c2 * s1 + s3 * c1, -c3 * s2
     y4 = -s3 * c2 * c1 - c3 * s1, -s3 * c2 * s1 + c3 * c1, s3 * s2
     z2 = s2 * c1, s2 * s1, c2
@@ -128,7 +128,7 @@ def _six(arm: ArmGeometry, T: Array, found: Array) -> tuple[NDArray[np.bool_], N
 
 
 def _wrist_centre(arm: ArmGeometry, T: Array) -> tuple[Columns, Columns, Array, Array, NDArray[np.bool_]]:
-    """Returns the flange's z axis, the wrist from the shoulder, its distance, the elbow's cosine, what is too far."""
+    """Returns the flange's z axis, wrist from shoulder, its distance, the elbow's cosine, and what is out of reach."""
     ahead = T[:, 0, 2].copy(), T[:, 1, 2].copy(), T[:, 2, 2].copy()
     x = T[:, 0, 3] - arm.hand * ahead[0]
     y = T[:, 1, 3] - arm.hand * ahead[1]

@@ -11,11 +11,11 @@ from rcilab.core.arrays import Array, JointPath
 from rcilab.model.kinematics.solvers.spherical.inverse import ArmGeometry
 
 SINGULAR = 0.02
-"""Sine of an angle, or share of the reach: what is nearer to a singularity counts as on it. Tuning value: a degree."""
+"""Sine of an angle, or share of the reach, below which an arm counts as singular. Tuning value: about a degree."""
 
 
 def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
-    """Returns which singularity an arm is at, in words, or None where it can move its tool in every direction.
+    """Returns the description of the singularity of a configuration, or None.
 
     7 axes follow a pose at an arm angle: seven numbers for seven joints. These lose a direction where sin q4 = 0, where
     sin q2 = 0 (axes 1 and 3 in line) or sin q6 = 0 (axes 5 and 7), and where shoulder and wrist are above each other.
@@ -34,9 +34,9 @@ def find_singularity(arm: ArmGeometry, q: Sequence[float]) -> str | None:
 
 
 def singularity_path(arm: ArmGeometry, q: JointPath) -> Array:
-    """Returns how near an arm is to a singularity along a path, shape (N,): from 1 on `find_singularity` finds one.
+    """Returns the closeness to a singularity along a path, shape (N,); from 1 on `find_singularity` finds one.
 
-    It is `SINGULAR` over the sine, or the share of the reach, that the nearest singularity is away.
+    It is `SINGULAR` divided by the sine, or the share of the reach, that separates the arm from the singularity.
 
     Args:
         arm: From `build_geometry`.
