@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from rcilab.core.error_base import plain_text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
 
@@ -29,7 +30,7 @@ def fact_rows(run: Run, text: Text) -> list[list[str]]:
         if report.ok:
             verdict = text("facts.conforms", share=100.0 * report.worst.ratio, id=report.worst.id)
         rows.append(("check", verdict))
-    return [[text(f"facts.{name}"), value] for name, value in rows if value]
+    return [[text(f"facts.{name}"), plain_text(value)] for name, value in rows if value]
 
 
 def describe_stop(stopped: str, faults: Iterable[object], text: Text) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
+from rcilab.core.error_base import plain_text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.error_messages import describe_note
@@ -49,7 +50,7 @@ def run_html(run: Run, language: str = "en") -> str:
     else:
         rows.append(("timing", words["card.lockstep"]))
     cells = "".join(
-        f"<tr><th style='text-align:left'>{words[f'card.{name}']}</th><td>{escape(value)}</td></tr>"
+        f"<tr><th style='text-align:left'>{words[f'card.{name}']}</th><td>{escape(plain_text(value))}</td></tr>"
         for name, value in rows
     )
     return f"<table><caption>{words['card.title']}</caption>{cells}</table>"

@@ -144,3 +144,10 @@ def test_parquet_and_mcap_of_a_callback_have_no_plan_and_compare_with_its_comman
     told = " ".join(entry["description"] for entry in schema["properties"].values())
     assert "measured minus commanded" in told
     assert "plan" not in told
+
+
+def test_a_name_that_reverses_the_writing_direction_leaves_the_rest_of_a_page_readable():
+    run = replace(some_run(stopped="\u202eno"), setup=replace(SETUP, target="rci://\u202e\x1b[2J"))
+    for page in (export_run(run, ".html").decode(), run._repr_html_()):
+        assert "\u202e" not in page
+        assert "\\u202eno" in page.replace("\\\\", "\\")
