@@ -112,7 +112,7 @@ def test_begun_at_a_pace_it_is_never_faster_and_goes_the_same_way(plan, speed_ov
 
 
 def test_what_breaks_a_condition_at_its_pace_is_refused():
-    with pytest.raises(PlanningError, match=r"torque\.rate at t = .* choose another speed override"):
+    with pytest.raises(PlanningError, match=r"torque\.rate at t = .* use another speed override"):
         plan_start_with_override(joint_motion(0.8), 0.9, MODEL, "torque")  # Nor would it be allowed as planned.
 
 
