@@ -241,7 +241,7 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     assert "0 / 0°" in rest
     assert "%" not in rest.partition("rl-meter")[0]
     headline = CheckPanel(Text("en"), lambda request: None)._headline(bench.plan, None, None, is_current=True)
-    assert f"Broken conditions: 1 (occurrences: {len(report.violations)})." in headline
+    assert f"Violated conditions: 1 (occurrences: {len(report.violations)})." in headline
 
 
 @pytest.mark.parametrize("phase", ["closed", "lost", "crashed"])

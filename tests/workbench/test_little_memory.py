@@ -89,7 +89,7 @@ def test_a_supervisor_without_a_thread_to_watch_leaves_no_process(monkeypatch) -
     assert (status.phase, status.worker_pid, status.controller_pid) == ("closed", None, None)
 
 
-@pytest.mark.parametrize("name", ["held push", "world watch"])
+@pytest.mark.parametrize("name", ["held push", "simulation status"])
 def test_a_thread_for_the_world_port_is_started_once_there_is_memory(monkeypatch, capfd, name) -> None:
     start, refused = threading.Thread.start, threading.Event()
 
