@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from rcilab.cli.output import drop_output, is_unwritable, one_line_each, prepare_streams
+from rcilab.cli.output import drop_output, drop_unread_output, is_unwritable, one_line_each, prepare_streams
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
@@ -32,6 +32,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         import argcomplete
 
         argcomplete.autocomplete(_build_parser())
+    try:
+        return _run_command(arguments)
+    except KeyboardInterrupt:  # Also while an error is printed.
+        drop_unread_output()
+        return _INTERRUPTED
+
+
+def _run_command(arguments: Sequence[str]) -> int:
     try:
         # Loads only the module of the named command; the error for an unknown command lists all of them.
         args = _build_parser(arguments[:1] if arguments[0] in COMMANDS else COMMANDS).parse_args(arguments)
@@ -61,8 +69,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         drop_output()
         print(f"rcilab: the output could not be written: {error.strerror}", file=sys.stderr)
         return _USAGE
-    except KeyboardInterrupt:
-        return _INTERRUPTED
 
 
 def _flush() -> None:

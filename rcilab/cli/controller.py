@@ -8,6 +8,8 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
+from rcilab.cli.output import print_interruptibly
+
 if TYPE_CHECKING:
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import NetworkFaults, Stall
@@ -132,20 +134,15 @@ def run(args: argparse.Namespace) -> int:
     else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not args.host.startswith("127.") and args.host != "localhost":
-        print(
+        print_interruptibly(
             f"rcilab controller: warning: {args.host} is reachable from outside this machine; anyone there can move "
             "this virtual arm",
-            file=sys.stderr,
-            flush=True,
+            sys.stderr,
         )
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
-    def announce() -> None:
-        sys.stdout.write(f"{server.description}{world}\n")
-        sys.stdout.flush()
-
-    server.run(announce)
+    server.run(lambda: print_interruptibly(f"{server.description}{world}"))
     return 0
 
 

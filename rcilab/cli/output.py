@@ -5,8 +5,12 @@ from __future__ import annotations
 import errno
 import io
 import os
+import select
+import signal
 import sys
 from contextlib import suppress
+from types import FrameType
+from typing import TextIO
 
 from rcilab.core.errors import plain_text
 
@@ -45,6 +49,50 @@ def drop_output() -> None:
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, sys.stdout.fileno())
     os.close(null)
+
+
+def drop_unread_output() -> None:
+    """Drops pending output if its reader does not read; otherwise the end of the process would wait for the reader."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # Closed, or not a file.
+            if not select.select([], [stream.fileno()], [], 0.0)[1]:
+                nowhere = os.open(os.devnull, os.O_WRONLY)
+                os.dup2(nowhere, stream.fileno())
+                os.close(nowhere)
+
+
+def print_interruptibly(line: str, stream: TextIO | None = None) -> None:
+    """Prints a line where handlers of signals only request the end; alone they would not end a write that is not read.
+
+    After such a request the rest of the line is dropped if it is not read.
+
+    Args:
+        line: The line.
+        stream: Stream; None: stdout.
+    """
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        handlers[number](number, frame)
+        raise _InterruptedWriteError
+
+    target = stream or sys.stdout
+    found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {int(number): handler for number, handler in found.items() if callable(handler)}
+    try:
+        try:
+            for number in handlers:
+                signal.signal(number, on_signal)
+            target.write(f"{line}\n")
+            target.flush()
+        finally:
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+    except _InterruptedWriteError:
+        drop_unread_output()
+
+
+class _InterruptedWriteError(Exception):
+    """A signal came during a write."""
 
 
 def is_unwritable(error: OSError) -> bool:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
-from rcilab.cli.output import drop_output, show
+from rcilab.cli.output import drop_output, drop_unread_output, show
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import name_faults
 
@@ -71,6 +71,7 @@ def run(args: Namespace) -> int:
         try:
             return _run(args, stopper)
         except KeyboardInterrupt:
+            drop_unread_output()
             print("\nNothing was sent.", file=sys.stderr)
             return _NOT_DONE
         except BrokenPipeError:  # Before the motion: the operator cannot have read the report or the question.

@@ -12,6 +12,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.cli.output import print_interruptibly
 from rcilab.core.errors import UsageError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
@@ -118,7 +119,7 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     with _ended_by_memory_error(ending), Workbench(config) as bench:
         is_secret = config.token is not None and not sys.stdout.isatty()
         address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
-        print(f"rcilab workbench: {address}  (Ctrl-C ends it)", flush=True)
+        print_interruptibly(f"rcilab workbench: {address}  (Ctrl-C ends it)")
         problem = ""
         with _browser(bench.url if browser else None, is_private=config.token is not None):
             while not ending.wait(0.5):
@@ -171,7 +172,7 @@ def _print_problem(status: SupervisorStatus, printed: str) -> str:
     if status.phase not in ("lost", "crashed"):
         return "" if status.phase in ("idle", "moving") else printed
     if status.message != printed:
-        print(f"rcilab workbench: {status.message}", file=sys.stderr, flush=True)
+        print_interruptibly(f"rcilab workbench: {status.message}", sys.stderr)
     return status.message
 
 

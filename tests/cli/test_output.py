@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+
+from tests.waiting import wait_for
 
 START = [0, 0.5235987755982988, 0, 1.0471975511965976, 0, 1.5707963267948966, 0]
 PROGRAM = {
@@ -78,3 +82,31 @@ def test_a_program_of_too_many_waypoints_is_refused_by_their_number(program):
     program.write_text(json.dumps({**PROGRAM, "waypoints": 10_001 * [{}]}))
     ran = shell(f"check {program}")
     assert "waypoints must be 1 to 10000, got 10001" in ran.stderr
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("controller", "--model", "xMatePro7", "--port", "0"),
+        ("--no-browser", "--port", "0"),
+        ("doctor",),
+        ("check", "missing.npz", "--model", "xMatePro7"),
+    ],
+)
+def test_an_interrupt_ends_a_command_whose_output_was_full_from_the_start(command: tuple[str, ...]) -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    with subprocess.Popen([sys.executable, "-m", "rcilab", *command], stdout=writer, stderr=writer) as process:
+        try:
+            blocked = Path(f"/proc/{process.pid}/wchan")
+            wait_for(lambda: "pipe_write" in blocked.read_text() or process.poll() is not None)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(60.0) in (0, 130)
+        finally:
+            process.kill()
+            os.close(writer)
+            os.close(reader)
