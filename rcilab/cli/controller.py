@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import ipaddress
 import os
 import signal
 import sys
@@ -133,9 +134,9 @@ def run(args: argparse.Namespace) -> int:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())
     else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if not args.host.startswith("127.") and args.host != "localhost":
+    if not ipaddress.ip_address(server.host).is_loopback:
         print_interruptibly(
-            f"rcilab controller: warning: {args.host} is reachable from outside this machine; anyone there can move "
+            f"rcilab controller: warning: {server.host} is reachable from outside this machine; anyone there can move "
             "this virtual arm",
             sys.stderr,
         )

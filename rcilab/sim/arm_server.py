@@ -115,6 +115,11 @@ class ArmServer:
         return self._timer.missed
 
     @property
+    def host(self) -> str:
+        """IPv4 address that it listens on; a name may have been resolved to it."""
+        return self._endpoint.host
+
+    @property
     def url(self) -> str:
         """URL for clients."""
         return f"{self._server.scheme}://{self._endpoint.host}:{self._endpoint.port}{self._endpoint.options}"

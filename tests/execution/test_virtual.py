@@ -296,7 +296,9 @@ def test_what_the_session_allows_while_moving_is_what_the_controller_grants():
 
 
 GAINS = re.compile(r"Kp ([\d. ]+) N m/rad with Kd ([\d. ]+) N m s/rad is stable")
-ROOM = re.compile(r"([\d.]+) kg m² at joint (\d) and ([\d.]+) kg m² at joint (\d): at most ([\d.]+) and ([\d.]+) N m s/rad")
+ROOM = re.compile(
+    r"([\d.]+) kg m² at joint (\d) and ([\d.]+) kg m² at joint (\d): at most ([\d.]+) and ([\d.]+) N m s/rad"
+)
 
 
 def readme():

@@ -152,6 +152,17 @@ def test_an_address_that_others_can_reach_gets_a_warning() -> None:
         assert "warning: 0.0.0.0 is reachable from outside this machine" in errors
 
 
+@pytest.mark.parametrize(("name", "address"), [("127.evil.example", "0.0.0.0"), ("good.example", "127.0.0.2")])
+def test_the_warning_is_about_the_address_that_a_name_resolves_to(name: str, address: str) -> None:
+    resolve = f"import socket; socket.gethostbyname = {{{name!r}: {address!r}}}.__getitem__; "
+    command = [sys.executable, "-c", resolve + _MAIN, "--model", "xMate3", "--port", "0", "--host", name, "--lockstep"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        first_line(process)
+        process.terminate()
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert ("warning: 0.0.0.0 is reachable" in errors) == (address == "0.0.0.0")
+
+
 def test_a_private_controller_ends_when_its_parent_is_gone() -> None:
     # The parent starts the controller, passes its line on and ends without a word to it.
     parent = f"""
