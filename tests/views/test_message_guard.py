@@ -183,6 +183,19 @@ def test_an_upload_is_bounded_before_it_is_kept(page, link):
     assert set(states) == {"more than said", "second"}
 
 
+def test_only_the_page_that_uploads_is_told_of_its_upload(page, link):
+    with page.open() as other:
+        page.enter(other)
+        start_upload(page, link, "own", 3, 1)
+        send_part(page, link, "own", 0, b"all")
+        page.settle(link)
+        with page.open() as later:
+            page.enter(later)
+            page.settle(later)
+            of_all = [{message["type"] for message in received(each)} for each in (link, other, later)]
+    assert ["FileTransferPartAck" in kinds for kinds in of_all] == [True, False, False]
+
+
 def test_a_page_that_goes_leaves_no_upload_behind(page):
     states = page.guard.viser.gui._current_file_upload_states
     with page.open() as link:
@@ -213,20 +226,25 @@ def client_of(page) -> int:
     return max(page.guard.viser.get_clients())
 
 
-def values_sent(link, handle) -> list[object]:
-    """What the server has told this page about a control until now."""
-    values: list[object] = []
+def received(link) -> list[dict]:
+    """What the server has sent this page until now."""
+    messages: list[dict] = []
     with suppress(TimeoutError):
         while True:
             raw = link.recv(timeout=0.3)
             packed = raw[16 : 16 + int.from_bytes(raw[8:16], "little")]
-            said = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(packed, max_output_size=10**8))
-            values += [
-                message["updates"]["value"]
-                for message in said["messages"]
-                if message.get("uuid") == handle._impl.uuid and message["type"] == "GuiUpdateMessage"
-            ]
-    return values
+            unpacked = zstandard.ZstdDecompressor().decompress(packed, max_output_size=10**8)
+            messages += msgspec.msgpack.decode(unpacked)["messages"]
+    return messages
+
+
+def values_sent(link, handle) -> list[object]:
+    """What the server has told this page about a control until now."""
+    return [
+        message["updates"]["value"]
+        for message in received(link)
+        if message.get("uuid") == handle._impl.uuid and message["type"] == "GuiUpdateMessage"
+    ]
 
 
 def test_a_page_that_watches_changes_nothing_and_is_shown_what_all_see(page, link):

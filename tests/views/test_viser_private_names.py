@@ -18,8 +18,9 @@ USED = {
     "icons": {"viser._gui_api", "viser._gui_handles", "viser._icons"},
     "loop_event": {"viser.infra", "viser.infra._infra", "viser.infra._async_message_buffer"},
     "message_guard": {
-        "viser._messages", "viser.infra._messages", "_client_state_from_id", "_drop_uploads_from_client",
-        "_gui_input_handle_from_uuid", "_handle_incoming_message", "_impl", "_incoming_handlers", "_websock_server",
+        "viser._messages", "viser.infra._messages", "_client_state_from_id", "_current_file_upload_states",
+        "_drop_uploads_from_client", "_gui_input_handle_from_uuid", "_handle_incoming_message", "_impl",
+        "_incoming_handlers", "_websock_server",
     },
     "orientation": {"viser._messages", "_impl", "_queue_scene_message"},
     "persistent_tab": {"_children", "_label"},

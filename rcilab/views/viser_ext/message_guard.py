@@ -7,7 +7,8 @@ none of that, but a script could. Invalid messages are dropped without a reply.
 viser has one value per control for all pages. The messages of a spectator, except those of its camera, are therefore
 dropped too, and the control on its page is reset to the common value.
 
-Unnecessary once viser validates the messages of clients, by control and by client.
+Unnecessary once viser validates the messages of clients, by control and by client, and acknowledges an upload to its
+client only.
 """
 
 from __future__ import annotations
@@ -74,6 +75,7 @@ class MessageGuard:
                 await handle(client_id, message)
 
         sockets._handle_incoming_message = guarded
+        self._answer_only_uploader()
         sockets.on_client_connect(self._guard_camera)
         sockets.on_client_disconnect(self._forget)
 
@@ -109,6 +111,21 @@ class MessageGuard:
         if isinstance(message, kinds.GuiUpdateMessage):
             return self._admits_update(message)
         return not isinstance(message, kinds.FileTransferStartUpload) or self._admits_upload(client, message)
+
+    def _answer_only_uploader(self) -> None:
+        """Acknowledges an upload to its page only; viser does so to every page, later ones included."""
+        sockets, broadcast = self._sockets, self._sockets.queue_message
+
+        def queue_message(message: Any) -> None:
+            if isinstance(message, self._kinds.FileTransferPartAck):
+                owner = self._gui._current_file_upload_states[message.transfer_uuid]["client_id"]
+                page = sockets._client_state_from_id.get(owner)
+                if page is not None:
+                    page.message_buffer.push(message)
+            else:
+                broadcast(message)
+
+        sockets.queue_message = queue_message
 
     def count_malformed(self) -> None:
         """Counts a malformed message and reports the first one."""
