@@ -183,7 +183,8 @@ class RunFile:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._stream = path.open("wb")
+            path.unlink(missing_ok=True)
+            self._stream = path.open("xb")  # Not through a link or a named pipe that someone put there meanwhile.
         except OSError as error:
             raise _unwritable(path, error) from error
         try:

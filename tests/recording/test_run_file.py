@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import struct
 import zlib
 from dataclasses import replace
@@ -273,3 +274,14 @@ def test_what_is_no_file_name_is_said_to_be_none():
         rcilab.load_run(None)
     with pytest.raises(InvalidValueError, match="must be a file name, got None"):
         some_run().save(None)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to(path.with_name("precious"))])
+def test_a_run_is_not_written_through_what_someone_has_put_in_its_place(tmp_path, make):
+    precious = tmp_path / "precious"
+    precious.write_text("mine")
+    make(tmp_path / "a.rcirun")
+    with RunFile(tmp_path / "a.rcirun", some_run().cycles.dtype, plan=None, model=None)._stream:
+        assert (tmp_path / "a.rcirun").is_file()
+    assert not (tmp_path / "a.rcirun").is_symlink()
+    assert precious.read_text() == "mine"
