@@ -245,7 +245,8 @@ def test_the_first_lesson_runs_in_its_language_and_its_slider_moves_the_arm(
     run_all(tab)
     handle = tab.locator(".widget-hslider .noUi-handle").first
     handle.wait_for()
-    assert tab.locator(".widget-hslider .widget-label").first.inner_text() == "关节 1"
+    label = tab.locator(".widget-hslider .widget-label").first
+    wait_for(lambda: label.inner_text() == "关节 1", what="its label, which is drawn after it", tab=tab)
     wait_for(lambda: shows(tab, PRO7.home), what="the arm at home in the preview", timeout=40.0, tab=tab)
     turn_joint_1(tab, handle)
     wait_for(
