@@ -259,12 +259,13 @@ class LabState:
     def take(self, outcome: Outcome) -> None:
         """Shows how an execution ended: that of the plan beside it, that of a cell in its place."""
         with self.lock:
-            self.outcome, run = outcome, outcome.run
+            run = outcome.run
             if outcome.what == "cell":
                 self.exhibit(None if run is None else exhibit_run(run, self.model))
             elif run is not None and run.has_speed_override:  # The times of the plan are others now.
                 self.moment = None
                 self.tell("plan", "moment")
+            self.outcome = outcome  # Last: other threads that see it find what it is about in place.
             self.tell("run")
 
     def halt(self) -> None:
