@@ -33,6 +33,9 @@ _SHORTEST, _LONGEST = (1.0 - UNIT_TOLERANCE) ** 2, (1.0 + UNIT_TOLERANCE) ** 2  
 _EXACT = 1e-12
 """A rotation matrix with a larger error is orthonormalised."""
 
+_NEAR_HALF_TURN = -0.9
+"""Cosine of an angle above which the skew part of a rotation matrix loses digits of the axis."""
+
 
 class Pose:
     """A rigid transform; read as `T_a_b`, the pose of frame b in frame a, so that neighbours cancel in products.
@@ -366,18 +369,18 @@ def rotation_between(old: Rotation9, new: Rotation9) -> tuple[float, float, floa
     sz = 0.5 * ((s * a + t * b + u * c) - (p * d + q * e + r * f))
     sine = math.sqrt(sx * sx + sy * sy + sz * sz)
     cosine = 0.5 * (p * a + q * b + r * c + s * d + t * e + u * f + v * g + w * h + x * i - 1.0)
-    if sine > 1e-8:
-        scale = math.atan2(sine, cosine) / sine
+    if cosine > _NEAR_HALF_TURN:
+        scale = math.atan2(sine, cosine) / sine if sine > 1e-8 else 1.0
         return scale * sx, scale * sy, scale * sz
-    if cosine > 0.0:
-        return sx, sy, sz
-    # Near pi the matrix is 2 a a^T - 1; its largest diagonal element gives the axis a most accurately.
+    # Near pi the skew part vanishes and the symmetric part, cos I + (1 - cos) a a^T, gives the axis a. Its largest
+    # diagonal element names the most accurate column.
     m = (
         (p * a + q * b + r * c, p * d + q * e + r * f, p * g + q * h + r * i),
         (s * a + t * b + u * c, s * d + t * e + u * f, s * g + t * h + u * i),
         (v * a + w * b + x * c, v * d + w * e + x * f, v * g + w * h + x * i),
     )
     k = max(range(3), key=lambda j: m[j][j])
-    axis = [m[j][k] + (1.0 if j == k else 0.0) for j in range(3)]
-    scale = math.pi / math.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+    axis = [0.5 * (m[j][k] + m[k][j]) - (cosine if j == k else 0.0) for j in range(3)]
+    size = math.copysign(math.hypot(*axis), axis[0] * sx + axis[1] * sy + axis[2] * sz)
+    scale = math.atan2(sine, cosine) / size
     return scale * axis[0], scale * axis[1], scale * axis[2]

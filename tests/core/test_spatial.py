@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -98,6 +100,17 @@ def test_half_a_turn_has_an_axis_and_a_length_of_pi(axis):
     turn = np.array(rotation_between(old.parts[0], (Pose(wxyz=[0.0, *a]) @ old).parts[0]))
     assert np.linalg.norm(turn) == pytest.approx(np.pi)
     assert abs(turn @ a) == pytest.approx(np.pi)
+
+
+@given(st.floats(-14.0, 0.0), poses)
+def test_near_half_a_turn_the_axis_is_as_exact_as_elsewhere(exponent, old):
+    axis = np.array((0.48, -0.6, 0.64))
+    angle = math.pi - 10.0**exponent
+    new = Pose(wxyz=[math.cos(angle / 2.0), *(math.sin(angle / 2.0) * axis)]) @ old
+    turn = np.array(rotation_between(old.parts[0], new.parts[0]))
+    if exponent < -13.0:
+        turn = math.copysign(1.0, turn @ axis) * turn  # The matrix no longer tells the two directions apart.
+    np.testing.assert_allclose(turn, angle * axis, rtol=0.0, atol=1e-13)
 
 
 def test_no_turn_is_zero():

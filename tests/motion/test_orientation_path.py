@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from rcilab.core.spatial import rotation_between, rotation_from_wxyz
@@ -30,6 +30,7 @@ def at(turning, share: float) -> np.ndarray:
 
 
 @given(rotations, rotations, rotations, places)
+@example(*(rotation_from_wxyz(q) for q in ((0, 0, 0, 1), (0, 0, 0.75, 6e-8), (0, 1, 0, 1))), 0.5)
 def test_all_three_orientations_are_passed_exactly(start, middle, goal, place):
     turning = turn_through(start, middle, goal, place)
     for share, wanted in ((0.0, start), (place, middle), (1.0, goal)):

@@ -207,7 +207,7 @@ class MovingArm:
         """
         if isinstance(q, np.ndarray) and q.dtype == np.float64 and q.shape == (self.n,):
             values = q.tolist()
-            if math.isfinite(sum(values)) and -MAX_ANGLE <= min(values) and max(values) <= MAX_ANGLE:
+            if math.hypot(*values) <= MAX_ANGLE:  # False also for nan.
                 return values
         values = as_vector(q, self.n, "q", "rad").tolist()
         joint = max(range(self.n), key=lambda i: abs(values[i]))
