@@ -168,12 +168,12 @@ class JitterBuffer:
             first = self._queue[0].number
             self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
         self._look_for_excess()
-        skipped = self._skip_old()
+        skipped = 0 if self._stock is None else self._skip_old()
         lives, self._lives = self._lives, False
         if not self._queue:
             return self._wait_alive() if lives else self._lose(_EMPTY)
         command = self._queue[0]
-        steps = self._steps_to(command, is_next)
+        steps = 1 if command.number == self._last_id + 1 else self._steps_to(command, is_next)
         if steps > 1:  # Unless a command that was overtaken fills the gap, its cycles are lost.
             between = (other for other in self._queue if self._last_id < other.number < command.number)
             command = min(between, key=lambda other: other.number, default=command)
@@ -203,7 +203,9 @@ class JitterBuffer:
         return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
 
     def _look_for_excess(self) -> None:
-        self._lowest = min(self._lowest, len(self._queue) - 1)
+        stock = len(self._queue) - 1
+        if stock < self._lowest:
+            self._lowest = stock
         self._looked += 1
         if self._looked >= STOCK_WINDOW:
             excess = self._lowest - self._prefill
@@ -227,7 +229,7 @@ class JitterBuffer:
         return _EMPTY
 
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
-        self._queue.remove(command)
+        self._queue.remove(command)  # The first one but for an overtaken command.
         self._advance_to(command.number)
         self.lost_in_row = 0
         self.is_finished = command.finished
