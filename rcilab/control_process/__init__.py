@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rcilab.control_process.pending_request import PendingRequest as PendingRequest
+    from rcilab.control_process.requests import PendingRequest as PendingRequest
     from rcilab.control_process.status import SupervisorStatus as SupervisorStatus
     from rcilab.control_process.supervisor import Supervisor as Supervisor
 
-_HOME = {"Supervisor": "supervisor", "PendingRequest": "pending_request", "SupervisorStatus": "status"}
+_HOME = {"Supervisor": "supervisor", "PendingRequest": "requests", "SupervisorStatus": "status"}
 
 __all__ = ["PendingRequest", "Supervisor", "SupervisorStatus"]
 

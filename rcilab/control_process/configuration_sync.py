@@ -10,7 +10,7 @@ from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.maker import capabilities_of
 
 if TYPE_CHECKING:
-    from rcilab.control_process.pending_request import PendingRequest
+    from rcilab.control_process.requests import PendingRequest
     from rcilab.model.robot_model import RobotModel
 
 

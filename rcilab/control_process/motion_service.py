@@ -7,7 +7,7 @@ import gc
 from rcilab.control_process.jog_record import HeldJog
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock
 from rcilab.control_process.messages import End, Execute, NumberedRequest, Stop, SwitchRows
-from rcilab.control_process.request_channel import RequestChannel
+from rcilab.control_process.requests import RequestChannel
 from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.clock import CYCLE_TIME
@@ -17,9 +17,9 @@ from rcilab.core.state import Mode
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.jog import JogCallback
 from rcilab.execution.motion_executor import HELD_TOO_LONG, LONGEST_PAUSE, MotionExecutor
+from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.start_pose_check import describe_start_mismatch
-from rcilab.execution.streaming import MotionStream
 from rcilab.makers.driver import StreamingDriver
 from rcilab.model.robot_model import RobotModel
 from rcilab.realtime.cpu_latency import awake_cores

@@ -32,16 +32,13 @@ from rcilab.control_process.messages import (
     Stop,
     StopGuiding,
 )
-from rcilab.control_process.motion_preconditions import require_admissible, require_ready
-from rcilab.control_process.motion_rows import SharedRows
-from rcilab.control_process.pending_request import PendingRequest
+from rcilab.control_process.motion_upload import SharedRows, require_admissible, require_ready
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
-from rcilab.control_process.request_client import RequestClient
+from rcilab.control_process.requests import PendingRequest, RequestClient
 from rcilab.control_process.ring import RingReader
-from rcilab.control_process.round_trip import RoundTrip
 from rcilab.control_process.snapshot import Snapshot
 from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
-from rcilab.control_process.status_reader import StatusReader
+from rcilab.control_process.status_reader import RoundTrip, StatusReader
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
@@ -280,7 +277,7 @@ class Supervisor(Closeable):
             motion: The motion.
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques; see
-                `rcilab.execution.command_builder`.
+                `rcilab.execution.motion_stream`.
             speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it.
             stops: Value of `stops` when the operator requested this; None: its value now.
 

@@ -37,7 +37,7 @@ from rcilab.control_process.messages import (
     SwitchRows,
 )
 from rcilab.control_process.motion_service import MotionService, StoppedError
-from rcilab.control_process.request_channel import RequestChannel
+from rcilab.control_process.requests import RequestChannel
 from rcilab.control_process.status_writer import StatusWriter
 from rcilab.control_process.stop_conditions import StopConditions
 from rcilab.core.arrays import JointVector

@@ -10,8 +10,8 @@ from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, Mode
 from rcilab.execution.control_loop import STATE_TIMEOUT, Callback, ControlLoop, StopCheck
 from rcilab.execution.filters import CommandFilter, RateLimiter
+from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.recorder import CycleLog
-from rcilab.execution.streaming import MotionStream
 from rcilab.makers.driver import StreamingDriver
 
 if TYPE_CHECKING:

@@ -25,11 +25,11 @@ from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.execution.motion_callback import Progress, follow_poses, report_progress
 from rcilab.execution.motion_progress import MotionProgress
 from rcilab.execution.motion_runner import MotionRunner, RunListener
+from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.speed_override import SpeedOverride, StreamRows
 from rcilab.execution.start_pose_check import describe_start_mismatch
-from rcilab.execution.streaming import MotionStream
 from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import (
@@ -374,7 +374,7 @@ class RobotSession(Closeable):
         """Checks a motion by the conditions of the mode, streams it and returns its run.
 
         From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` returns its
-        progress. In torque mode the arm is compliant, see `rcilab.execution.command_builder`.
+        progress. In torque mode the arm is compliant, see `rcilab.execution.motion_stream`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.

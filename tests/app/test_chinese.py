@@ -17,7 +17,7 @@ from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.control_process import SupervisorStatus
-from rcilab.control_process.motion_preconditions import require_ready
+from rcilab.control_process.motion_upload import require_ready
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
 from rcilab.core.spatial import Pose

@@ -19,8 +19,8 @@ import pytest
 from rcilab.control_process import jitter_histogram as lateness
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
-from rcilab.control_process.message_ring import MessageRing
 from rcilab.control_process.messages import Reply, Settings, as_sendable
+from rcilab.control_process.requests import MessageRing
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
 from rcilab.control_process.supervisor import build_settings

@@ -22,9 +22,9 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
+from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
-from rcilab.execution.streaming import MotionStream
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator, timing_of
 from rcilab.makers.parameters import default_parameters

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rcilab.control_process.layout import MESSAGE_SLOTS, ControlBlock, Counter
-from rcilab.control_process.message_ring import MessageRing
 from rcilab.control_process.messages import NumberedRequest, Recover, Reply, SetPower, Stop
-from rcilab.control_process.request_client import RequestClient
+from rcilab.control_process.requests import MessageRing, RequestClient
 from rcilab.core.errors import ConnectionLostError, UsageError
 
 
