@@ -20,7 +20,7 @@ from rcilab.makers.maker import capabilities_of
 if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate
     from rcilab.core.state import Mode
-    from rcilab.execution.motion_progress import MotionProgress
+    from rcilab.execution.motion_runner import MotionProgress
     from rcilab.execution.session import RobotSession
     from rcilab.motion.motion import Motion
     from rcilab.recording.run import Run

@@ -1,15 +1,18 @@
-"""Execution of motions on a connection, and their recorded runs."""
+"""Execution of motions on a connection: their recorded runs, their progress, and paths of the tool as callbacks."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition
 from rcilab.core.errors import RecordedError
-from rcilab.core.state import Mode
+from rcilab.core.state import Mode, RobotState
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.filters import CommandFilter
 from rcilab.execution.motion_executor import MotionExecutor
@@ -25,11 +28,39 @@ from rcilab.recording.setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion
+    from rcilab.motion.path import Path
 
 RunListener: TypeAlias = Callable[[Run, BaseException | None], None]
 """Called with the run of a motion and the error that ended it, or None."""
 
 _SPARE_CYCLES = 2000  # Additional rows of the recorder, for the cycles before and after the motion.
+
+Progress: TypeAlias = Callable[[float, float], None]
+"""`(t, duration)`, both [s]; called about 20 times a second from inside the loop, so it must be quick."""
+
+_PROGRESS_CYCLES = 50
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionProgress:
+    """Progress of the motion that `RobotSession.execute` is streaming; see `RobotSession.progress`."""
+
+    time: float
+    """Time since its first command, [s]."""
+    duration: float
+    """Its duration with the present speed override, [s]; of a held motion, until standstill."""
+    plan_time: float
+    """Time in its plan, [s]; less than `time` if it ran slower or was held."""
+    plan_duration: float
+    """Duration of its plan, [s]."""
+    speed_override: float
+    """Present or requested speed override, from 0 (held) to 1."""
+    mode: Mode
+    """Command mode."""
+
+    def __repr__(self) -> str:
+        percent = 100.0 * self.speed_override
+        return f"<MotionProgress: at {self.plan_time:.3f} s of the plan, {percent:.0f} % of its speed, {self.mode}>"
 
 
 class MotionRunner:
@@ -149,3 +180,37 @@ class MotionRunner:
                     error.run = run
             raise
         return report(stopped)
+
+
+def follow_poses(path: Path, shares: Array, with_psi: bool, on_cycle: Callable[[int], None] | None = None) -> Callback:
+    """Returns the callback that streams a path of the tool: the pose at share k in controller cycle k.
+
+    Args:
+        path: The path.
+        shares: From 0 to 1, shape (N,).
+        with_psi: Whether to send the arm angle; if not, the controller holds its own.
+        on_cycle: Called with the number of every cycle.
+    """
+    last = len(shares) - 1
+
+    def callback(state: RobotState, t: float) -> CartesianPosition:
+        cycle = min(round(t / CYCLE_TIME), last)
+        if on_cycle is not None:
+            on_cycle(cycle)
+        pose, psi = path.at(float(shares[cycle]))
+        return CartesianPosition(pose.matrix, psi if with_psi else None, finished=cycle == last)
+
+    return callback
+
+
+def report_progress(motion: Motion, progress: Progress | None) -> Callable[[int], None] | None:
+    """Returns a function that reports the progress about 20 times a second and at the end, or None."""
+    if progress is None:
+        return None
+    last = len(motion.q) - 1
+
+    def report(cycle: int) -> None:
+        if cycle % _PROGRESS_CYCLES == 0 or cycle == last:
+            progress(min(cycle * CYCLE_TIME, motion.duration), motion.duration)
+
+    return report

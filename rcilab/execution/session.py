@@ -22,9 +22,14 @@ from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
-from rcilab.execution.motion_callback import Progress, follow_poses, report_progress
-from rcilab.execution.motion_progress import MotionProgress
-from rcilab.execution.motion_runner import MotionRunner, RunListener
+from rcilab.execution.motion_runner import (
+    MotionProgress,
+    MotionRunner,
+    Progress,
+    RunListener,
+    follow_poses,
+    report_progress,
+)
 from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl

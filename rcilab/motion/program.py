@@ -1,18 +1,42 @@
-"""Programs: sequences of waypoints that can be planned, saved and exported as a script."""
+"""Programs: sequences of waypoints that can be planned, saved and exported as a script.
+
+The script is Python that plans the same motion, prints its report and optionally saves it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import PathLike
 
 from rcilab.core.arrays import as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.motion.program_file import load_program, program_text, read_program, save_program
-from rcilab.motion.program_script import program_script
 from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_count, require_fit, vector_of
 from rcilab.robots import describe_robot
+
+_HEAD = '''"""Plans a program of rcilab and prints the report; `python SCRIPT OUT.npz` also saves the motion."""
+
+import sys
+
+import rcilab
+from rcilab import Program, Waypoint
+
+program = Program(
+'''
+
+_TAIL = """
+model = rcilab.load_model(program.model)
+motion = rcilab.plan_program(model, program, law="torque_rate_limited")
+
+if __name__ == "__main__":
+    report = rcilab.check(motion, model)
+    print(report)
+    if len(sys.argv) > 1:
+        motion.save(sys.argv[1])
+    sys.exit(0 if report.ok else 1)
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,3 +133,16 @@ class Program:
         types = [waypoint.type for waypoint in self.waypoints]
         counts = ", ".join(f"{types.count(kind)} {kind}" for kind in dict.fromkeys(types))
         return f"<Program{f' {self.name!r}' if self.name else ''} for {self.model}: {counts}>"
+
+
+def program_script(program: Program) -> str:
+    """Returns the script; numbers are exact, and text of the program appears only in string literals."""
+    head = [("name", program.name), ("model", program.model), ("tool", program.tool), ("start", program.start)]
+    lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
+    waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)
+    return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + _TAIL
+
+
+def _call(waypoint: Waypoint) -> str:
+    given = [(field.name, getattr(waypoint, field.name), field.default) for field in fields(waypoint)]
+    return "Waypoint(" + ", ".join(f"{key}={value!r}" for key, value, default in given if value != default) + ")"

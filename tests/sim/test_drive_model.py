@@ -7,7 +7,7 @@ import pytest
 
 from rcilab.model.robot_model import load_model
 from rcilab.robots.mjcf import ARMATURE_PER_TORQUE
-from rcilab.sim.drive_model import DriveModel
+from rcilab.sim.drive_report import DriveModel
 
 
 def test_without_torque_the_motor_is_the_joint_times_the_ratio() -> None:

@@ -10,7 +10,7 @@ import pytest
 from rcilab.makers.rokae import wire as rci
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.joint import plan_joint
-from rcilab.sim.drive_model import DriveModel
+from rcilab.sim.drive_report import DriveModel
 from rcilab.sim.filters import low_pass_gain
 
 
