@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
-from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
 from rcilab.i18n.locale import LANGUAGES
 
 if TYPE_CHECKING:
@@ -44,7 +44,9 @@ def add_parser(subparsers: Any) -> None:
     add_max_rows(parser)
     form = parser.add_mutually_exclusive_group()
     form.add_argument("--explain", choices=tuple(LANGUAGES), help="print sentences, in English or Chinese")
-    form.add_argument("--json", action="store_true", help="print one JSON object instead; SI units")
+    form.add_argument(
+        "--json", action="store_true", help="print one JSON object instead, also about an error; SI units"
+    )
     parser.set_defaults(run=run)
 
 
@@ -54,6 +56,17 @@ def run(args: Namespace) -> int:
     Raises:
         RcilabError: Bad input; the caller prints it and exits with 2.
     """
+    from rcilab.cli.report_json import as_json_text, error_as_json
+
+    try:
+        return _run(args)
+    except RcilabError as error:
+        if args.json:
+            show(as_json_text({"model": args.model, "ok": False, "error": error_as_json(error)}))
+        raise
+
+
+def _run(args: Namespace) -> int:
     from rcilab.cli.report_json import as_json_text, report_as_json
     from rcilab.conformance.check import check
     from rcilab.model.robot_model import load_model

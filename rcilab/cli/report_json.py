@@ -6,6 +6,10 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
+from rcilab.cli.output import one_line_each
+from rcilab.core.errors import ControlError, RcilabError
+from rcilab.i18n.translator import Remark
+
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report, Violation
     from rcilab.motion import Motion
@@ -32,6 +36,19 @@ def report_as_json(report: Report) -> dict[str, Any]:
 def run_as_json(run: Run) -> dict[str, Any]:
     """Returns the duration of a run, [s], the reason of its stop or null, and its largest joint error, [rad]."""
     return {"duration": _finite(run.duration), "stopped": run.stopped, "largest_error": _finite(run.largest_error)}
+
+
+def error_as_json(error: RcilabError) -> dict[str, Any]:
+    """Returns the class of an error, its message and, of a fault, the manual's names and what the cycles show."""
+    faults = error.faults if isinstance(error, ControlError) else ()
+    finding = error.finding if isinstance(error, ControlError) else ""
+    parts = finding.parts if isinstance(finding, Remark) and finding else ()
+    return {
+        "type": type(error).__name__,
+        "text": one_line_each(str(error)),
+        "faults": [getattr(fault, "manual_name", str(fault)) for fault in faults],
+        "findings": [{"text": str(part), **_facts(part)} for part in parts],
+    }
 
 
 def as_json_text(content: dict[str, Any]) -> str:
@@ -66,6 +83,11 @@ def _violation(violation: Violation) -> dict[str, Any]:
         "fault": None if violation.fault is None else violation.fault.manual_name,
         "text": str(violation),
     }
+
+
+def _facts(remark: Remark) -> dict[str, Any]:
+    facts: Any = remark.as_dict()["facts"]
+    return {name: _finite(fact) if isinstance(fact, float) else fact for name, fact in facts.items()}
 
 
 def _finite(value: float) -> float | None:

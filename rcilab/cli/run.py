@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, drop_unread_output, show
-from rcilab.core.errors import UsageError
+from rcilab.core.errors import RcilabError, RecordedError, UsageError
 from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
@@ -52,7 +52,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
-        "--json", action="store_true", help="print one JSON object, SI units; reports and questions go to stderr"
+        "--json",
+        action="store_true",
+        help="print one JSON object, also about an error; SI units; reports and questions go to stderr",
     )
     add_max_rows(parser)
     parser.add_argument(
@@ -67,17 +69,24 @@ def run(args: Namespace) -> int:
     Raises:
         RcilabError: Bad input, no robot, or a fault; the caller prints it and exits with 2.
     """
+    moves: list[_Move] = []
     with _stopping_on_signals() as stopper:
         try:
-            return _run(args, stopper)
+            name = _run(args, stopper, moves)
         except KeyboardInterrupt:
             drop_unread_output()
             print("\nNothing was sent.", file=sys.stderr)
+            _show_json(args, args.model, "not_agreed", moves)
             return _NOT_DONE
         except BrokenPipeError:  # Before the motion: the operator cannot have read the report or the question.
             drop_output()
             print("The output is closed, so the report cannot be read: nothing was sent.", file=sys.stderr)
             return _NOT_DONE
+        except RcilabError as error:
+            _show_json(args, args.model, "failed", moves, error)
+            raise
+    _show_json(args, name, moves[-1].outcome, moves)
+    return _DONE if moves[-1].outcome == "done" else _NOT_DONE
 
 
 class _Stopper:
@@ -119,8 +128,8 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
             signal.signal(number, handler)
 
 
-def _run(args: Namespace, stopper: _Stopper) -> int:
-    from rcilab.cli.report_json import as_json_text
+def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
+    """Appends the motions with their outcomes to `moves` and returns the name of the arm."""
     from rcilab.conformance.check import check
     from rcilab.execution.session import connect
     from rcilab.execution.start_pose_check import describe_start_mismatch
@@ -128,7 +137,6 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
 
     found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None
-    moves: list[_Move] = []
     with connect(args.robot, model, args.timeout) as robot:
         show_note = partial(print, file=_text_stream(args))
         motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
@@ -142,17 +150,27 @@ def _run(args: Namespace, stopper: _Stopper) -> int:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
             report = check(motion, robot.model, start=motion.q[0])
             if not report.ok:  # Known before the arm moves to its start.
-                moves, motions = [_refuse(report, args)], []
+                moves.append(_refuse(report, args))
+                motions = []
         if motions and args.to_start and state.faults:
             _recover(robot, state, args)
         for planned in motions:
-            moves.append(_move(planned, robot, stopper, args))
+            _move(planned, robot, stopper, args, moves)
             if moves[-1].outcome != "done":
                 break
-        name = robot.model.name
-    if args.json:
-        show(as_json_text({"model": name, "outcome": moves[-1].outcome, "moves": [move.as_json() for move in moves]}))
-    return _DONE if moves[-1].outcome == "done" else _NOT_DONE
+        return robot.model.name
+
+
+def _show_json(
+    args: Namespace, model: str | None, outcome: str, moves: Sequence[_Move], error: RcilabError | None = None
+) -> None:
+    """Prints the result of the command with --json."""
+    if not args.json:
+        return
+    from rcilab.cli.report_json import as_json_text, error_as_json
+
+    found = {"model": model, "outcome": outcome, "moves": [move.as_json() for move in moves]}
+    show(as_json_text(found if error is None else {**found, "error": error_as_json(error)}))
 
 
 def _text_stream(args: Namespace) -> TextIO:
@@ -181,7 +199,7 @@ def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
 class _Move:
     """One motion of the command and its outcome."""
 
-    outcome: Literal["done", "stopped", "not_conforming", "not_agreed"]
+    outcome: Literal["done", "stopped", "failed", "not_conforming", "not_agreed"]
     report: Report
     run: Run | None = None
 
@@ -193,21 +211,27 @@ class _Move:
         return {"outcome": self.outcome, "report": report_as_json(self.report), "run": run}
 
 
-def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace) -> _Move:
-    """Checks a motion, shows the report, asks for confirmation, and runs the motion."""
+def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace, moves: list[_Move]) -> None:
+    """Checks a motion, shows the report, asks for confirmation, runs the motion, and appends it to `moves`."""
     from rcilab.conformance.check import check
 
     out = _text_stream(args)
     report = check(motion, robot.model, start=robot.state.q_c)
     if not report.ok:
-        return _refuse(report, args)
+        moves.append(_refuse(report, args))
+        return
     print(report, file=out)
     print(_describe_move(motion, robot), file=out, flush=True)
     if not args.yes and not _is_confirmed(out):
-        return _Move(outcome="not_agreed", report=report)
+        moves.append(_Move(outcome="not_agreed", report=report))
+        return
     if not robot.is_powered():
         robot.power_on()
-    result = stopper.execute(robot, motion, report.certificate)
+    try:
+        result = stopper.execute(robot, motion, report.certificate)
+    except RecordedError as error:
+        moves.append(_Move(outcome="failed", report=report, run=error.run))
+        raise
     if not args.json:
         show(result)
     if result.stopped:
@@ -216,7 +240,7 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
             "its position (robot.state.q_c), or move it to the start of a file: rcilab run FILE --to-start",
             file=sys.stderr,
         )
-    return _Move(outcome="stopped" if result.stopped else "done", report=report, run=result)
+    moves.append(_Move(outcome="stopped" if result.stopped else "done", report=report, run=result))
 
 
 def _refuse(report: Report, args: Namespace) -> _Move:

@@ -103,6 +103,29 @@ def test_json_is_one_object_on_stdout_and_all_text_is_on_stderr(address, tmp_pat
     assert "will move for" in captured.err
 
 
+def test_json_names_what_ends_a_run_or_prevents_it(tmp_path, capsys):
+    controller = start_controller(MODEL.name)
+    try:
+        file = tmp_path / "motion.npz"
+        plan_joint(MODEL, MODEL.home, GOAL, speed=0.5).save(file)
+        host, port = controller.world_address.split(":")
+        with SimulationControl(host, int(port)) as world:
+            world.push((0, 0, -200, 0, 0, 0))
+            assert main(["run", str(file), "--robot", controller.address, "--yes", "--json"]) == 2
+        captured = capsys.readouterr()
+        found = json.loads(captured.out)
+        assert found["outcome"] == "failed"
+        assert found["error"]["type"] == "ControlError"
+        assert found["error"]["faults"] == ["kCollision"]
+        assert found["error"]["text"] in captured.err
+    finally:
+        controller.end()
+    assert main(["run", str(tmp_path / "none.npz"), "--robot", controller.address, "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["error"]["type"] == "InvalidValueError"
+    assert main(["check", str(tmp_path / "none.npz"), "--model", "xMatePro7", "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["ok"] is False
+
+
 def test_a_question_that_cannot_be_read_is_not_agreed_to(address, tmp_path):
     with connect(address) as robot:
         q = robot.state.q_c
