@@ -34,8 +34,14 @@ def report_as_json(report: Report) -> dict[str, Any]:
 
 
 def run_as_json(run: Run) -> dict[str, Any]:
-    """Returns the duration of a run, [s], the reason of its stop or null, and its largest joint error, [rad]."""
-    return {"duration": _finite(run.duration), "stopped": run.stopped, "largest_error": _finite(run.largest_error)}
+    """Returns duration, [s], reason of the stop or null, largest joint error and, at the goal, joint errors, [rad]."""
+    goal_error = run.goal_error
+    return {
+        "duration": _finite(run.duration),
+        "stopped": run.stopped,
+        "largest_error": _finite(run.largest_error),
+        "goal_error": None if goal_error is None else [_finite(value) for value in goal_error],
+    }
 
 
 def error_as_json(error: RcilabError) -> dict[str, Any]:

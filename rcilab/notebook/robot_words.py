@@ -14,7 +14,7 @@ from rcilab.i18n.translator import Message, Text, message
 from rcilab.makers.maker import driven_robots
 from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import head, table, verdict
-from rcilab.recording.html_facts import describe_stop
+from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.recording.run import describe_end
 
 
@@ -87,6 +87,8 @@ def outcome_html(
         return verdict("bad", "✗", text.render(why))
     if run is not None and run.stopped:
         return stopped
+    if run is not None and run.missed_goal is not None:
+        return verdict("warn", "▲", describe_goal(run, text))
     if run is not None and len(run.q):
         largest = float(np.abs(np.nan_to_num(run.error)).max())
         return verdict("good", "✓", text("run.arrived", cycles=len(run.t), error=largest))

@@ -45,6 +45,14 @@ def describe_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
     return text("stop.reported", why=why, faults=names) if names else why
 
 
+def describe_goal(run: Run, text: Text) -> str:
+    """Returns where a run that was not stopped ended: at its goal, beside it, or at the last command of a callback."""
+    if run.missed_goal is not None:
+        joint, angle = run.missed_goal
+        return text("run.beside_goal", joint=joint, angle=angle)
+    return text("facts.goal" if run.plan is not None else "facts.last")
+
+
 def _ended(run: Run, text: Text) -> str:
     if run.is_safety_stop:
         return text("facts.stopped", why=describe_stop(run.stopped or "", run.faults, text))
@@ -53,7 +61,7 @@ def _ended(run: Run, text: Text) -> str:
     if not run.is_complete:
         return text("facts.cut")
     if not run.stopped:
-        return text("facts.goal" if run.plan is not None else "facts.last")
+        return describe_goal(run, text)
     return text("facts.stopped", why=describe_stop(run.stopped or "", run.faults, text))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.conformance.check import check
-from rcilab.core.arrays import Array, JointPath
+from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import SAFETY_STOP, ControlError, UsageError, plain_text
@@ -74,6 +74,10 @@ class Timing:
     """[s]."""
     late: int
     """Cycles answered more than 1 ms late."""
+
+
+GOAL_TOLERANCE = 5e-4
+"""[rad] A larger distance from the goal is stated with the end of a run. Stiff modes end 20 times closer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -287,6 +291,25 @@ class Run:
         """The largest joint error, [rad]; 0.0 without anything to compare."""
         return float(np.nanmax(np.abs(self.error), initial=0.0))
 
+    @property
+    def goal_error(self) -> JointVector | None:
+        """Measured joint angles at the end minus the goal, shape (n,), [rad]; None unless it ran to the end of a plan.
+
+        In a compliant mode the arm yields to friction and to errors of the model, and ends beside its goal.
+        """
+        if self.plan is None or self.stopped or self.faults or not self.is_complete or not len(self.cycles):
+            return None
+        return self.q[-1] - self.plan.q[-1]
+
+    @property
+    def missed_goal(self) -> tuple[int, float] | None:
+        """The joint that ended farthest from its goal, from 1, and how far, [rad]; None within `GOAL_TOLERANCE`."""
+        error = self.goal_error
+        if error is None:
+            return None
+        joint = int(np.abs(error).argmax())
+        return (joint + 1, abs(float(error[joint]))) if abs(error[joint]) > GOAL_TOLERANCE else None
+
     def _describe_error(self) -> str:
         stop = self.stop_time if self.plan is not None else None
         deviation = f"{self.largest_error:.3g} rad ({math.degrees(self.largest_error):.3g} deg)"
@@ -362,6 +385,9 @@ class Run:
         if len(self.cycles):
             facts.append(f"largest error {self._describe_error()}")
             facts.append(f"success rate {float(self.success_rate[-1]):.3f}")
+        if self.missed_goal is not None:
+            joint, angle = self.missed_goal
+            facts.append(f"ended {angle:.2g} rad ({math.degrees(angle):.2g} deg) from its goal at joint {joint}")
         if self.stopped:
             facts.append(f"stopped: {plain_text(self.stopped)}")
         if not self.is_complete:

@@ -13,6 +13,7 @@ from rcilab.i18n.catalogue import load_catalogue
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.locale import require_language
 from rcilab.i18n.translator import Text
+from rcilab.recording.html_facts import describe_goal
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -32,8 +33,11 @@ def run_html(run: Run, language: str = "en") -> str:
     """
     words, timing = load_catalogue("rcilab.recording", require_language(language)), run.timing
     ended = words["card.fault" if run.faults else "card.goal"]
+    text = Text(language, "rcilab.recording")
     if run.stopped:
-        ended = Text(language, "rcilab.recording").render(describe_note(run.stopped))
+        ended = text.render(describe_note(run.stopped))
+    elif run.missed_goal is not None:
+        ended = describe_goal(run, text)
     rows = [
         ("duration", words["card.cycles"].format(duration=run.duration, cycles=len(run.cycles))),
         ("ended", ended),

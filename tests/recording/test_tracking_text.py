@@ -5,14 +5,20 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.text import Text as PageText
+from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
+from rcilab.notebook.robot_words import outcome_html as notebook_outcome
+from rcilab.recording.html_facts import fact_rows
+from rcilab.recording.run_html import run_html
 from rcilab.recording.tracking_text import tracking_notes
 from rcilab.workbench.panels.recording import summary_html
-from tests.recording.runs import SETUP, export_run, some_ideal_run, some_run, some_stopped_run
+from tests.recording.runs import MODEL, OFFSET, SETUP, export_run, some_ideal_run, some_run, some_stopped_run
 
 
 def notes(run, language: str = "en") -> list[str]:
@@ -37,6 +43,22 @@ def test_an_arm_that_lags_is_not_called_exact_and_an_unknown_one_is_not_called_i
     assert notes(some_run()) == []  # MuJoCo.
     assert notes(replace(some_run(), setup=replace(SETUP, plant="ideal"))) == []  # With an impedance it lags, too.
     assert notes(replace(some_ideal_run(), setup=replace(SETUP, plant=""))) == []  # A controller somewhere.
+
+
+def test_an_arm_that_yields_says_how_far_from_its_goal_it_ended():
+    run = some_run()  # Joint 2 is off by 1 mrad.
+    assert run.goal_error is not None
+    assert np.allclose(run.goal_error, OFFSET * np.eye(7)[1], atol=1e-6)
+    assert "ended 0.001 rad (0.057 deg) from its goal at joint 2" in repr(run)
+    said = "Ran to its end, 0.06° from its goal at joint 2: the arm yields in a compliant mode."
+    status = SupervisorStatus(phase="closed", code="closed")
+    assert said in run_html(run)
+    assert said in fact_rows(run, Text("en", "rcilab.recording"))[3][1]
+    assert said in notebook_outcome(Outcome(what="execute", run=run), MODEL, status, Text("en", "rcilab.notebook"))
+    exact = some_ideal_run()
+    assert exact.missed_goal is None
+    assert "goal" not in repr(exact)
+    assert some_stopped_run().goal_error is None
 
 
 @pytest.mark.parametrize(("language", "words"), [("en", "until the stop at 0.300 s"), ("zh", "只比较到 0.300 秒")])

@@ -9,7 +9,7 @@ from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
-from rcilab.recording.html_facts import describe_stop
+from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
@@ -101,4 +101,6 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
         return "warn", text("record.cut"), facts
     if run.stopped:
         return "warn", text("record.left_alone" if recording.is_left_alone else "record.stopped"), facts
+    if run.missed_goal is not None:
+        return "warn", describe_goal(run, text), facts
     return "good", text("record.arrived"), facts
