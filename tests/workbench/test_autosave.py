@@ -109,6 +109,7 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         left = file.read_text()
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert Text("en").render(bench.store.state.notice.text) == f"Back with the {MODEL.name}: program, tool."
+        assert bench.store.state.setup.seen == {"tool"}  # What was set is drawn.
         assert len(bench.store.state.program.draft.steps) == 2
         assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
         assert bench.store.state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.12]

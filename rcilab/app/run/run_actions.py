@@ -17,7 +17,7 @@ from rcilab.app.run.active_force import TOOL, is_guided
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
-from rcilab.app.setup.configuration_state import SetupState, name_parts, setup_obstacle
+from rcilab.app.setup.configuration_state import SetupState, drawn_parts, name_parts, setup_obstacle
 from rcilab.app.status_text import StartingError, tell_error, tell_incident
 from rcilab.app.store import Store, UiState
 from rcilab.core.clock import CYCLE_TIME
@@ -212,7 +212,8 @@ class RunActions:
         """Takes note of the configuration of an arm that is replaced by another."""
         fresh = SetupState()
         touched: frozenset[SetupPart] = frozenset(setup.parts)
-        self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched)
+        seen = drawn_parts(touched)
+        self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched, seen=seen)
 
     def _exchange_setups(self, state: UiState, name: str) -> SetupState:
         """Returns the configuration of an arm that is chosen now, and keeps that of the one before."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -70,6 +71,11 @@ def pending_parts(state: UiState, status: SupervisorStatus) -> tuple[SetupPart, 
         for part in LISTED
         if part in setup.touched and getattr(status.setup, part) is not getattr(setup.wanted, part)
     )
+
+
+def drawn_parts(parts: Iterable[str]) -> frozenset[str]:
+    """Returns those of the parts that the scene can draw."""
+    return frozenset(parts) & frozenset(SETUP_PARTS)
 
 
 def own_limits(state: UiState) -> SoftJointLimits:

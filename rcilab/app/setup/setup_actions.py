@@ -20,6 +20,7 @@ from rcilab.app.setup.configuration_state import (
     FORCE_AXES,
     LISTED,
     SetupState,
+    drawn_parts,
     name_parts,
     own_limits,
     pending_parts,
@@ -291,13 +292,14 @@ class SetupActions:
             self._send(self._session.status())
 
     def restore(self, setup: RobotConfiguration) -> None:
-        """Restores a configuration edited before; it is sent to a real robot only after a question."""
+        """Restores and draws a configuration edited before; it is sent to a real robot only after a question."""
         now = self._store.state.setup
         model = self._store.state.model
         parts: set[SetupPart] = {part for part in setup.parts if tell_lack_of_part(model, part) is None}
         if parts:
             self._is_back = True
-            self._take(replace(now, wanted=now.wanted.updated(setup.only(parts)), touched=now.touched | parts), parts)
+            wanted, touched = now.wanted.updated(setup.only(parts)), now.touched | parts
+            self._take(replace(now, wanted=wanted, touched=touched, seen=now.seen | drawn_parts(parts)), parts)
 
     def tick(self, status: SupervisorStatus) -> None:
         """Follows a configuration that was sent, and sends what is new to a virtual controller."""
