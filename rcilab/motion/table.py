@@ -18,7 +18,7 @@ from rcilab.core.file_bounds import require_bytes, require_rows
 
 _LONGEST_LINE = 65_536  # [bytes] Tuning value: a line written by rcilab has some hundreds.
 _MAX_COLUMNS = 1024  # Tuning value: the table of a run with the complete state has 200.
-_LINE = re.compile(rb"([^\r\n]*)(?:\r\n|\r|\n|\Z)")
+_LINE = re.compile(rb"([^\r\n]{0,%d})(?:\r\n|\r|\n|\Z|(?=[^\r\n]))" % (_LONGEST_LINE + 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,9 @@ def _data_lines(content: bytes, name: str) -> Iterator[tuple[int, str]]:
     """
     start = len(BOM_UTF8) if content.startswith(BOM_UTF8) else 0
     for number, match in enumerate(_LINE.finditer(content, start), 1):
-        size = match.end(1) - match.start(1)
-        if size > _LONGEST_LINE:
+        if match.end(1) - match.start(1) > _LONGEST_LINE:
+            ends = (content.find(end, match.end(1)) for end in (b"\r", b"\n"))
+            size = min((end for end in ends if end >= 0), default=len(content)) - match.start(1)
             raise InvalidValueError(
                 f"{name}, line {number}", size, f"characters are more than the {_LONGEST_LINE} allowed in a line"
             ).coded("table_line", count=size, most=_LONGEST_LINE)

@@ -54,6 +54,7 @@ SLIP = 20  # [cycles] A motion that took this much longer than planned is logged
 GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
+_MOST_LINES = 20  # Of a kind that a client causes, before they are summed up: as many as a person reads.
 _CHECK_PERIOD = 0.1  # [s] Between checks for the end of the parent process, or for a requested end during a stall.
 
 
@@ -97,7 +98,7 @@ class ArmServer:
         client = None if config.client_host is None else (config.client_host, config.client_port)
         self._endpoint = Endpoint(config.host, server.channels, client)
         states_network = config.network if config.states_network is None else config.states_network
-        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network, log)
+        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network, self._log_refusal)
         server.attach(self._network)
         self._stalls = StallSchedule()
         self._environment = Environment(
@@ -243,7 +244,7 @@ class ArmServer:
             remaining = min(deadline - self._clock.now(), _CHECK_PERIOD)
             remaining = resend - self._clock.now() if is_first else remaining
             self._poll(0.0 if len(controller.arm.playout) else remaining)
-            self._check_parent()
+            self._check_now_and_then()
             if len(controller.arm.playout) or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
                 return
@@ -295,13 +296,14 @@ class ArmServer:
         if self.controller.is_moving is not was_moving and not self.config.lockstep:
             self._log_slip()
         self._server.settle()
-        self._check_parent()
+        self._check_now_and_then()
         return is_idle
 
-    def _check_parent(self) -> None:
-        if self.config.parent_pid is not None and self._clock.now() >= self._next_check:
+    def _check_now_and_then(self) -> None:
+        if self._clock.now() >= self._next_check:
             self._next_check = self._clock.now() + _CHECK_PERIOD
-            if os.getppid() != self.config.parent_pid:
+            self._rare_lines.write_counts()
+            if self.config.parent_pid is not None and os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
     def _catch_up(self) -> None:
@@ -314,11 +316,15 @@ class ArmServer:
             if self.controller.wants_commands:
                 self._advance(is_seen=False)
 
+    def _log_refusal(self, line: str) -> None:
+        self._rare_lines.write("refused request", line, "requests were refused", _MOST_LINES)
+
     def _log_slip(self) -> None:
         """Logs by how much a motion took longer than planned, after its end."""
         if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
-            self._log(f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up")
+            line = f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up"
+            self._rare_lines.write("slip", line, "motions took longer", _MOST_LINES)
         self._missed_before = self.missed
 
     def _advance(self, *, is_seen: bool = True) -> None:
@@ -335,11 +341,11 @@ class ArmServer:
         """Logs the reason for new error bits."""
         self._logged_faults = faults
         if faults:
-            self._log(f"{name_faults(faults)}: {self.controller.reason}; the arm stops")
+            line = f"{name_faults(faults)}: {self.controller.reason}; the arm stops"
+            self._rare_lines.write("fault", line, "faults stopped the arm", _MOST_LINES)
             if self.controller.lacks_commands and self.controller.arm.playout.lost:
-                self._log(
-                    "a client that pauses needs a deeper play-out (--prefill 50), SCHED_FIFO for itself, or --lockstep"
-                )
+                line = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
+                self._rare_lines.write("playout", line, "motions lacked commands")
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
@@ -362,7 +368,7 @@ class ArmServer:
                     self._rare_lines.write("stranger", line, "were left out")
                 case ClientRefused(address, holder):
                     line = f"refused another client from {address}: {holder} is connected"
-                    self._rare_lines.write("refused", line, "were refused")
+                    self._rare_lines.write("refused", line, "clients were refused")
 
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
@@ -375,6 +381,7 @@ class ArmServer:
 
     def _handle_disconnect(self, peer: Peer, reason: str) -> None:
         if self._server.disconnect(peer):
-            self._log(f"the client {reason} in mid-motion: the arm stops")
+            line = f"the client {reason} in mid-motion: the arm stops"
+            self._rare_lines.write("left in motion", line, "clients were lost in mid-motion", _MOST_LINES)
         elif reason != "closed the connection":
             self._rare_lines.write("left", f"the client {reason}", "clients were lost")

@@ -104,5 +104,5 @@ class Link(Protocol):
         ...
 
     def log(self, line: str, /) -> None:
-        """Takes a line for the operator."""
+        """Takes the line about a refused request for the operator; after some lines, they are counted."""
         ...

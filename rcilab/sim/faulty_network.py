@@ -22,7 +22,7 @@ class FaultyNetwork:
 
     Attributes:
         has_lost: Whether the newest state, or a command since then, is lost: this state may never be answered.
-        log: Receives a line for the operator; does not block.
+        log: Receives the line about a refused request; does not block.
 
     Args:
         endpoint: The sockets.

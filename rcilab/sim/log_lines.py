@@ -7,9 +7,10 @@ import os
 import threading
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 
 _MAX_QUEUED = 200  # Lines; a tuning value: as many as a person reads.
-_PERIOD = 10.0  # [s] Between two lines of a kind that any peer can cause; others are counted. A tuning value.
+_PERIOD = 10.0  # [s] For which lines of a kind that any peer can cause are counted together. A tuning value.
 _CLOSE_TIMEOUT = 0.5  # [s] For the last lines at the end of the controller, if they are not read.
 
 
@@ -29,8 +30,18 @@ class LineHandler(logging.Handler):
         self._write(record.getMessage())
 
 
+@dataclass(slots=True)
+class _Kind:
+    """Lines of a kind in the current period."""
+
+    end: float  # [s]
+    more: str
+    written: int = 0
+    counted: int = 0
+
+
 class SeldomLines:
-    """Limits the rate of lines that any peer can cause: one of a kind per period, with the number of skipped ones.
+    """Limits the rate of lines that any peer can cause: some of a kind per period, then the number of skipped ones.
 
     Args:
         write: Writes a line; does not block.
@@ -39,24 +50,35 @@ class SeldomLines:
 
     def __init__(self, write: Callable[[str], None], clock: Callable[[], float]) -> None:
         self._write, self._clock = write, clock
-        self._next: dict[str, float] = {}  # Kind -> earliest time of the next line, [s].
-        self._counted: dict[str, int] = {}
+        self._kinds: dict[str, _Kind] = {}
 
-    def write(self, kind: str, line: str, more: str) -> None:
+    def write(self, kind: str, line: str, more: str, most: int = 1) -> None:
         """Writes a line, or counts it.
 
         Args:
-            kind: Kind of line; lines of a kind are counted together.
+            kind: Kind of line, one of a few; lines of a kind are counted together.
             line: The line.
             more: Text for the counted ones, such as "were refused".
+            most: Number of lines of this kind that are written per period.
         """
-        now = self._clock()
-        if now < self._next.get(kind, now):
-            self._counted[kind] = self._counted.get(kind, 0) + 1
+        self.write_counts()
+        seen = self._kinds.setdefault(kind, _Kind(self._clock() + _PERIOD, more))
+        if seen.written < most:
+            seen.written += 1
+            self._write(line)
+        else:
+            seen.counted += 1
+
+    def write_counts(self) -> None:
+        """Writes how many lines were skipped in each period that is over. Call it now and then."""
+        if not self._kinds:
             return
-        self._next[kind] = now + _PERIOD
-        count = self._counted.pop(kind, 0)
-        self._write(f"{line} ({count} more {more} since the last line)" if count else line)
+        now = self._clock()
+        for kind, seen in list(self._kinds.items()):
+            if now >= seen.end:
+                del self._kinds[kind]
+                if seen.counted:
+                    self._write(f"{seen.counted} more {seen.more} within {_PERIOD:g} s")
 
 
 class LogLines:

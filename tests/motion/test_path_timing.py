@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
@@ -35,12 +35,14 @@ def ends(model, seed, size=0.5):
     return q, model.forward(via), model.forward(goal), psi
 
 
-def planned(plan, *arguments, **options):
-    """The motion, or no example where the path cannot be followed."""
+def planned(plan, model, *arguments, **options):
+    """The motion, or no example where the path cannot be followed or comes too close to the floor."""
     try:
-        return plan(*arguments, **options)
+        motion = plan(model, *arguments, **options)
     except PlanningError:
         assume(False)
+    assume(not any(found.condition.id.startswith("clearance.") for found in check(motion, model).violations))
+    return motion
 
 
 def angles(model, q):
@@ -96,6 +98,7 @@ def test_a_line_is_straight_allowed_smooth_and_exact_at_its_ends(name, seed, spe
 
 @SOME
 @given(names, seeds, speeds)
+@example("xMatePro3", 9108064, 1.0)  # It ends below the floor.
 def test_an_arc_is_round_allowed_and_smooth(name, seed, speed):
     model = MODELS[name]
     q, via, goal, psi = ends(model, seed, 0.4)

@@ -19,6 +19,7 @@ from rcilab.control_process.simulate import simulate
 from rcilab.makers.rokae import wire as rci
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
+from rcilab.sim import log_lines
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
 from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
 from tests.makers.rokae.controller.test_server import PATIENCE, Peer, Running, bind_udp, running
@@ -195,14 +196,24 @@ def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
     written, now = [], 100.0
     lines = SeldomLines(written.append, lambda: now)
     for number in range(1000):
-        lines.write("left", f"the client left {number}", "were lost")
+        lines.write("left", f"the client left {number}", "clients were lost")
     lines.write("refused", "another kind", "were refused")
+    assert written == ["the client left 0", "another kind"]
     now += 60.0
-    lines.write("left", "the client left", "were lost")
-    lines.write("refused", "another kind", "were refused")
-    assert written == [
-        "the client left 0", "another kind", "the client left (999 more were lost since the last line)", "another kind",
-    ]  # fmt: skip
+    lines.write_counts()
+    assert written[2:] == ["999 more clients were lost within 10 s"]
+    for number in range(5):
+        lines.write("left", f"the client left {number}", "clients were lost", 3)
+    assert written[3:] == [f"the client left {number}" for number in range(3)]
+
+
+def test_a_client_that_is_refused_again_and_again_fills_no_log(monkeypatch):
+    monkeypatch.setattr(log_lines, "_PERIOD", 3.0)
+    with running() as found, Peer(found) as client:
+        for _ in range(100):
+            assert client.ask(rci.SetMotorPower(7)) != 0
+        found.wait_for_line("80 more requests were refused within 3 s")
+    assert len(found.lines) == 21
 
 
 @pytest.mark.parametrize("sent", [b"oops, a line of text", struct.pack("<HHH", 10, 1, 999) + bytes(4)])
