@@ -150,7 +150,7 @@ class Camera:
     def go(self, degrees: tuple[float, ...]) -> None:
         """Brings the arm to where the film begins."""
         self.pose(degrees)
-        self.ask(RobotCommand(what="execute", page=self.bench.store.state.lease.holder))
+        self.ask(RobotCommand(what="execute", page=self.bench.store.state.control_lock.holder))
         self.wait(lambda: self.bench.store.state.recording is not None and self.idle)
         self.ask(PoseGoal(name="here"))
         self.wait(lambda: self.bench.store.state.plan is None)
@@ -261,7 +261,7 @@ def run(camera: Camera) -> None:
 
 
 def fault(camera: Camera) -> None:
-    """One of the gallery."""
+    """One of the fault lab."""
     learn = camera.bench.store
     camera.press(camera.tab_named("Learn"))
     camera.say("Twenty faults to provoke, each with cause and remedy")
@@ -309,7 +309,7 @@ def opened(quality: str, sharpness: float) -> Iterator[Camera]:
         tab.wait_for_function(DRAWN, timeout=120_000)
         tab.evaluate("document.querySelectorAll('.mantine-Notification-closeButton').forEach((one) => one.click())")
         camera = Camera(bench, tab)
-        camera.wait(lambda: bench.store.state.lease.holder is not None and bench.session.status().powered)
+        camera.wait(lambda: bench.store.state.control_lock.holder is not None and bench.session.status().powered)
         yield camera
         browser.close()
 

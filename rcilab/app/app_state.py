@@ -1,4 +1,4 @@
-"""The part of the state that page and notebook share: the arm, the goal, the plan, how it is run, what came of it."""
+"""The part of the state that page and notebook share: the arm, the goal, the plan, how it is run, the last run."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ class Toast:
     tone: Tone
     text: Message
     page: int | None = None
-    """Client id of the only page it concerns; None: all of them."""
+    """Client id of the only page that shows it; None: all pages."""
     trouble: str = ""
-    """Names a trouble that it reports and that can end: then it is withdrawn."""
+    """Name of the trouble that it reports; the notice is withdrawn when the trouble ends."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AppState:
-    """Values of the features that page and notebook have in common."""
+    """State of the features that page and notebook have in common."""
 
     model: RobotModel
     target: str = "virtual"
     """"virtual" or an address, rci://HOST:PORT."""
     plant: PlantKind = "ideal"
-    """What the virtual controller moves."""
+    """What the virtual controller drives."""
     world: WorldState = field(default_factory=WorldState)
     """The virtual controller itself: its network, wiring and buttons."""
     drive: DriveState = field(default_factory=DriveState)
@@ -55,10 +55,10 @@ class AppState:
     no_plan: Message | None = None
     """Why there is no plan."""
     asked: Motion | None = None
-    """The motion that a foreign robot is to make and that awaits a second yes."""
+    """The motion of a foreign robot that waits for the operator's second confirmation."""
     recording: Recording | None = None
     last_run: Recording | None = None
-    """The run that was made last, whatever was planned since: for its table and for export."""
+    """The last run, whatever was planned since: for its table and for export."""
     record: bool = True
     """Whether every cycle of a motion is written to a file as well."""
     runs: Path | None = None
@@ -66,25 +66,25 @@ class AppState:
     speed: float = 0.5
     law: JointLaw = "torque_rate_limited"
     way: PathKind = "joint"
-    """How the tool goes to the goal."""
+    """How the tool moves to the goal."""
     via: Pose | None = None
-    """What an arc leads over."""
+    """Via point of an arc."""
     place: float = 0.0
-    """Where in the plan the preview stands, 0 to 1."""
+    """Place of the preview in the plan, 0 to 1."""
     playing: bool = False
     notices: tuple[Toast, ...] = ()
-    """The newest of each page and of all pages together, oldest first: one page's never displace another's."""
+    """The newest of each page and of all pages together, oldest first: those of one page never displace others."""
     problems: Mapping[str, Message] = field(default_factory=lambda: MappingProxyType({}))
-    """What is wrong with typed numbers, by field."""
+    """Problems of typed numbers, by field."""
 
     @property
     def is_virtual(self) -> bool:
-        """Whether the robot is a virtual controller: nothing but numbers moves."""
+        """Whether the robot is a virtual controller: no hardware moves."""
         return self.target == "virtual"
 
     @property
     def notice(self) -> Toast | None:
-        """The newest notice, whomever it concerns."""
+        """The newest notice, for any page."""
         return self.notices[-1] if self.notices else None
 
     @property

@@ -1,4 +1,4 @@
-"""What an arm lacks, as page and notebook say it beside a control that is off."""
+"""What an arm lacks, as page and notebook explain it next to a disabled control."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 
-def tell_lack(model: RobotModel, feature: Feature) -> Message | None:
-    """Returns what an arm lacks for a feature and why; None: it has it."""
+def explain_lack(model: RobotModel, feature: Feature) -> Message | None:
+    """Returns what an arm lacks for a feature and why; None if it has the feature."""
     lack = find_lack(model, feature)
     if lack is None:
         return None
@@ -25,17 +25,17 @@ def tell_lack(model: RobotModel, feature: Feature) -> Message | None:
     return said
 
 
-def tell_lack_of_part(model: RobotModel, part: SetupPart) -> Message | None:
-    """Returns why a part of the configuration cannot be changed; None: it can.
+def explain_lack_of_part(model: RobotModel, part: SetupPart) -> Message | None:
+    """Returns why a part of the configuration cannot be changed; None if it can.
 
-    An arm that is only planned for can be given all of them: its plans and checks go by them.
+    An arm for which motions are only planned has all parts: its plans and checks use them.
     """
-    return None if is_only_planned(model) else tell_lack(model, part)
+    return None if is_only_planned(model) else explain_lack(model, part)
 
 
-def tell_lack_to_run(model: RobotModel, *, is_virtual: bool) -> Message | None:
-    """Returns why no motion of an arm can be run at the virtual controller, or at an address; None: it can."""
-    return tell_lack(model, "simulation" if is_virtual else "driving")
+def explain_lack_to_run(model: RobotModel, *, is_virtual: bool) -> Message | None:
+    """Returns why no motion of an arm can run at the virtual controller, or at an address; None if one can."""
+    return explain_lack(model, "simulation" if is_virtual else "driving")
 
 
 def is_only_planned(model: RobotModel) -> bool:
@@ -45,8 +45,8 @@ def is_only_planned(model: RobotModel) -> bool:
 
 
 def start_of_plans(model: RobotModel, status: ArmStatus) -> JointVector | None:
-    """Returns where a plan begins, [rad], shape (n,): where the arm is commanded to be; None: that is not known.
+    """Returns where a plan begins, the commanded joint angles, [rad], shape (n,); None if they are unknown.
 
-    The plans of an arm that is only planned for begin at its home.
+    The plans of an arm for which motions are only planned begin at its home pose.
     """
     return model.home if is_only_planned(model) else status.q_c

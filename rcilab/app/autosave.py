@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 _FORMAT, _VERSION = "rcilab workbench", 1
 Look: TypeAlias = Literal["language", "theme", "angle", "length"]
 _AT_FIRST: dict[Look, str] = {"language": "en", "theme": "light", "angle": "deg", "length": "mm"}
-_PAUSE = 1.0  # [s] Between two writings, during a drag.
+_PAUSE = 1.0  # [s] Minimum time between two writes, during a drag.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SavedState:
-    """What came back of one arm."""
+    """The restored values of one arm."""
 
     q: JointVector | None
-    """The goal, shape (n,), [rad]; None where the workbench was closed."""
+    """The goal, shape (n,), [rad]; None after a regular end of the workbench."""
     program: Program | None = None
     setup: RobotConfiguration = field(default_factory=RobotConfiguration)
-    """Those parts of the configuration that were edited."""
+    """The edited parts of the configuration."""
 
 
 def looks_of(state: UiState) -> dict[Look, str]:
-    """Returns what of the page's settings is not as at first, by the names in `SetView`."""
+    """Returns the page's settings that differ from their defaults, by the names in `SetView`."""
     looks: dict[Look, str] = {
         "language": state.language,
         "theme": state.theme,
@@ -51,21 +51,21 @@ def looks_of(state: UiState) -> dict[Look, str]:
 
 
 def autosave_file(port: int) -> Path:
-    """Returns where the workbench at a port keeps it: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
+    """Returns the file of the workbench at a port: in $XDG_STATE_HOME/rcilab, or ~/.local/state/rcilab."""
     home = os.environ.get("XDG_STATE_HOME", "")
     folder = Path(home) if os.path.isabs(home) else Path.home() / ".local" / "state"
     return folder / "rcilab" / f"workbench-{port}.json"
 
 
 class Autosave:
-    """Writes down how the page looks, and goal, program and configuration of every arm, when they have changed.
+    """Writes the view settings, and goal, program and configuration of every arm, when they have changed.
 
     Owned by the dispatcher's thread.
 
-    This file was not asked for, so where it cannot be written or read it is left out silently.
+    The operator did not ask for this file, so where it cannot be written or read it is skipped silently.
 
     Args:
-        file: Where; it belongs to the process that holds the port it is named for. None: nowhere.
+        file: The file; it belongs to the process that holds the port in its name. None: nothing is saved.
     """
 
     def __init__(self, file: Path | None) -> None:
@@ -76,7 +76,7 @@ class Autosave:
         self._next = 0.0
 
     def recall(self, model: RobotModel) -> SavedState | None:
-        """Returns what the workbench before kept of an arm, if the file can be understood."""
+        """Returns what the previous workbench saved of an arm, if the file is valid."""
         if self._file is None:
             return None
         try:
@@ -91,17 +91,17 @@ class Autosave:
             program = None if own["program"] is None else Program.from_json(own["program"])
             q = None if own.get("q") is None else readonly_copy(as_vector(own["q"], model.n, "q", "rad"))
             setup = build_setup(own.get("setup") or {})
-            setup.applied_to(model)  # A load that it cannot bear is not brought back.
+            setup.applied_to(model)  # A load above the arm's payload is not restored.
             return SavedState(q=q, program=program, setup=setup)
         except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError, RcilabError):
             return None
 
     def recall_looks(self) -> dict[Look, str]:
-        """Returns the settings of the page that were chosen, by their names in `SetView`; after `recall`."""
+        """Returns the saved settings of the page, by their names in `SetView`; after `recall`."""
         return dict(self._looks)
 
     def recall_setups(self, model: RobotModel) -> dict[str, RobotConfiguration]:
-        """Returns the edited set-ups of the arms that were chosen before this one, by name; after `recall`."""
+        """Returns the edited configurations of the other arms, by name; after `recall`."""
         found: dict[str, RobotConfiguration] = {}
         for name, own in self._arms.items():
             with suppress(ValueError, LookupError, TypeError, AttributeError, RcilabError):
@@ -121,7 +121,7 @@ class Autosave:
         return tuple(found)
 
     def keep(self, state: UiState) -> None:
-        """Writes down what is new, at most once a second."""
+        """Writes changes, at most once a second."""
         now = time.monotonic()
         content = (
             state.model.name,
@@ -146,7 +146,7 @@ class Autosave:
             self._write(self._arms)
 
     def close(self, state: UiState) -> None:
-        """Forgets goals: the workbench was closed on purpose. What belongs to an arm stays, and view settings."""
+        """Forgets goals, at a regular end of the workbench. Programs, configurations and view settings are kept."""
         if self._file is None:
             return
         self._next = 0.0

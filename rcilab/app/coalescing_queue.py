@@ -1,4 +1,4 @@
-"""The one queue between the page's callbacks and the thread that acts on them."""
+"""The queue between the page's callbacks and the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ T = TypeVar("T")
 
 
 class CoalescingQueue(Generic[T]):
-    """A queue in which a newer request can replace an older one that has not been taken yet.
+    """A queue in which a newer request can replace a waiting older one.
 
-    While a gizmo is dragged, twenty positions a second arrive; only the newest is worth solving.
+    During a drag, twenty positions per second arrive; only the newest needs a solution.
     """
 
     def __init__(self) -> None:
@@ -20,11 +20,11 @@ class CoalescingQueue(Generic[T]):
         self._waiting: deque[tuple[str | None, T]] = deque()
 
     def put(self, request: T, key: str | None = None) -> None:
-        """Adds a request at the end and returns at once.
+        """Appends a request and returns at once.
 
         Args:
-            request: What is asked for.
-            key: When the newest waiting request has the same key, it is replaced.
+            request: The request.
+            key: The newest waiting request with the same key is replaced.
         """
         with self._condition:
             if key is not None and self._waiting and self._waiting[-1][0] == key:
@@ -34,7 +34,7 @@ class CoalescingQueue(Generic[T]):
             self._condition.notify()
 
     def take(self, timeout: float) -> T | None:
-        """Returns the oldest request, or None when none came within `timeout`, [s]."""
+        """Returns the oldest request, or None if none came within `timeout`, [s]."""
         with self._condition:
             if not self._waiting:
                 self._condition.wait(timeout)

@@ -1,4 +1,4 @@
-"""What the application asks of a robot, whether a control process or a session drives it. Nothing here waits."""
+"""The interface of a robot that a control process or a session drives. Nothing here waits."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class Robot(Protocol):
-    """Takes requests. `rcilab.control_process.Supervisor` is one."""
+    """Takes requests; `rcilab.control_process.Supervisor` is an implementation."""
 
     @property
     def scaled_motion(self) -> SpeedScaledMotion | None:
-        """The motion in progress, or the last one, with its speed override; None where the run itself holds it."""
+        """The motion in progress, or the last one, with its speed override; None if the run itself holds it."""
         ...
 
     def power_on(self) -> PendingRequest:
@@ -54,11 +54,11 @@ class Robot(Protocol):
         ...
 
     def pause(self) -> PendingRequest:
-        """Holds the motion in progress."""
+        """Pauses the motion in progress."""
         ...
 
     def set_up(self, setup: RobotConfiguration) -> PendingRequest:
-        """Sends tool, load, limits or parameters; the status has what the controller acknowledged."""
+        """Sends tool, load, limits or parameters; the status has the acknowledged values."""
         ...
 
     def set_output(self, signal: int, level: bool) -> PendingRequest:
@@ -74,25 +74,25 @@ class Robot(Protocol):
         ...
 
     def drain(self) -> NDArray[np.void]:
-        """Returns the cycles since the last call, where the robot does not record a run itself."""
+        """Returns the cycles since the last call if the robot does not record a run itself."""
         ...
 
 
 class Connection(Protocol):
-    """The robot of the moment."""
+    """The current robot."""
 
     def status(self) -> SupervisorStatus:
         """Returns its status."""
         ...
 
     def supervisor(self) -> Robot:
-        """Returns what takes requests.
+        """Returns the object that takes requests.
 
         Raises:
-            StartingError: It is not there yet.
+            StartingError: The control process has not started yet.
         """
         ...
 
     def take_run(self) -> Run | None:
-        """Returns the last run of `execute` if the robot recorded it itself; None: it is made of drained cycles."""
+        """Returns the last run of `execute` if the robot recorded it itself; None: it is built from drained cycles."""
         ...

@@ -1,4 +1,4 @@
-"""Pages that come, go, fall silent and ask for the controls. Owned by the dispatcher's thread."""
+"""Pages that open, close, fall silent and ask for the controls. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from rcilab.i18n.translator import message
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakeControls(Request):
-    """This page wants the controls."""
+    """A page asks for the controls."""
 
     needs_control: ClassVar[bool] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Refuse(Request):
-    """A page without the controls has tried to use one."""
+    """A page without the controls has used a control."""
 
     needs_control: ClassVar[bool] = False
 
@@ -34,7 +34,7 @@ class Refuse(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerControls(Request):
-    """The page that holds the controls was asked for them."""
+    """The answer of the holder to a page that asked for the controls."""
 
     needs_control: ClassVar[bool] = False
 
@@ -50,18 +50,18 @@ class PageOpened(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageClosed(Request):
-    """A page has gone."""
+    """A page has closed."""
 
     needs_control: ClassVar[bool] = False
 
 
 class ControlLockActions:
-    """Hands the controls from page to page.
+    """Passes the controls from page to page.
 
     Args:
-        store: Where the lease is.
-        session: Whether the arm moves.
-        presence: When pages were last heard of.
+        store: Has the lock.
+        session: The robot; it reports whether the arm moves.
+        presence: When each page last sent a heartbeat.
     """
 
     def __init__(self, store: Store, session: RobotConnection, presence: ClientHeartbeat) -> None:
@@ -69,7 +69,7 @@ class ControlLockActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             TakeControls: self.take_controls,
             AnswerControls: self.answer,
@@ -78,63 +78,65 @@ class ControlLockActions:
         }
 
     def page_came(self, request: PageOpened) -> None:
-        """Notes a page; it gets the controls when no page has them."""
+        """Registers a page; it gets the controls if no page has them."""
         if request.page is not None:
             self._presence.came(request.page)
-            self._store.update(lease=self._store.state.lease.arrive(request.page))
+            self._store.update(control_lock=self._store.state.control_lock.arrive(request.page))
 
     def page_went(self, request: PageClosed) -> None:
-        """Notes that a page has gone. Without a holder no sign of life reaches the robot: a motion ends after 2 s."""
+        """Removes a page. Without a holder no heartbeat reaches the robot: a motion ends after 2 s."""
         if request.page is not None:
             self._presence.went(request.page)
-            self._store.update(lease=self._store.state.lease.leave(request.page, self._presence.now()))
+            self._store.update(control_lock=self._store.state.control_lock.leave(request.page, self._presence.now()))
             self._store.forget_page(request.page)
 
     def take_controls(self, request: TakeControls) -> None:
         """Gives a page free controls, or asks their holder."""
-        page, lease = request.page, self._store.state.lease
-        if page is None or lease.allows(page) or lease.asking == page:
+        page, lock = request.page, self._store.state.control_lock
+        if page is None or lock.allows(page) or lock.asking == page:
             return
-        after = lease.ask(page, self._presence.now())
-        self._store.update(lease=after)
+        after = lock.ask(page, self._presence.now())
+        self._store.update(control_lock=after)
         if after.holder == page:
             self._store.say("good", message("notice.taken", page=after.number(page)))
         elif after.asking == page:
-            self._store.say("good", message("lease.asked", page=lease.number(page), holder=lease.number(lease.holder)))
+            self._store.say(
+                "good", message("control_lock.asked", page=lock.number(page), holder=lock.number(lock.holder))
+            )
         else:
-            self._store.say("warn", message("lease.busy", page=lease.number(lease.asking)), page=page)
+            self._store.say("warn", message("control_lock.busy", page=lock.number(lock.asking)), page=page)
 
     def answer(self, request: AnswerControls) -> None:
-        """Hears whether the holder hands over."""
-        lease = self._store.state.lease
-        if request.page is None or request.page != lease.holder or lease.asking is None:
+        """Takes the answer of the holder."""
+        lock = self._store.state.control_lock
+        if request.page is None or request.page != lock.holder or lock.asking is None:
             return
-        asking = lease.number(lease.asking)
-        self._store.update(lease=lease.answer(request.page, request.yes))
-        said = message("notice.taken", page=asking) if request.yes else message("lease.kept", page=asking)
+        asking = lock.number(lock.asking)
+        self._store.update(control_lock=lock.answer(request.page, request.yes))
+        said = message("notice.taken", page=asking) if request.yes else message("control_lock.kept", page=asking)
         self._store.say("good" if request.yes else "warn", said)
 
     def tick(self) -> None:
-        """Does what time asks for: a silent holder loses the controls, an unanswered question counts as yes."""
-        lease, now = self._store.state.lease, self._presence.now()
-        if lease.holder is not None and self._presence.is_silent(lease.holder):
-            silent = lease.number(lease.holder)
-            lease = self._store.update(lease=lease.fall_silent(now)).lease
-            if len(lease.pages) > 1:
-                self._store.say("warn", message("lease.silent", page=silent))
-        if lease.holder is not None and lease.is_overdue(now) and not is_moving(self._session.status()):
-            taken = lease.number(lease.asking)
-            lease = self._store.update(lease=lease.answer(lease.holder, yes=True)).lease
-            self._store.say("warn", message("lease.unanswered", page=taken))
-        if lease.holder is None and lease.pages:
+        """Handles timeouts: a silent holder loses the controls, a request without an answer is granted."""
+        lock, now = self._store.state.control_lock, self._presence.now()
+        if lock.holder is not None and self._presence.is_silent(lock.holder):
+            silent = lock.number(lock.holder)
+            lock = self._store.update(control_lock=lock.fall_silent(now)).control_lock
+            if len(lock.pages) > 1:
+                self._store.say("warn", message("control_lock.silent", page=silent))
+        if lock.holder is not None and lock.is_overdue(now) and not is_moving(self._session.status()):
+            taken = lock.number(lock.asking)
+            lock = self._store.update(control_lock=lock.answer(lock.holder, yes=True)).control_lock
+            self._store.say("warn", message("control_lock.unanswered", page=taken))
+        if lock.holder is None and lock.pages:
             self._find_holder(now)
 
     def _find_holder(self, now: float) -> None:
-        """Gives free controls back to the page that had them, or to the only one once the arm stands."""
-        lease = self._store.state.lease
-        if lease.former is not None and not self._presence.is_silent(lease.former):
-            self._store.update(lease=lease.take(lease.former))
-        elif len(lease.pages) == 1 and now - lease.since > OPERATOR_TIMEOUT and not is_moving(self._session.status()):
-            only = lease.pages[0]
+        """Returns free controls to their former holder, or to the only page once the arm stands still."""
+        lock = self._store.state.control_lock
+        if lock.former is not None and not self._presence.is_silent(lock.former):
+            self._store.update(control_lock=lock.take(lock.former))
+        elif len(lock.pages) == 1 and now - lock.since > OPERATOR_TIMEOUT and not is_moving(self._session.status()):
+            only = lock.pages[0]
             if not self._presence.is_silent(only):
-                self._store.update(lease=lease.take(only))
+                self._store.update(control_lock=lock.take(only))

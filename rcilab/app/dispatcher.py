@@ -1,4 +1,4 @@
-"""The one thread that acts: takes requests from the mailbox, validates them, and exchanges the state."""
+"""The thread that acts: it takes requests from the queue, validates them, and replaces the state."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
 from rcilab.app.setup.configuration_state import name_parts
 from rcilab.app.setup.setup_actions import SetupActions, is_setup_field
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.app.view_actions import DrawInSoftware, SetView, ViewActions
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import memory_needed
 from rcilab.i18n.translator import message
 
-_TICK = 0.03  # [s] About the display's rate; also how often the robot is looked at.
-_AGAIN = 1.0  # [s] A page that acts without the controls is answered once in that time.
+_TICK = 0.03  # [s] About the display's rate; also the interval between two looks at the robot.
+_AGAIN = 1.0  # [s] Minimum time between two answers to a page that acts without the controls.
 
 
 class Dispatcher:
-    """Owns the state and the session; everything else only reads snapshots.
+    """Owns the state and the session; all others read snapshots.
 
     Args:
         store: The state.
-        session: The robot side.
+        session: The robot.
         deliver: Sends a file to a page.
-        autosave: Where goal and program are written down for the case of a crash; None: nowhere.
-        presence: When pages were last heard of.
+        autosave: Saves goal and program for a restart after a crash; None: nothing is saved.
+        presence: When each page last sent a heartbeat.
     """
 
     def __init__(
@@ -78,21 +78,21 @@ class Dispatcher:
         self._check = CheckActions(store, session, self._goal, self._program)
         self._learn = LearnActions(store, session)
         self._view = ViewActions(store)
-        self._lease = ControlLockActions(store, session, presence or ClientHeartbeat())
+        self._control_lock = ControlLockActions(store, session, presence or ClientHeartbeat())
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
         self._mailbox: CoalescingQueue[Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
-        self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Of page and holder, when: [s].
-        self._refused_for: int | None = None  # Who held the controls when another page was last refused.
+        self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Page and holder -> time, [s].
+        self._refused_for: int | None = None  # Holder when another page was last refused.
         self.errors = Failures()
-        """Failures of our own code; one a second at most is printed and shown on the page."""
+        """Failures of our own code; at most one a second is printed and shown on the page."""
         features = (
             self._goal, self._poses, self._scene, self._setup, self._jog, self._push, self._program,
             self._program.editing, self._check, self._learn, self.robot, self._where, self._mode, self._world,
-            self._signals, self._view, self._export, self._folder, self._lease,
+            self._signals, self._view, self._export, self._folder, self._control_lock,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
         self._handlers |= {TypeField: self._type_field, RobotCommand: self._drive, Refuse: self._refuse}
@@ -104,10 +104,10 @@ class Dispatcher:
         self._mailbox.put(request, request.replaces)
 
     def resume(self, *, language: str | None = None) -> None:
-        """Brings back what the workbench before this one had; before `start`.
+        """Restores the state of the previous workbench; before `start`.
 
         Args:
-            language: The one that was asked for this time; None is the one that was chosen last.
+            language: The language of this start; None: the one chosen last.
         """
         kept = self._autosave.recall(self._store.state.model)
         for name, value in self._autosave.recall_looks().items():
@@ -143,9 +143,9 @@ class Dispatcher:
         self._autosave.close(self._store.state)
 
     def act(self, request: Request) -> None:
-        """Carries out one request; what goes wrong becomes a sentence on the page."""
-        lease = self._store.state.lease
-        if request.needs_control and not lease.allows(request.page) and not _is_stop(request):
+        """Carries out one request; an error becomes a message on the page."""
+        lock = self._store.state.control_lock
+        if request.needs_control and not lock.allows(request.page) and not _is_stop(request):
             if not request.is_silent:
                 self._refuse(request)
             return
@@ -155,13 +155,13 @@ class Dispatcher:
         self._guard(lambda: self._handlers[type(request)](request))
 
     def tick(self, elapsed: float) -> None:
-        """Does what time asks for: the preview plays on, the robot is looked at, a plan completed."""
+        """Does periodic work: advances the preview, reads the robot's status, completes a plan."""
         self._view.advance(elapsed)
-        self._lease.tick()
-        if self._store.state.lease.holder != self._refused_for:
-            self._store.settle("lease")
+        self._control_lock.tick()
+        if self._store.state.control_lock.holder != self._refused_for:
+            self._store.settle("control_lock")
         event = self.robot.watch()
-        if event == "placed" and self._store.state.plan is None:  # A plan may be quicker than this look at the arm.
+        if event == "placed" and self._store.state.plan is None:  # A plan may be quicker than this status.
             self._goal.plan()
         elif event == "rested":
             self._goal.catch_up()
@@ -196,18 +196,18 @@ class Dispatcher:
             self._store.say("good", message("setup.back", what=name_parts(tuple(back)), model=name))
 
     def _refuse(self, request: Request) -> None:
-        """Informs a page that it is a spectator, unless it has got the controls meanwhile."""
-        lease = self._store.state.lease
+        """Informs a page that it is a spectator, unless it has the controls by now."""
+        lock = self._store.state.control_lock
         now = time.monotonic()
-        refused = (request.page, lease.holder)
-        if lease.allows(request.page) or now - self._refused_at.get(refused, -_AGAIN) < _AGAIN:
+        refused = (request.page, lock.holder)
+        if lock.allows(request.page) or now - self._refused_at.get(refused, -_AGAIN) < _AGAIN:
             return
         self._refused_at = {key: at for key, at in self._refused_at.items() if now - at < _AGAIN}
         self._refused_at[refused] = now
-        self._refused_for = lease.holder
-        code = "lease.free" if lease.holder is None else "notice.watching"
-        said = message(code, page=lease.number(lease.holder))
-        self._store.say("warn", said, page=request.page, trouble="lease")
+        self._refused_for = lock.holder
+        code = "control_lock.free" if lock.holder is None else "notice.watching"
+        said = message(code, page=lock.number(lock.holder))
+        self._store.say("warn", said, page=request.page, trouble="control_lock")
 
     def _drive(self, request: RobotCommand) -> None:
         if request.what == "pause":
@@ -241,14 +241,14 @@ class Dispatcher:
                 self._store.changed.set()
 
     def _guard(self, action: Callable[[], None], trouble: str = "") -> None:
-        """Shows what goes wrong with an action; with a `trouble`, once until the action succeeds again."""
+        """Shows the error of an action; with a `trouble`, once until the action succeeds again."""
         try:
             with memory_needed():
                 action()
         except RcilabError as error:
             if not trouble or all(notice.trouble != trouble for notice in self._store.state.notices):
-                self._store.say("bad", tell_error(error), trouble=trouble)
-        except Exception as error:  # A bug of ours must neither end the thread nor stay unseen.
+                self._store.say("bad", explain_error(error), trouble=trouble)
+        except Exception as error:  # A bug of ours must neither end the thread nor stay unnoticed.
             if self.errors.report(error):
                 self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
@@ -261,6 +261,6 @@ def _is_stop(request: Request) -> bool:
 
 
 def _reloads_pages(request: Request) -> bool:
-    """Returns whether pages load themselves again for a request; a motion would stop for want of a page."""
+    """Returns whether pages reload for a request; a motion would stop, as no page is open meanwhile."""
     is_graphics = isinstance(request, SetView) and request.name == "quality"
     return is_graphics or isinstance(request, DrawInSoftware)

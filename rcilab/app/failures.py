@@ -1,4 +1,4 @@
-"""Failures of our own code: all are counted, and one a second at most is printed, however often a loop repeats it."""
+"""Failures of our own code: all are counted, and at most one a second is printed."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import time
 import traceback
 from collections.abc import Callable
 
-_PAUSE = 1.0  # [s] A tuning value: a loop that fails at the display's rate fills no disk.
-_MOST = 100  # A tuning value: the first ones tell the most.
+_PAUSE = 1.0  # [s] A tuning value: a loop that fails at the display's rate must not fill the disk.
+_MOST = 100  # A tuning value: the first failures matter most.
 
 
 class Failures(list[BaseException]):
-    """The first failures, for tests. One thread adds them.
+    """The first failures, for tests. Written by one thread.
 
     Args:
         clock: Returns the time, [s].
@@ -24,7 +24,7 @@ class Failures(list[BaseException]):
         self._printed = float("-inf")
 
     def report(self, error: Exception) -> bool:
-        """Keeps a failure; returns whether it was printed, too: not if another one was within the last second."""
+        """Keeps a failure; returns whether it was printed, too: not within a second after another one."""
         if len(self) < _MOST:
             self.append(error)
         now = self._clock()

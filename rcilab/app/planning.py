@@ -1,4 +1,4 @@
-"""From a goal to a checked motion: what every change of the goal runs, many times a second during a drag."""
+"""From a goal to a checked motion: runs after every change of the goal, many times a second during a drag."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 PathKind = Literal["joint", "line", "arc"]
 PATH_KINDS: tuple[PathKind, ...] = get_args(PathKind)
 
-SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm is where the arm is.
-SAME_WAY = 1e-3  # [rad] Beyond it a line ends in another way of standing than the one that was wanted.
+SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm counts as the arm's position.
+SAME_WAY = 1e-3  # [rad] At a larger distance a line ends in another branch than the requested one.
 PATH_POINTS = 120
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """A motion, its report, and what views draw of it."""
+    """A motion, its report, and the data that views draw."""
 
     motion: Motion
     report: Report
@@ -47,38 +47,38 @@ class Plan:
     path: Array = field(repr=False)
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
-    """How much of its velocity limit the busiest joint uses at each of these positions, 0 to 1, shape (N,)."""
+    """Utilisation of the velocity limit by the busiest joint at each of these positions, 0 to 1, shape (N,)."""
     short: Message | None = None
-    """How far short of the target it ends, in words; None when it leads there."""
+    """How far from the target it ends, as a message; None if it reaches the target."""
     program: Program | None = None
-    """The program that the motion goes through; None where it leads to the goal."""
+    """The program of the motion; None if it leads to the goal."""
     mode: Mode = "joint_position"
     """The mode it was checked for."""
     kind: PathKind = "joint"
-    """How the tool goes, where it is no program."""
+    """Path type, if it is not a program."""
     note: Message | None = None
-    """What else is to be said about where it ends."""
+    """Further message about its end."""
     complete: bool = False
-    """Whether collisions were checked, too. During a drag they are not: it would halve the rate."""
+    """Whether collisions were checked, too. Not during a drag: the check would halve the rate."""
 
     @property
     def starts_at(self) -> JointVector:
-        """Joint angles it must be executed from, [rad]."""
+        """Joint angles at which it must be executed, [rad]."""
         return self.motion.start
 
     def completed(self, mode: Mode = "joint_position") -> Plan:
-        """Returns this plan with a report on all conditions of a mode, collisions too: what may be executed."""
+        """Returns this plan with a report on all conditions of a mode, with collisions, as execution requires it."""
         if self.complete and self.mode == mode:
             return self
         report = check(self.motion, self.model, box=self.box, mode=mode)
         return replace(self, report=report, mode=mode, complete=True)
 
     def stale_parts(self, model: RobotModel, box: SafetyBox | None) -> tuple[str, ...]:
-        """Returns what has changed since the plan was checked, as certificates name it: tool, load, joint limits, box.
+        """Returns what has changed since the plan was checked, as in certificates: tool, load, joint limits, box.
 
         Args:
-            model: The arm as it is now.
-            box: The safety box that is in force now; without one, a plan that was kept inside a box is as good.
+            model: The current arm.
+            box: The current safety box; without one, a plan that was checked with a box still holds.
         """
         then, now = self.model.fingerprint, model.fingerprint
         changed = [part for part in ("tool", "load") if then[part] != now[part]]
@@ -95,7 +95,7 @@ class Plan:
 
 
 def tool_path(model: RobotModel, motion: Motion) -> Array:
-    """Returns where the tool is at `PATH_POINTS` moments of a motion, shape (N, 3), [m]."""
+    """Returns the positions of the tool at `PATH_POINTS` times of a motion, shape (N, 3), [m]."""
     return model.position_path(motion.q[sampled_rows(motion)])
 
 
@@ -109,7 +109,7 @@ def make_plan(
     kind: PathKind = "joint",
     via: Pose | None = None,
 ) -> Plan | Message:
-    """Returns a motion from start to goal, checked except for collisions, or why none was found."""
+    """Returns a motion from start to goal, checked except for collisions, or why there is none."""
     for place, q in (("start", start), ("goal", goal)):
         joint = find_outside(model, q)
         if joint is not None:
@@ -131,7 +131,7 @@ def make_plan(
 
 
 def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None = None) -> Plan | Message:
-    """Returns the motion that leads joints and tool back inside, checked but for collisions, or why none does."""
+    """Returns the motion that leads joints and tool back inside, checked except for collisions, or why none does."""
     try:
         motion = plan_recovery(model, start, box)
         report = check(motion, model, start=start, box=box, distance=None)
@@ -141,7 +141,7 @@ def make_recovery(model: RobotModel, start: JointVector, box: SafetyBox | None =
 
 
 def find_outside(model: RobotModel, q: JointVector) -> int | None:
-    """Returns the first joint, counted from 1, that is not strictly inside its range; None when all are."""
+    """Returns the first joint, from 1, that is not strictly inside its range; None if all are."""
     outside = np.flatnonzero(~((model.limits.joint.lower < q) & (q < model.limits.joint.upper)))
     return int(outside[0]) + 1 if outside.size else None
 
@@ -177,13 +177,13 @@ def _go(
 
 
 def build_plan_view(model: RobotModel, motion: Motion, report: Report, box: SafetyBox | None = None) -> Plan:
-    """Returns a checked motion with what views draw of it."""
+    """Returns a checked motion with the data that views draw."""
     effort = np.abs(motion.dq[sampled_rows(motion)] / model.limits.joint.velocity).max(axis=1)
     return Plan(motion=motion, report=report, path=tool_path(model, motion), effort=effort, model=model, box=box)
 
 
 def sampled_rows(motion: Motion) -> NDArray[np.intp]:
-    """Returns the rows of a motion at `PATH_POINTS` moments, the first and the last among them."""
+    """Returns the rows of a motion at `PATH_POINTS` times, with the first and the last."""
     times = np.linspace(0.0, motion.duration, PATH_POINTS)
     return np.minimum((times / CYCLE_TIME).astype(np.intp), len(motion.times) - 1)
 

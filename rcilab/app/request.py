@@ -1,4 +1,4 @@
-"""What a user interface can ask the application for: frozen values that each feature declares next to its handlers."""
+"""The requests of a user interface to the application: frozen values that each feature declares with its handlers."""
 
 from __future__ import annotations
 
@@ -9,32 +9,32 @@ from typing import Any, ClassVar, TypeAlias
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
-    """Anything a page asks for."""
+    """A request of a page."""
 
     page: int | None = None
     """Client id of the page; None for requests of the application itself."""
     needs_control: ClassVar[bool] = True
-    """Whether only the page that holds the controls may ask for it."""
+    """Whether only the page with the controls may send it."""
     is_silent: ClassVar[bool] = False
-    """Whether a page sends it without a press of the operator: it is not answered where it may not be asked for."""
+    """Whether a page sends it without an action of the operator: it is then refused without an answer."""
 
     @property
     def replaces(self) -> str | None:
-        """Names the waiting requests that this one replaces: those of one drag or slider. None: it replaces none."""
+        """Key of the waiting requests that this one replaces: those of one drag or slider. None: none."""
         return None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moving(Request):
-    """A request that may set the robot in motion. A stop that comes before it has done so cancels it."""
+    """A request that may set the robot in motion. An earlier stop cancels it."""
 
     stops: int | None = None
-    """Stops that the robot side had received when the page asked; None: as many as when it is carried out."""
+    """Number of stops that the robot had received when the page sent it; None: as many as when it is carried out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TypeField(Request):
-    """The text of a number field; the part of its name before the first dot names the feature that takes it."""
+    """The text of a number field; the part of its name before the first dot names the feature."""
 
     field: str
     """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup.fields`)."""
@@ -42,4 +42,4 @@ class TypeField(Request):
 
 
 Handlers: TypeAlias = Mapping[type[Request], Callable[[Any], None]]
-"""What a feature does for each of its requests."""
+"""The handlers of a feature's requests."""

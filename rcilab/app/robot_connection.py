@@ -1,4 +1,4 @@
-"""The robot that a control process of our own drives: one supervisor at a time, exchanged without waiting for it."""
+"""The robot that our control process drives: one supervisor at a time, replaced without waiting for it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rcilab.app.arm_features import tell_lack_to_run
+from rcilab.app.arm_features import explain_lack_to_run
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.core.errors import RcilabError, UsageError
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 class RobotConnection:
-    """Starts, exchanges and closes the supervisor in a thread of its own.
+    """Starts, replaces and closes the supervisor in a separate thread.
 
     Args:
-        on_failure: Called with the error when a supervisor could not be started; from a foreign thread.
+        on_failure: Called with the error if a supervisor could not be started; from that thread.
     """
 
     def __init__(self, on_failure: Callable[[RcilabError], None]) -> None:
         self._on_failure = on_failure
         self._lock = threading.Lock()
         self._current: Supervisor | None = None
-        self._shown: Supervisor | None = None  # Whose states belong to the model of now.
-        self._ready: Supervisor | None = None  # Only what start() has built; requests go here.
+        self._shown: Supervisor | None = None  # The one of the current model.
+        self._ready: Supervisor | None = None  # Only one that start() has built; it takes requests.
         self._generation = 0
         self._worker: threading.Thread | None = None
         self.name = ""
@@ -40,14 +40,14 @@ class RobotConnection:
     def open(
         self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
     ) -> None:
-        """Closes what is open and starts a supervisor for this arm, destination and plant; returns at once.
+        """Closes the open supervisor and starts one for this arm, destination and plant; returns at once.
 
-        For an arm that cannot be run there, nothing is started: see `tell_lack_to_run`.
+        For an arm that cannot run there, nothing is started: see `explain_lack_to_run`.
 
         Raises:
             UsageError: Memory is short.
         """
-        if tell_lack_to_run(model, is_virtual=target == "virtual") is not None:
+        if explain_lack_to_run(model, is_virtual=target == "virtual") is not None:
             self.disconnect()
             self.name = target
             return
@@ -59,7 +59,7 @@ class RobotConnection:
             self._work(self._exchange, generation, previous, model, target, plant, setup)
 
     def disconnect(self) -> None:
-        """Closes what is open and starts nothing; returns at once, `status` is "closed" from then on."""
+        """Closes the open supervisor and starts nothing; returns at once, `status` is "closed" from then on."""
         with self._lock:
             self._generation += 1
             previous = self._worker
@@ -68,7 +68,7 @@ class RobotConnection:
             self._work(self._let_go, previous)
 
     def close(self) -> None:
-        """Ends the supervisor and waits for its processes to go."""
+        """Ends the supervisor and waits for the end of its processes."""
         with self._lock:
             self._generation += 1
             worker, self._ready = self._worker, None
@@ -80,47 +80,47 @@ class RobotConnection:
             current.close()
 
     def status(self) -> SupervisorStatus:
-        """Returns the supervisor's snapshot; "starting" before the first."""
+        """Returns the supervisor's snapshot; "starting" before the first one."""
         shown = self._shown
         if shown is not None:
             return shown.status()
         if self._worker is None or self._is_apart:
-            return SupervisorStatus()  # No connection was asked for.
+            return SupervisorStatus()  # No connection is wanted.
         return SupervisorStatus(phase="starting", code="starting", target=self.name)
 
     @property
     def is_ready(self) -> bool:
-        """Whether `supervisor` has one to ask; its status may show an idle arm a moment earlier."""
+        """Whether `supervisor` returns one; its status may show an idle arm a moment earlier."""
         return self._ready is not None
 
     def supervisor(self) -> Supervisor:
-        """Returns the supervisor to ask something of.
+        """Returns the supervisor for requests.
 
         Raises:
-            StartingError: It is not there yet.
+            StartingError: It has not started yet.
         """
         ready, shown = self._ready, self._shown
         if ready is None and shown is not None and shown.status().phase == "idle":
-            return shown  # What the page shows as ready is ready, even while start() is about to return.
+            return shown  # What the page shows as ready is ready, even just before start() returns.
         if ready is None:
             raise StartingError("the control process is still starting; try again in a moment")
         return ready
 
     def take_run(self) -> None:
-        """Returns None: a run is made of the cycles that are drained."""
+        """Returns None: a run is built from the drained cycles."""
 
     def stop(self) -> None:
-        """Stops a motion. Callable from any thread, never waits: the fast lane of Stop and Esc."""
+        """Stops a motion. Callable from any thread, never waits: the direct path of Stop and Esc."""
         current = self._current
         if current is not None:
             with suppress(
                 RcilabError
-            ):  # It is closed or has no connection: nothing of ours moves, and status says why.
+            ):  # It is closed or has no connection: nothing of ours moves, and the status explains why.
                 current.stop()
 
     @property
     def stops(self) -> int:
-        """How often the present supervisor was stopped; 0 without one."""
+        """Number of stops of the current supervisor; 0 without one."""
         current = self._current
         return 0 if current is None else current.stops
 
@@ -173,7 +173,7 @@ class RobotConnection:
         except RcilabError as error:
             with self._lock:
                 if generation == self._generation:
-                    self._is_apart = True  # Else a supervisor that could not even be made would be starting for ever.
+                    self._is_apart = True  # Else a supervisor whose creation failed would be starting for ever.
             self._on_failure(error)
             return
         with self._lock:

@@ -1,4 +1,4 @@
-"""The robot that a session drives in this process, asked as `RobotConnection` is."""
+"""The robot that a session drives in this process, with the interface of `RobotConnection`."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from rcilab.motion.motion import Motion
     from rcilab.recording.run import Run
 
-_FRESH = 0.04  # [s] A state that is younger is not asked for again.
-_LOST_LOOK = 1.0  # [s] Between two looks at a connection that is lost.
-_WAIT = 0.2  # [s] For a state that was asked for.
-_POWER_LOOK = 1.0  # [s] Between two queries of motor power; the state does not have it.
+_FRESH = 0.04  # [s] A younger state is not requested again.
+_LOST_LOOK = 1.0  # [s] Between two checks of a lost connection.
+_WAIT = 0.2  # [s] Maximum wait for a requested state.
+_POWER_LOOK = 1.0  # [s] Between two queries of motor power, which the state does not contain.
 
 
 class BusyError(UsageError):
-    """Something was asked of a robot while another request was in progress.
+    """A request to a robot while another one is in progress.
 
     Attributes:
         in_progress: Name of that request.
@@ -44,7 +44,7 @@ class BusyError(UsageError):
 
 
 class SessionConnection:
-    """A session: its motions run in this process. It stays open when this ends.
+    """A session: its motions run in this process. It stays open after the end of this object.
 
     Args:
         session: From `connect` or `simulate`.
@@ -59,21 +59,21 @@ class SessionConnection:
         self._cell_runs: list[tuple[Run, RcilabError | None]] = []
         self._no_cycles: NDArray[np.void] = np.zeros(0, cycle_dtype(session.model.n))
         self._progress: MotionProgress | None = None  # Of the running or last motion.
-        self._run: Run | None = None  # Of the last motion that was started here.
+        self._run: Run | None = None  # The last motion that was started here.
         self._is_cells = False
         self._remove_listener = session.on_run(self._on_run)
         self._powered: bool | None = None
-        self._held = RobotConfiguration()  # What was sent from here.
+        self._held = RobotConfiguration()  # The configuration that was sent from here.
         self._inputs: tuple[bool, ...] | None = None
         self._outputs: tuple[bool | None, ...] = (None,) * len(
             capabilities_of(session.model).outputs
-        )  # What was set from here.
+        )  # The configuration that was set from here.
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
 
     def status(self) -> SupervisorStatus:
-        """Returns its status, from a state of this moment; from the last one while another cell moves the arm."""
+        """Returns its status, from a new state; from the last one while another cell moves the arm."""
         age = time.monotonic() - self._looked
         if age > (_LOST_LOOK if self._last.phase == "lost" else _FRESH):
             self._last = self._look()
@@ -82,12 +82,12 @@ class SessionConnection:
 
     @property
     def is_cells(self) -> bool:
-        """Whether what moves was started by a cell."""
+        """Whether a cell has started the motion in progress."""
         return self._is_cells
 
     @property
     def planned(self) -> float:
-        """Where the plan of the running or last motion ends, [s]; 0 where that is unknown."""
+        """Duration of the plan of the running or last motion, [s]; 0 if it is unknown."""
         return 0.0 if self._progress is None else self._progress.plan_duration
 
     def _look(self) -> SupervisorStatus:
@@ -98,7 +98,7 @@ class SessionConnection:
         is_moving = way is not None or is_ours or self._session.is_moving
         self._is_cells = is_moving and not is_ours
         if self._is_cells and way is None:
-            self._progress = None  # How far a callback is, is unknown.
+            self._progress = None  # The progress of a callback is unknown.
         self._progress = way = way or self._progress
         try:
             state = self._session.state if is_moving else self._session.receive_state(_WAIT, max_age=_FRESH)
@@ -106,7 +106,7 @@ class SessionConnection:
                 self._ask_power()
         except ConnectionLostError as error:
             return SupervisorStatus(phase="lost", code="lost.silent", message=str(error), target=self.name)
-        except UsageError:  # A cell has just begun to move the arm, or closed the session.
+        except UsageError:  # A cell has just started a motion, or closed the session.
             return self._last
         phase = "fault" if state.faults else "moving" if is_moving else "idle"
         is_held = phase == "moving" and way is not None and way.speed_override == 0.0
@@ -133,24 +133,24 @@ class SessionConnection:
         )
 
     def supervisor(self) -> SessionConnection:
-        """Returns this object: it takes the requests itself."""
+        """Returns this object, which takes the requests itself."""
         return self
 
     @property
     def scaled_motion(self) -> None:
-        """None: the run of a session holds the motion as it was run."""
+        """None: the run of a session holds the executed motion."""
 
     def drain(self) -> NDArray[np.void]:
         """Returns no cycles: a session records its runs itself."""
         return self._no_cycles
 
     def take_run(self) -> Run | None:
-        """Returns the run of the last `execute`; None where the arm did not move."""
+        """Returns the run of the last `execute`; None if the arm did not move."""
         run, self._run = self._run, None
         return run
 
     def take_cell_runs(self) -> list[tuple[Run, RcilabError | None]]:
-        """Returns what cells have run since the last call, and why it did not reach its end."""
+        """Returns the runs of cells since the last call, and why each did not reach its end."""
         runs, self._cell_runs = self._cell_runs, []
         return runs
 
@@ -182,7 +182,7 @@ class SessionConnection:
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: How the arm is commanded.
             speed_override: Speed override, 0.1 to 1.
-            stops: Not counted here.
+            stops: Not used here.
         """
         self._progress = None
         return self._do(
@@ -197,7 +197,7 @@ class SessionConnection:
         def send() -> None:
             self._session.configure(setup)
             self._held = self._held.updated(setup)
-            self._looked = float("-inf")  # What was acknowledged is not sent again.
+            self._looked = float("-inf")  # Acknowledged values are not sent again.
 
         return self._do("control", send)
 
@@ -225,19 +225,19 @@ class SessionConnection:
         return _settled("speed_override")
 
     def pause(self) -> PendingRequest:
-        """Holds the motion in progress."""
+        """Pauses the motion in progress."""
         self._session.pause()
         return _settled("pause")
 
     def stop(self, reason: str | None = None) -> None:
-        """Stops a motion in progress, also one that a cell has started; from any thread, without waiting."""
+        """Stops a motion in progress, also that of a cell; from any thread, without waiting."""
         self._session.stop(*(() if reason is None else (reason,)))
 
     def heartbeat(self) -> None:
-        """Does nothing: who looks after a session stops it itself."""
+        """Does nothing: the operator of a session stops it directly."""
 
     def close(self) -> None:
-        """Stops what was started here; the session stays open."""
+        """Stops a motion that was started here; the session stays open."""
         self._remove_listener()
         worker = self._worker
         if worker is not None and worker.is_alive():
@@ -272,7 +272,7 @@ class SessionConnection:
         return request
 
     def _on_run(self, run: Run, error: BaseException | None) -> None:
-        """Keeps a run; called in the thread that ran it."""
+        """Keeps a run; called in the thread of the run."""
         if threading.current_thread() is self._worker:
             self._run = run
         elif len(run.cycles):

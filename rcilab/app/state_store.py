@@ -1,4 +1,4 @@
-"""The one place where the state of an application is exchanged: a whole new value for the old one."""
+"""The store of an application's state: each change replaces the whole value."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.app.goal.target_status import Tone
 from rcilab.i18n.translator import Message
 
 _UNDO_DEPTH = 100
-_NOTICES = 4  # Kept of each page, and of all pages together: more would cover the scene.
+_NOTICES = 4  # For each page, and for all pages together: more would cover the scene.
 
 S = TypeVar("S", bound=AppState, covariant=True)
 
@@ -27,7 +27,7 @@ class StateStore(Generic[S]):
         self._past: list[Goal] = []
         self._notices = 0
         self.changed = threading.Event()
-        """Set when a request has been carried out whole, cleared by who shows it."""
+        """Set when a request has been carried out, cleared by the view that shows it."""
 
     @property
     def state(self) -> S:
@@ -35,7 +35,7 @@ class StateStore(Generic[S]):
         return self._state
 
     def update(self, **changes: Any) -> S:
-        """Exchanges the state for one with these fields changed, and returns it."""
+        """Replaces the state by one with these fields changed, and returns it."""
         with self._lock:
             self._state = replace(self._state, **changes)
             return self._state
@@ -44,10 +44,10 @@ class StateStore(Generic[S]):
         """Shows a notice, on one page or on every page.
 
         Args:
-            tone: How it looks.
-            text: What it says.
-            page: Client id of the only page it concerns; None: all of them.
-            trouble: Names the trouble that it reports, for `settle`.
+            tone: Its style.
+            text: Its message.
+            page: Client id of the only page that shows it; None: all pages.
+            trouble: Name of the trouble that it reports, for `settle`.
         """
         with self._lock:
             self._notices += 1
@@ -58,7 +58,7 @@ class StateStore(Generic[S]):
             self._state = replace(self._state, notices=(*kept, new))
 
     def forget_page(self, page: int) -> None:
-        """Drops what was to be said to a page that has gone."""
+        """Drops the notices of a page that has closed."""
         with self._lock:
             self._state = replace(self._state, notices=tuple(n for n in self._state.notices if n.page != page))
 
@@ -70,22 +70,22 @@ class StateStore(Generic[S]):
                 self._state = replace(self._state, notices=tuple(n for n in notices if n.trouble != trouble))
 
     def complain(self, field: str, problem: Message) -> None:
-        """Says beside a field what is wrong with what was typed."""
+        """Shows a problem of a typed value next to its field."""
         self.update(problems=MappingProxyType({**self._state.problems, field: problem}))
 
     def clear_problems(self, *beginnings: str) -> None:
-        """Takes back what was said beside all fields whose names begin so."""
+        """Clears the problems of all fields whose names begin so."""
         kept = {field: said for field, said in self._state.problems.items() if not field.startswith(beginnings)}
         self.update(problems=MappingProxyType(kept))
 
     def remember(self) -> None:
-        """Keeps the goal of this moment, to come back to with `undo`."""
+        """Stores the current goal for `undo`."""
         self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]
 
     def undo(self) -> Goal | None:
-        """Returns the goal that was remembered last, or None."""
+        """Returns the goal that was stored last, or None."""
         return self._past.pop() if self._past else None
 
     def forget(self) -> None:
-        """Drops what could be undone: it belongs to another arm."""
+        """Clears the undo history: it belongs to another arm."""
         self._past = []

@@ -35,15 +35,15 @@ _LOST = ("lost.silent", "lost.unreachable", "lost.closed", "lost.other_arm", "lo
 
 
 class StartingError(UsageError):
-    """Something was asked of the control process before it was there."""
+    """A request to the control process before it has started."""
 
 
-def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Message:
-    """Returns the sentence for an error.
+def explain_error(error: RcilabError, status: SupervisorStatus | None = None) -> Message:
+    """Returns the message for an error.
 
     Args:
-        error: What went wrong.
-        status: How the robot side stands, where the error came from there.
+        error: The error.
+        status: Status of the robot, if the error came from there.
     """
     if isinstance(error, StartingError):
         return message("ready.starting")
@@ -55,36 +55,36 @@ def tell_error(error: RcilabError, status: SupervisorStatus | None = None) -> Me
         return message("notice.stale")
     if isinstance(error, ConnectionLostError) and status is not None:
         known = status.code in (*_CRASHES, *_LOST) or status.incident is None
-        return _tell_loss(status.code if known or status.incident is None else status.incident.code, status)
+        return _describe_loss(status.code if known or status.incident is None else status.incident.code, status)
     return message("notice.error", text=describe_error(error))
 
 
-def tell_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
-    """Returns the sentence for an incident of the supervisor."""
+def describe_incident(code: str, sentence: str, status: SupervisorStatus) -> Message:
+    """Returns the message for an incident of the supervisor."""
     if code in _SAFETY_STOPS:
         return message(_SAFETY_STOPS[code])
     if code == "fault":
         return message("notice.fault", faults=name_faults(status.faults))
     if code in _CRASHES or code in _LOST:
-        return _tell_loss(code, status)
+        return _describe_loss(code, status)
     return message("notice.plain", text=LiteralText(sentence))
 
 
-def tell_status(status: SupervisorStatus) -> Message:
-    """Returns what the robot side is doing, in one sentence."""
+def describe_status(status: SupervisorStatus) -> Message:
+    """Returns what the robot is doing, as one message."""
     if status.code in _SAFETY_STOPS:
         return message(_SAFETY_STOPS[status.code])
     if status.code == "fault":
         return message("ready.fault_of", faults=name_faults(status.faults))
     if status.code in _CRASHES or status.code in _LOST:
-        return _tell_loss(status.code, status)
+        return _describe_loss(status.code, status)
     return message(phase_code(status))
 
 
-def tell_success(status: SupervisorStatus) -> Message:
+def describe_success(status: SupervisorStatus) -> Message:
     """Returns the share of commands in time; the controller keeps that of the last motion until the next one.
 
-    Before the first one it is the controller's initial number, which says nothing.
+    Before the first motion it is the controller's initial number, which has no meaning.
     """
     is_moving = status.phase in ("moving", "stopping")
     if not is_moving and status.motion_time is None:
@@ -94,7 +94,7 @@ def tell_success(status: SupervisorStatus) -> Message:
 
 
 def phase_code(status: SupervisorStatus) -> str:
-    """Returns the key of the two or three words for what the robot side is doing."""
+    """Returns the key of the short name of the robot's status."""
     if status.phase in ("idle", "fault") and status.is_pressed:
         return "phase.pressed"
     if status.phase == "idle" and status.powered is False:
@@ -102,8 +102,8 @@ def phase_code(status: SupervisorStatus) -> str:
     return _PHASES.get(status.code, f"phase.{status.phase}")
 
 
-def _tell_loss(code: str, status: SupervisorStatus) -> Message:
-    """Returns what has gone, of whom, and what to press; a lost connection to our own controller names no cable."""
+def _describe_loss(code: str, status: SupervisorStatus) -> Message:
+    """Returns what was lost, and what to press; the message for our own controller does not mention a cable."""
     if code in _CRASHES:
         return message(f"incident.{code}", next=message(_what_follows(status)))
     if code == "lost.other_arm":
@@ -115,13 +115,13 @@ def _tell_loss(code: str, status: SupervisorStatus) -> Message:
 
 
 def _what_follows(status: SupervisorStatus) -> str:
-    """Returns the key of what comes next after the end of a process of ours."""
+    """Returns the key of what happens after the end of one of our processes."""
     if status.incident is not None and status.incident.is_restarted:
         return "incident.again"
     return "incident.choose" if status.phase == "closed" else "incident.press"
 
 
-def tell_remedy(fault: FaultCode, text: Text) -> str:
-    """Returns what to do about a fault; "" where its maker gives no advice."""
+def describe_remedy(fault: FaultCode, text: Text) -> str:
+    """Returns the remedy for a fault; "" if its maker gives none."""
     key = next((key for key in (f"remedy.{fault.key}", f"remedy.{fault.maker}") if text.has(key)), None)
     return "" if key is None else f"{text('run.remedy')} {text(key)}"

@@ -1,4 +1,4 @@
-"""What the page shows, as one frozen value, and the store that holds it."""
+"""The state of the page, as one frozen value, and its store."""
 
 from __future__ import annotations
 
@@ -29,58 +29,58 @@ Theme = Literal["light", "dark"]
 
 @dataclass(frozen=True, slots=True)
 class RunsFolder:
-    """What the folder of recorded runs holds, and what is to be cleared away."""
+    """The folder of recorded runs, and what is to be deleted."""
 
     count: int = 0
     size: int = 0
     """[bytes]."""
     keep: int = 20
-    """How many of the newest ones are to stay."""
+    """Number of newest ones to keep."""
     asked: bool = False
-    """Whether deleting awaits a second yes."""
+    """Whether deleting awaits a second confirmation."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class UiState(AppState):
-    """Everything that the operator has set on the page, and everything that was computed from it."""
+    """All settings of the operator on the page, and all values computed from them."""
 
     push: PushState = field(default_factory=PushState)
     typed_address: str = ""
-    """The address that waits for a second yes."""
+    """The address that awaits a second confirmation."""
     reboot_asked: bool = False
-    """Whether the question about a restart of the controller waits for its answer."""
+    """Whether the question about a restart of the controller awaits its answer."""
     jog: JogState = field(default_factory=JogState)
     setup: SetupState = field(default_factory=SetupState)
     """Safety box, tool, load, force-control frame; `model` has this tool and this load."""
     scene: SceneState = field(default_factory=SceneState)
-    """What was computed for the scene."""
+    """Values computed for the scene."""
     program: ProgramState = field(default_factory=ProgramState)
     check: CheckState = field(default_factory=CheckState)
     learn: LearnState = field(default_factory=LearnState)
     folder: RunsFolder = RunsFolder()
     export: Export | None = None
-    """What is being written for a page."""
+    """The export in progress."""
     busy: Message | None = None
-    """What is being done that takes longer than a moment."""
+    """The job in progress."""
     loop: bool = False
-    """Whether the preview begins again at its end."""
+    """Whether the preview is repeated."""
     rate: float = 1.0
     plot_joint: int = 0
     """Joint shown in the plots, from 1; 0 shows all."""
     plots: frozenset[str] = frozenset({"q", "dq", "ddq", "jerk", "error", "tool"})
-    """Which plots are shown; those of errors once there are some."""
+    """The visible plots; those of errors once there are some."""
     language: str = "en"
     units: Units = USUAL
-    """What angles and lengths are shown and typed in; nothing is kept in them."""
+    """Units in which angles and lengths are shown and typed; values are stored in SI."""
     quality: str = "full"
     is_quality_chosen: bool = False
-    """Whether the operator chose it; otherwise a browser without a graphics card makes it "light"."""
+    """Whether the operator chose it; otherwise it is "light" for a browser without a graphics card."""
     theme: Theme = "light"
     height: float = 800.0
     """Height of the newest page's window, [px]: the plots fill it."""
-    lease: ControlLock = field(default_factory=ControlLock)
+    control_lock: ControlLock = field(default_factory=ControlLock)
     entered: Mapping[int | None, float] = field(default_factory=lambda: MappingProxyType({}))
-    """When a page last said that what is typed in it is complete, by page, [s] of the monotonic clock."""
+    """Time at which a page last reported that its typed text is complete, by page, [s] of the monotonic clock."""
 
     @property
     def box(self) -> SafetyBox | None:

@@ -11,8 +11,8 @@ class Text(translator.Text):
     """The catalogue of the page in one language.
 
     Args:
-        language: Which.
-        units: What angles and lengths are shown in.
+        language: Language.
+        units: Units in which angles and lengths are shown.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
@@ -25,5 +25,5 @@ class Text(translator.Text):
         return item.explain(self.language, self.units)
 
     def unit(self, usual: str) -> Unit:
-        """Returns the unit that numbers of a field are shown and typed in, for "deg" or "mm"."""
+        """Returns the unit in which numbers of a field are shown and typed, for "deg" or "mm"."""
         return self.units.unit(usual)

@@ -1,4 +1,4 @@
-"""What only changes how the page looks. Owned by the dispatcher's thread."""
+"""Requests that change the view only. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.request import Handlers, Request
 from rcilab.app.store import Store
 from rcilab.i18n.locale import LANGUAGES
@@ -22,19 +22,19 @@ QUALITIES = ("full", "light")
 THEMES = ("light", "dark")
 RATES = (0.1, 0.25, 0.5, 1.0, 2.0)
 PLOTS = ("q", "dq", "ddq", "jerk", "tau", "speed", "acceleration", "psi", "error", "tool")
-"""In the order they stand below each other."""
+"""In the order in which they are shown."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommitField(Request):
-    """Enter was pressed in a field that was typed in, or the field was left: what is typed is complete."""
+    """Enter was pressed in a field, or the field was left: the typed text is complete."""
 
     needs_control: ClassVar[bool] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DropProblem(Request):
-    """The field that a problem stands beside does not show any more what it is about."""
+    """The field of a problem does not show the rejected text any more."""
 
     needs_control: ClassVar[bool] = False
     field: str
@@ -43,7 +43,7 @@ class DropProblem(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawInSoftware(Request):
-    """The browser has no graphics card to draw with."""
+    """The browser has no graphics card."""
 
     is_silent: ClassVar[bool] = True
 
@@ -62,10 +62,10 @@ class Seek(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Play(Request):
-    """Start or hold the preview."""
+    """Start or pause the preview."""
 
     playing: bool | None = None
-    """None turns it over."""
+    """None toggles it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +99,7 @@ class ViewActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             CommitField: self.enter,
             DropProblem: lambda request: self._store.clear_problems(request.field),
@@ -112,13 +112,13 @@ class ViewActions:
         }
 
     def seek(self, request: Seek) -> None:
-        """Holds the preview at a place of the plan."""
+        """Moves the preview to a place of the plan and pauses it."""
         if math.isfinite(request.place):
             self._store.update(place=min(max(request.place, 0.0), 1.0), playing=False)
 
     def play(self, request: Play) -> None:
-        """Starts the preview, from the beginning when it stands at the end, or holds it."""
-        state = exhibited(self._store.state)
+        """Starts the preview, from the beginning if it is at the end, or pauses it."""
+        state = displayed_state(self._store.state)
         playing = not state.playing if request.playing is None else request.playing
         if state.plan is None:
             self._store.say("warn", message("ready.no_plan"))
@@ -128,8 +128,8 @@ class ViewActions:
             self._store.update(playing=False)
 
     def advance(self, elapsed: float) -> None:
-        """Moves a playing preview on by `elapsed`, [s]."""
-        state = exhibited(self._store.state)
+        """Advances a playing preview by `elapsed`, [s]."""
+        state = displayed_state(self._store.state)
         if not state.playing or state.plan is None:
             return
         place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
@@ -138,12 +138,12 @@ class ViewActions:
         self._store.update(place=min(place, 1.0), playing=place < 1.0)
 
     def enter(self, request: CommitField) -> None:
-        """Lets what is typed in a page count at once."""
+        """Takes the typed text of a page at once."""
         entered = {**self._store.state.entered, request.page: time.monotonic()}
         self._store.update(entered=MappingProxyType(entered))
 
     def set_view(self, request: SetView) -> None:
-        """Changes a setting; values that do not exist are ignored."""
+        """Changes a setting; invalid values are ignored."""
         value = request.value
         known = {
             "language": value in LANGUAGES,
@@ -164,7 +164,7 @@ class ViewActions:
                 self._store.update(is_quality_chosen=True)
 
     def draw_in_software(self, request: DrawInSoftware) -> None:
-        """Draws lightly for a browser without a graphics card, unless the operator chose otherwise."""
+        """Chooses light graphics for a browser without a graphics card, unless the operator chose otherwise."""
         if not self._store.state.is_quality_chosen:
             self._store.update(quality="light")
 
@@ -175,10 +175,10 @@ class ViewActions:
             self._store.update(plots=plots | {request.name} if request.on else plots - {request.name})
 
     def set_recording(self, request: SetRecording) -> None:
-        """Has the next motions written to files, or not."""
+        """Turns recording of the next motions to files on or off."""
         self._store.update(record=request.on)
 
 
 def has_plot(model: RobotModel, name: str) -> bool:
-    """Returns whether there is anything to plot for an arm: only an arm with redundancy has an arm angle."""
+    """Returns whether an arm has a quantity to plot: only an arm with redundancy has an arm angle."""
     return name != "psi" or bool(model.redundancy)

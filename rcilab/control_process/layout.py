@@ -42,7 +42,7 @@ VERSION = 10  # Increment with every change of this file, of the snapshot or of 
 RING_CYCLES = 32768  # 33 s: the longest time between two reads without a loss.
 MOTION_TIME = 300.0  # [s] Longest motion that fits into the block.
 MOTION_ROWS = round(MOTION_TIME / CYCLE_TIME) + 1
-OPERATOR_TIMEOUT = 2.0  # [s] A motion ends after this time without an operator (workbench: operator lease).
+OPERATOR_TIMEOUT = 2.0  # [s] A motion ends after this time without an operator (workbench: control lock).
 MESSAGE_SLOTS = 16
 MESSAGE_SIZE = 4096  # [bytes] The largest request, a configuration, needs 1300.
 

@@ -22,6 +22,8 @@ from rcilab.core.spatial import IDENTITY, Pose
 Mode: TypeAlias = Literal["joint_position", "joint_impedance", "cartesian_position", "cartesian_impedance", "torque"]
 """Command mode of a motion: the members of `ControllerMode` that move the arm, in lower case."""
 MODES: tuple[Mode, ...] = get_args(Mode)
+COMPLIANT_MODES: tuple[Mode, ...] = ("joint_impedance", "cartesian_impedance", "torque")
+"""Modes in which forces move the arm, too: it may end next to its goal."""
 
 
 class ControllerMode(IntEnum):

@@ -379,7 +379,7 @@ class RobotSession(Closeable):
         """Checks a motion by the conditions of the mode, streams it and returns its run.
 
         From another thread, `pause`, `resume` and `set_speed_override` change its speed, and `progress` returns its
-        progress. In torque and impedance modes the arm is compliant and ends beside its goal: `Run.goal_error`.
+        progress. In torque and impedance modes the arm is compliant and ends next to its goal: `Run.goal_error`.
 
         Args:
             motion: The motion; it must begin at the commanded angles of the arm, `state.q_c`.

@@ -1,6 +1,6 @@
-"""What a robot is configured with: tool, load, safety box, force-control frame, soft joint limits, mode parameters.
+"""The configuration of a robot: tool, load, safety box, force-control frame, soft joint limits, mode parameters.
 
-Values that every maker understands; what is None is left as the controller has it.
+Values that every maker understands; for None, the controller keeps its own.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 SetupPart: TypeAlias = Literal["box", "tool", "load", "force", "joints", "control"]
 
 SETUP_PARTS: tuple[SetupPart, ...] = ("box", "tool", "load", "force")
-"""The parts that have a place in space."""
+"""The parts with a position in space."""
 _ALL_PARTS: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints", "control")
 
 
 class ForceFrame(IntEnum):
-    """What the axes of a force-control frame follow."""
+    """The reference of a force-control frame's axes."""
 
     WORLD = 0
     TOOL = 1
@@ -35,26 +35,26 @@ class ForceFrame(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ForceControlFrame:
-    """The frame in which the controller reports forces, and in which it controls them."""
+    """The frame in which the controller reports and controls forces."""
 
     T_flange_force: Pose = IDENTITY
     type: ForceFrame = ForceFrame.WORLD
-    """What its axes follow."""
+    """The reference of its axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SoftJointLimits:
-    """Bounds of the joint angles inside the arm's own, n numbers each, [rad]."""
+    """Soft limits of the joint angles within the arm's own, n numbers each, [rad]."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
 
 
 class ControllerParameters(Mapping[str, tuple[float, ...]]):
-    """Parameters of the modes by name of the group; groups that are missing are left as the controller has them.
+    """Parameters of the modes by name of the group; for missing groups, the controller keeps its own.
 
     Args:
-        groups: Such as `joint_stiffness=(...)`. Which groups there are: `Maker.parameters`.
+        groups: Such as `joint_stiffness=(...)`. The groups of an arm: `Maker.parameters`.
     """
 
     def __init__(self, **groups: tuple[float, ...]) -> None:
@@ -75,7 +75,7 @@ class ControllerParameters(Mapping[str, tuple[float, ...]]):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotConfiguration:
-    """A configuration, or parts of one: what is None is left as the controller has it."""
+    """A configuration, or parts of one: for None, the controller keeps its own."""
 
     box: SafetyBox | None = None
     tool: Pose | None = None
@@ -88,7 +88,7 @@ class RobotConfiguration:
 
     @property
     def parts(self) -> tuple[SetupPart, ...]:
-        """Names of what is not None."""
+        """Names of the parts that are not None."""
         return tuple(part for part in _ALL_PARTS if getattr(self, part) is not None)
 
     def only(self, parts: Iterable[str]) -> RobotConfiguration:
@@ -100,14 +100,14 @@ class RobotConfiguration:
         return self.only(set(_ALL_PARTS) - set(parts))
 
     def updated(self, newer: RobotConfiguration) -> RobotConfiguration:
-        """Returns this configuration with the parts of a newer one in it."""
+        """Returns this configuration with the parts of a newer one."""
         return replace(self, **{part: getattr(newer, part) for part in newer.parts})
 
     def applied_to(self, model: RobotModel) -> RobotModel:
         """Returns the arm with this tool, this load and these soft limits.
 
         Raises:
-            InvalidValueError: The load is heavier than the arm is rated for.
+            InvalidValueError: The load is heavier than the arm's payload.
         """
         changed = model if self.tool is None else model.with_tool(self.tool)
         changed = changed if self.load is None else changed.with_load(self.load)
@@ -118,7 +118,7 @@ def require_setup(setup: object) -> RobotConfiguration:
     """Returns `setup` if it is one.
 
     Raises:
-        InvalidValueError: It is something else.
+        InvalidValueError: It is not a configuration.
     """
     if isinstance(setup, RobotConfiguration):
         return setup
@@ -131,7 +131,7 @@ def require_control(control: object) -> ControllerParameters:
     """Returns `control` if it is a ControllerParameters.
 
     Raises:
-        InvalidValueError: It is something else.
+        InvalidValueError: It is not a ControllerParameters.
     """
     if isinstance(control, ControllerParameters):
         return control

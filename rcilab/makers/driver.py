@@ -1,4 +1,4 @@
-"""What a session and the control process need of a robot's driver, and which maker's driver an address belongs to."""
+"""The interface of a robot's driver for session and control process, and the choice of the maker by the address."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 GuideSpace: TypeAlias = Literal["joint", "cartesian"]
-"""Where constraints of hand guiding hold; without effect in joint space."""
+"""Space of the constraints of hand guiding; in joint space they have no effect."""
 GuideKind: TypeAlias = Literal["free", "translation", "rotation"]
-"""What stays free in Cartesian space."""
+"""The free directions in Cartesian space."""
 
 
 class RobotAddress(Protocol):
@@ -52,18 +52,18 @@ class RobotAddress(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExpectedArm:
-    """The arm that motions will be planned for, to compare with the one that the controller moves."""
+    """The arm that motions are planned for, to compare with the one at the controller."""
 
     name: str
     maker: str
     """Name of its maker's folder."""
     n: int
     lengths: tuple[tuple[float, float], ...]
-    """Denavit-Hartenberg a and d, one pair a joint, [m]."""
+    """Denavit-Hartenberg a and d, one pair per joint, [m]."""
 
     @classmethod
     def of(cls, model: RobotModel) -> ExpectedArm:
-        """Returns what identifies the arm of a model."""
+        """Returns the data that identify the arm of a model."""
         dh: tuple[DhRow, ...] = tuple(model.description.dh)
         return cls(
             name=model.name, maker=model.description.maker, n=model.n, lengths=tuple((row.a, row.d) for row in dh)
@@ -72,7 +72,7 @@ class ExpectedArm:
 
 @dataclass(slots=True, kw_only=True)
 class ConfiguredArm:
-    """What a session has configured on its robot; changed only with the session's lock."""
+    """The configuration that a session has sent to its robot; changed only with the session's lock."""
 
     model: RobotModel
     """The arm, with tool, load and soft limits."""
@@ -83,22 +83,22 @@ class ConfiguredArm:
 
 @dataclass(frozen=True, slots=True)
 class SafetyStopReason:
-    """Which safety stop holds an arm."""
+    """The safety stop that stops an arm."""
 
     code: str
-    """Names it for catalogues: `status.CODE`."""
+    """Key of its texts: `status.CODE`."""
     sentence: str
-    """What it is and what to do."""
+    """Its name and remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class FaultReport:
-    """What is known of the faults that ended a motion."""
+    """The diagnosis of the faults that ended a motion."""
 
     sentence: str
-    """All of it, with what to do in Python."""
+    """The full sentence, with the remedy in Python."""
     finding: Remark
-    """Joint, value and bound, for user interfaces; empty when not known."""
+    """Joint, value and bound, for user interfaces; empty if unknown."""
 
 
 class RequestLock(Protocol):
@@ -142,12 +142,12 @@ class MakerCommands(Protocol):
 
 
 class Driver(Protocol):
-    """A connection to a controller. Owned by one thread, but for requests that are sent alongside a motion."""
+    """A connection to a controller. Owned by one thread, except for requests that are sent alongside a motion."""
 
     scheme: str
-    """Of its addresses, and the session's attribute for its own commands."""
+    """Scheme of its addresses, and the session's attribute for its own commands."""
     name: str
-    """What errors call the other end: its address."""
+    """Name of the controller in errors: its address."""
     n: int
     """Number of joints."""
     arm_name: str
@@ -173,7 +173,7 @@ class Driver(Protocol):
 
     @property
     def age(self) -> float:
-        """How long ago it was sent, at most, [s]."""
+        """Upper bound of its age, [s]."""
         ...
 
     @property
@@ -198,11 +198,11 @@ class Driver(Protocol):
         ...
 
     def configure(self, configuration: RobotConfiguration) -> None:
-        """Sends a configuration; nothing may move meanwhile."""
+        """Sends a configuration; the arm must stand still."""
         ...
 
     def with_tool(self, model: RobotModel) -> RobotModel:
-        """Returns the model with the tool that the controller has; warns where that is another one."""
+        """Returns the model with the controller's tool; warns if that is another one."""
         ...
 
     def start_guiding(self, space: GuideSpace, kind: GuideKind) -> None:
@@ -231,10 +231,10 @@ class Driver(Protocol):
 
 
 class StreamingDriver(Driver, Protocol):
-    """A driver that is sent a command for every state."""
+    """A driver that sends a command for every state."""
 
     def begin(self, mode: ControllerMode) -> None:
-        """Asks the controller to begin a motion in a mode."""
+        """Asks the controller to start a motion in a mode."""
         ...
 
     def has_begun(self, state: RobotState) -> bool:
@@ -242,7 +242,7 @@ class StreamingDriver(Driver, Protocol):
         ...
 
     def is_streaming(self, state: RobotState) -> bool:
-        """Returns whether a state shows that commands are still followed; cheap enough for every cycle."""
+        """Returns whether a state shows that the motion is still in progress; cheap enough for every cycle."""
         ...
 
     def send(self, state: RobotState, command: Command) -> None:
@@ -250,11 +250,11 @@ class StreamingDriver(Driver, Protocol):
         ...
 
     def end(self, timeout: float | None = None) -> None:
-        """Ends the motion; `timeout` for the answer, [s]; None: as for every request."""
+        """Ends the motion; `timeout` for the answer, [s]; None: that of every request."""
         ...
 
     def find_safety_stop(self, state: RobotState) -> SafetyStopReason | None:
-        """Returns which safety stop a state shows; None: no safety stop."""
+        """Returns the safety stop that a state shows; None: there is none."""
         ...
 
     def is_lack_of_commands(self, faults: tuple[Any, ...]) -> bool:
@@ -279,19 +279,19 @@ class StreamingDriver(Driver, Protocol):
         box: SafetyBox | None = None,
         collision_thresholds: JointVector | None = None,
     ) -> FaultReport:
-        """Returns what the error says that a motion with these faults ends with.
+        """Returns the diagnosis of the faults that ended a motion.
 
         Args:
-            faults: What the controller reported.
+            faults: The faults that the controller reported.
             record: The last cycles, see `cycle_dtype`.
             t: Motion time of the state with the faults, [s]; NaN before the first command.
             model: The arm with its tool and load.
             limits: Its bounds.
-            mode: How it was commanded.
-            late: What a slow callback did, in a sentence; "" for nothing.
-            pressed: Which safety stop ended the motion, in a sentence; "" for none.
-            box: The safety box that the controller has, as far as it is known.
-            collision_thresholds: Its collision thresholds, shape (n,), [N m], as far as they are known.
+            mode: The command mode.
+            late: The delay by a slow callback, as a sentence; "" for none.
+            pressed: The safety stop that ended the motion, as a sentence; "" for none.
+            box: The controller's safety box, if it is known.
+            collision_thresholds: Its collision thresholds, shape (n,), [N m], if they are known.
         """
         ...
 
@@ -300,13 +300,13 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
     """Returns a connection to the controller at an address, once its first state has arrived.
 
     Args:
-        address: Its scheme chooses the maker.
+        address: The address; its scheme chooses the maker.
         timeout: For the connection, the first state and every answer, [s].
-        expected: The arm that must be there; None takes the one that is.
+        expected: The expected arm; None accepts any.
 
     Raises:
         ConnectionLostError: The controller does not answer, or sends no states.
-        ModelError: It moves another arm, or one that is not known.
+        ModelError: It has another arm, or an unknown one.
         InvalidValueError: The address is not valid.
     """
     maker = _maker_at(address, None if expected is None else expected.maker)
@@ -314,11 +314,11 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> S
 
 
 def parse_address(address: str, model: RobotModel | None = None) -> RobotAddress:
-    """Returns the parts of the address of a controller; `str` gives it with scheme and port written out.
+    """Returns the parts of the address of a controller; `str` returns it with scheme and port.
 
     Args:
-        address: With the scheme of a maker; without one, it is an address of the model's maker.
-        model: The arm at the address; None where that is not known.
+        address: With the scheme of a maker; without one, it is of the model's maker.
+        model: The arm at the address; None if it is unknown.
 
     Raises:
         InvalidValueError: It is not a valid address, or that of another maker's controller.
@@ -330,8 +330,8 @@ def require_signal(signal: object, names: Sequence[str]) -> int:
     """Returns the number of a digital signal.
 
     Args:
-        signal: What was asked for.
-        names: The names of those that exist, see `Capabilities`.
+        signal: The number or name.
+        names: The names of all signals, see `Capabilities`.
 
     Raises:
         InvalidValueError: There is no such signal.
@@ -342,7 +342,7 @@ def require_signal(signal: object, names: Sequence[str]) -> int:
 
 
 def require_timeout(timeout: object) -> None:
-    """Makes sure that a timeout is a finite number above 0, [s].
+    """Checks that a timeout is a finite number above 0, [s].
 
     Raises:
         InvalidValueError: It is not.
@@ -355,7 +355,7 @@ def require_timeout(timeout: object) -> None:
 
 
 def _maker_at(address: object, name: str | None) -> Maker:
-    """Returns the maker whose controller has an address; without a scheme, the one of this name, or the only one."""
+    """Returns the maker of an address; without a scheme, the one of this name, or the only one."""
     drivable = [maker for maker in all_makers() if maker.capabilities.drives]
     possible = [maker for maker in drivable if maker.name == name] or drivable
     scheme, mark, _ = address.strip().partition("://") if isinstance(address, str) else ("", "", "")

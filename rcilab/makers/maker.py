@@ -1,8 +1,8 @@
-"""What a maker of robots has to bring, and the registry of all makers.
+"""The interface of a maker of robots, and the registry of all makers.
 
 A maker is a folder in `rcilab/makers` with a module `maker.py` that has a `MAKER`, and a folder `robots` with the data
-files of its arms. Nothing outside its folder names it. `MAKER` is cheap to import: what needs sockets or physics is
-behind methods.
+files of its arms. Nothing outside its folder names it. `MAKER` is cheap to import: sockets and physics are imported by
+its methods.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ class Capabilities:
     streams: bool = False
     """Whether the controller follows a command in every cycle, as a callback gives them."""
     modes: tuple[Mode, ...] = ()
-    """How it can be commanded."""
+    """Its command modes."""
     guides: bool = False
-    """Whether it frees the arm for a hand to guide it."""
+    """Whether it supports hand guiding."""
     outputs: tuple[str, ...] = ()
     """Names of its digital outputs, by number from 0."""
     inputs: tuple[str, ...] = ()
@@ -52,33 +52,33 @@ class Capabilities:
     reboots: bool = False
     """Whether it can be restarted over its interface."""
     setup: tuple[SetupPart, ...] = ()
-    """What it can be sent: safety box, tool, load, force-control frame, soft joint limits, parameters."""
+    """The parts of its configuration: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     longest_tool: float = 2.0
-    """Farthest that tool, force-control frame and the load's centre of mass may be from the flange, [m]."""
+    """Largest distance of tool, force-control frame and the load's centre of mass from the flange, [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """When states and commands go over the wire of a maker."""
+    """The periods of states and commands of a maker's interface."""
 
     state_period: float = CYCLE_TIME
-    """From one state to the next, [s]."""
+    """Between two states, [s]."""
     command_period: float = CYCLE_TIME
-    """From one command of a motion to the next, [s]."""
+    """Between two commands of a motion, [s]."""
 
     @property
     def state_cycles(self) -> int:
-        """`state_period` in cycles of the grid that motions are planned on."""
+        """`state_period` in cycles of the planning grid."""
         return max(1, round(self.state_period / CYCLE_TIME))
 
     @property
     def command_cycles(self) -> int:
-        """`command_period` in cycles of the grid that motions are planned on."""
+        """`command_period` in cycles of the planning grid."""
         return max(1, round(self.command_period / CYCLE_TIME))
 
 
 Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals", "reboot"]
-"""What an arm may lack; catalogues call it `feature.NAME`."""
+"""Features that an arm may lack; their texts are `feature.NAME`."""
 
 
 class Maker(Protocol):
@@ -91,12 +91,12 @@ class Maker(Protocol):
 
     @property
     def title(self) -> str:
-        """Name as people write it, such as "ROKAE"."""
+        """Its name in texts, such as "ROKAE"."""
         ...
 
     @property
     def interface(self) -> str:
-        """Name of its control interface in a sentence, such as "the RCI"."""
+        """Name of its control interface in texts, such as "the RCI"."""
         ...
 
     @property
@@ -106,21 +106,21 @@ class Maker(Protocol):
 
     @property
     def robots(self) -> Mapping[str, str]:
-        """Its arms: by name, the module of the data file in its folder `robots`."""
+        """Its arms: name -> module of the data file in its folder `robots`."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What can be done with its arms."""
+        """The capabilities of its arms."""
         ...
 
     @property
     def timing(self) -> Timing:
-        """When states and commands go over its wire."""
+        """The periods of states and commands."""
         ...
 
     def conditions(self) -> ConditionTable:
-        """Returns the conditions that its interface has for a motion."""
+        """Returns the conditions of its interface for a motion."""
         ...
 
     def faults(self) -> type[FaultCode]:
@@ -128,19 +128,19 @@ class Maker(Protocol):
         ...
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
-        """Returns what one of its controllers can be set to beside tool, load and limits, in the order to show it."""
+        """Returns the parameters of a controller in addition to tool, load and limits, in display order."""
         ...
 
     def scenarios(self) -> tuple[FaultScenario, ...]:
-        """Returns how its faults are provoked on the virtual controller, in the order to show them."""
+        """Returns the scenarios that provoke its faults on the virtual controller, in display order."""
         ...
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
-        """Returns the virtual side of its wire for one of its arms; only where `capabilities.simulates`."""
+        """Returns the server of one of its arms; only with `capabilities.simulates`."""
         ...
 
     def parse_address(self, text: str) -> RobotAddress:
-        """Returns the parts of the address of one of its controllers; only where `capabilities.drives`.
+        """Returns the parts of the address of one of its controllers; only with `capabilities.drives`.
 
         Raises:
             InvalidValueError: It is not a valid address; the message says which part is wrong.
@@ -153,26 +153,26 @@ class Maker(Protocol):
 
 
 class PlanningOnly:
-    """The part of a maker whose arms can be computed with, but neither simulated nor driven."""
+    """The base of a maker whose arms can be planned for, but neither simulated nor driven."""
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
-        """Returns nothing: there is no controller to set."""
+        """Returns no parameters: there is no controller."""
         return ()
 
     def scenarios(self) -> tuple[FaultScenario, ...]:
-        """Returns nothing: there is no virtual controller."""
+        """Returns no scenarios: there is no virtual controller."""
         return ()
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
-        """Refuses: there is no virtual controller."""
+        """Raises an error: there is no virtual controller."""
         raise ModelError(f"{config.model} has no virtual controller")
 
     def parse_address(self, text: str) -> RobotAddress:
-        """Refuses: there is no driver."""
+        """Raises an error: there is no driver."""
         raise ModelError(f"{text} cannot be driven")
 
     def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
-        """Refuses: there is no driver."""
+        """Raises an error: there is no driver."""
         raise ModelError(f"{address} cannot be driven")
 
 
@@ -201,19 +201,19 @@ def maker_of(model: RobotModel) -> Maker | None:
 
 
 def capabilities_of(model: RobotModel) -> Capabilities:
-    """Returns what can be done with an arm; with one without a maker, nothing but computing."""
+    """Returns the capabilities of an arm; without a maker, none."""
     maker = maker_of(model)
     return Capabilities() if maker is None else maker.capabilities
 
 
 def timing_of(model: RobotModel) -> Timing:
-    """Returns when states and commands of an arm go over the wire; without a maker, in every cycle."""
+    """Returns the periods of an arm's states and commands; without a maker, one cycle."""
     maker = maker_of(model)
     return Timing() if maker is None else maker.timing
 
 
 def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
-    """Returns what the controller of an arm can be set to, see `Maker.parameters`."""
+    """Returns the parameters of an arm's controller, see `Maker.parameters`."""
     maker = maker_of(model)
     return () if maker is None else maker.parameters(model)
 
@@ -229,7 +229,7 @@ def driven_robots() -> tuple[str, ...]:
 
 
 def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
-    """Returns what an arm lacks for a feature and why, as the error of a call that needs it; None: it has it."""
+    """Returns why an arm lacks a feature, as the error of a call that needs it; None if it has the feature."""
     capabilities = capabilities_of(model)
     simulates, drives = capabilities.simulates, capabilities.drives
     if feature == "simulation" and simulates:
@@ -268,7 +268,7 @@ def require_feature(model: RobotModel, feature: Feature) -> RobotModel:
     """Returns `model` if its arm has a feature.
 
     Raises:
-        ModelError: It lacks it; the message says why, and what can be done with it.
+        ModelError: It lacks the feature; the message says why, and what is possible.
     """
     lack = find_lack(model, feature)
     if lack is not None:
@@ -277,7 +277,7 @@ def require_feature(model: RobotModel, feature: Feature) -> RobotModel:
 
 
 def require_parts(model: RobotModel, configuration: object) -> RobotConfiguration:
-    """Returns a configuration if an arm has every part of it.
+    """Returns a configuration if an arm has all its parts.
 
     Raises:
         InvalidValueError: It is not a configuration.
@@ -298,7 +298,7 @@ def require_driver(model: RobotModel) -> RobotModel:
     """Returns `model` if its arm can be driven, a virtual one or a real one.
 
     Raises:
-        ModelError: It cannot; the message says what can be done with it.
+        ModelError: It cannot; the message says what is possible.
     """
     return model if find_lack(model, "simulation") is None else require_feature(model, "driving")
 

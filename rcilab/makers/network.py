@@ -1,4 +1,4 @@
-"""How a controller's host is reached from here; the same for every maker's driver."""
+"""The route to a controller's host; common to all drivers."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from rcilab.core.errors import ConnectionLostError
 if TYPE_CHECKING:
     from rcilab.makers.driver import RobotAddress
 
-RECEIVE_BUFFER = 1 << 20  # [bytes] Room for about 0.4 s of states; the kernel may grant less.
+RECEIVE_BUFFER = 1 << 20  # [bytes] For about 0.4 s of states; the kernel may grant less.
 
 
 @dataclass(frozen=True, slots=True)
 class HostRoute:
-    """The two ends of the way to a controller, as IPv4 addresses."""
+    """The two ends of the route to a controller, as IPv4 addresses."""
 
     host: str
     local: str
-    """Our address that the kernel uses towards the host."""
+    """Our address on this route, as chosen by the kernel."""
 
 
 def find_route(address: RobotAddress) -> HostRoute:
-    """Returns which addresses a connection to a controller has; nothing is sent but a question for its name.
+    """Returns the addresses of a connection to a controller; nothing is sent except for a name lookup.
 
     Raises:
         ConnectionLostError: The host name has no address, or no network of ours leads there.
@@ -39,7 +39,7 @@ def find_route(address: RobotAddress) -> HostRoute:
     host = str(found)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect((host, address.port))  # Sends nothing: asks the kernel which source address it would use.
+            probe.connect((host, address.port))  # Sends nothing: the kernel chooses the source address.
             return HostRoute(host, str(probe.getsockname()[0]))
         except OSError as error:
             raise ConnectionLostError(

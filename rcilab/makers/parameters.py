@@ -1,4 +1,4 @@
-"""What a maker's arms can be set to: groups of numbers with unit, range, default and name, drawn by user interfaces."""
+"""The parameters of a maker's arms: groups of numbers with unit, range, default and name, for user interfaces."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ class Parameter:
     """One number."""
 
     label: Message
-    """Its name; the key is of the shared catalogue or of the maker's."""
+    """Key of its name, in the shared catalogue or the maker's."""
     low: float
     high: float
     default: float
-    """What the controller has after its start."""
+    """The controller's value after its start."""
     unit: str
 
 
@@ -28,12 +28,12 @@ class ParameterGroup:
     """Numbers that are sent together."""
 
     name: str
-    """In `ControllerParameters`; catalogues call the group `control.NAME`."""
+    """Name in `ControllerParameters`; its text is `control.NAME`."""
     parameters: tuple[Parameter, ...]
     modes: tuple[Mode, ...]
-    """In which modes it has an effect."""
+    """The modes in which it has an effect."""
     is_first: bool = False
-    """Whether it is what the mode is chosen for: user interfaces show it unfolded."""
+    """Whether it is the main parameter of the mode: user interfaces show it unfolded."""
 
     @property
     def defaults(self) -> tuple[float, ...]:
@@ -42,5 +42,5 @@ class ParameterGroup:
 
 
 def default_parameters(groups: Iterable[ParameterGroup]) -> ControllerParameters:
-    """Returns what a controller has after its start."""
+    """Returns a controller's parameters after its start."""
     return ControllerParameters(**{group.name: group.defaults for group in groups})

@@ -1,4 +1,4 @@
-"""A fault scenario: how one fault is provoked on a virtual controller, as a value. Every maker brings its own."""
+"""A fault scenario: how one fault is provoked on a virtual controller, as a value. Each maker has its own."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Callback: TypeAlias = Callable[[RobotState, float], Command]
 
 Group: TypeAlias = Literal["position", "velocity", "acceleration", "command", "contact"]
 GROUPS: tuple[Group, ...] = ("position", "velocity", "acceleration", "command", "contact")
-"""How user interfaces group faults: position, velocity, acceleration and jerk, pose and torque, contact and network."""
+"""Groups of faults: position, velocity, acceleration and jerk, pose and torque, contact and network."""
 
 
 class SimulatedWorld(Protocol):
@@ -58,17 +58,17 @@ class ScenarioRobot(Protocol):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
-    """The private robot as a scenario has prepared it."""
+    """The private robot, prepared by a scenario."""
 
     robot: ScenarioRobot
     commands: Any
     """The maker's own commands of the session, such as `robot.rci`."""
     start: RobotState
-    """Where the arm stands."""
+    """Position of the arm."""
     limits: Limits
-    """What its commands are checked with: the arm's own limits, narrowed or widened by what was set."""
+    """The limits of its commands: the arm's own, narrowed or widened by settings."""
     box: SafetyBox | None = None
-    """The safety box that was set."""
+    """The safety box, if it is set."""
 
     def narrowed(self, upper: JointVector) -> Scene:
         """Returns the scene with soft limits of the joints, `upper` of shape (n,), [rad]."""
@@ -95,22 +95,22 @@ def _at_home(model: RobotModel) -> JointVector:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FaultScenario:
-    """One fault, and what makes a controller report it."""
+    """One fault, and how to provoke it."""
 
     fault: FaultCode
     group: Group
     mode: Mode
-    """How the arm is commanded."""
+    """The command mode."""
     act: Callable[[Scene], Callback]
     """Returns the callback that provokes the fault."""
     prepare: Callable[[Scene], Scene] = field(default=_as_it_is)
-    """Prepares the scene: narrows a limit, softens the arm. Nothing moves."""
+    """Prepares the scene: narrows a limit, softens the arm. The arm does not move."""
     start: Callable[[RobotModel], JointVector] = field(default=_at_home)
-    """Returns the joint angles that the arm begins at, shape (n,), [rad]."""
+    """Returns the initial joint angles, shape (n,), [rad]."""
     needs_elbow: bool = False
     """Whether it needs an arm with an arm angle."""
     is_commanded: bool = False
-    """Whether a command breaks the condition, so that the arm does not follow it."""
+    """Whether a command violates the condition, so that the arm does not follow it."""
     cuts_network: bool = False
     """Whether the network has to be repaired afterwards."""
 

@@ -1,4 +1,4 @@
-"""Building the virtual controller of any arm: its maker comes from the model's name."""
+"""Creates the virtual controller of any arm: its maker is that of the model's name."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def build_virtual_controller(
     """Returns a virtual controller with its sockets open; `run` makes it serve.
 
     Args:
-        config: How it is configured.
-        plant: What moves; None: what the configuration names.
+        config: Its configuration.
+        plant: The plant; None: that of the configuration.
         log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
 
     Raises:

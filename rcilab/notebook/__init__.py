@@ -1,9 +1,9 @@
-"""The lab inside a notebook: parts that combine freely, and `Lab`, all of them in one cell.
+"""The lab inside a notebook: parts that combine freely, and `Lab`, all parts in one cell.
 
 from rcilab.notebook import JogPanel, Lab, MotionPlot, Scene
-jog = JogPanel(model)          # a part shows itself as the last line of a cell
-Scene(jog)                     # given another part, it looks at the same arm
-Lab(model)                     # everything
+jog = JogPanel(model)          # A part is displayed as the last line of a cell.
+Scene(jog)                     # Given another part, it shows the same arm.
+Lab(model)                     # All parts.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> object:
-    """Loads a part on first use."""
+    """Loads a part at its first use."""
     if name not in _HOMES:
         raise AttributeError(f"module 'rcilab.notebook' has no name {name!r}; it has: {', '.join(__all__)}")
     value = getattr(import_module(f"rcilab.notebook.{_HOMES[name]}"), name)

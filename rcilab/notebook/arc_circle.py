@@ -1,4 +1,4 @@
-"""The circle of arm angles at one pose: where the elbow can be, and what forbids it elsewhere."""
+"""The circle of arm angles at one pose: the free ones, and what forbids the others."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ _SIZE, _RADIUS, _WIDTH = 190.0, 62.0, 13.0
 _GOOD, _BAD, _GREY = "#1f9d57", "#d1392b", "#8a94a3"
 _INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
 _FULL_TURN = 2.0 * math.pi - 1e-6
-_SEAM = 0.01  # [rad] An arc reaches so far under the next one: no hairline between two of a colour.
+_SEAM = 0.01  # [rad] Overlap of neighbouring arcs, against hairlines between two of a colour.
 
 
 def draw_circle(arcs: FeasibleArcs, psi: float | None, text: Text) -> str:
-    """Returns the circle as SVG: green where the arm can stand, red beyond a joint limit, grey at a singularity.
+    """Returns the circle as SVG: green free, red beyond a joint limit, grey at a singularity.
 
     Args:
         arcs: From `model.feasible_arcs`.
-        psi: The arm angle now, [rad]; None draws no hand.
-        text: Words.
+        psi: The current arm angle, [rad]; None draws no hand.
+        text: The catalogue.
     """
     parts = [
         f'<svg viewBox="0 0 {_SIZE:g} {_SIZE:g}" width="{_SIZE:g}" height="{_SIZE:g}" role="img" '
@@ -59,5 +59,5 @@ def _arc(start: float, end: float, color: str, title: str) -> str:
 
 
 def _at(angle: float, radius: float) -> tuple[float, float]:
-    """Returns a place on the picture: 0 is at the top, positive angles go clockwise."""
+    """Returns the point of an angle on the picture: 0 is at the top, positive angles go clockwise."""
     return _SIZE / 2.0 + radius * math.sin(angle), _SIZE / 2.0 - radius * math.cos(angle)

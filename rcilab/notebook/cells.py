@@ -1,7 +1,7 @@
-"""What a cell has made ends when the cell runs again, when it is interrupted, and with the kernel.
+"""What a cell has created ends when the cell runs again, when it is interrupted, and with the kernel.
 
-A notebook has no window to close: a cell that is run again would leave its server, its process and its threads behind.
-JupyterLab and VS Code name the cell with every run; where no front end does (nbclient), its text is its name.
+A notebook has no window to close: without this, a cell that runs again would leave its server, process and threads.
+JupyterLab and VS Code send the cell's id with every run; for other front ends (nbclient) the text is the id.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rcilab.notebook.browser_watchdog import BrowserWatchdog
 
 
 class CellResource(Protocol):
-    """What a cell may own."""
+    """A resource that a cell may own."""
 
     def close(self) -> None:
         """Ends it; may be called twice."""
@@ -36,53 +36,53 @@ class CellResource(Protocol):
 
 
 class CellRegistry:
-    """Who was made by which cell. There is one for the kernel; tests make their own.
+    """Assigns resources to cells. The kernel has one instance; tests create their own.
 
     Args:
-        shell: IPython's shell; None outside of IPython, where everything ends with the process.
+        shell: IPython's shell; None outside of IPython, where resources end with the process.
     """
 
     def __init__(self, shell: Any) -> None:
         self._shell = shell
         self._owned: dict[str, list[weakref.ref[CellResource]]] = {}
-        self._keep: dict[int, CellResource] = {}  # An output may be the only one to hold a part.
+        self._keep: dict[int, CellResource] = {}  # An output may hold the only other reference to a part.
         self._running = threading.Event()
         if shell is not None:
             shell.events.register("pre_run_cell", self.begin)
             shell.events.register("post_run_cell", self.end)
             _stop_on_interrupts(shell, self.halt)
-            if self._current() is not None:  # It has begun before anybody listened.
+            if self._current() is not None:  # It began before this object existed.
                 self._running.set()
 
     @property
     def is_running(self) -> bool:
-        """Whether a cell runs at this moment."""
+        """Whether a cell is running."""
         return self._running.is_set()
 
     @property
     def is_calling(self) -> bool:
-        """Whether it is code that calls and goes on afterwards: a cell, or a program outside of a notebook."""
+        """Whether the caller is code that continues afterwards: a cell, or a program outside of a notebook."""
         if self._shell is None:
             return True
         return self.is_running and threading.current_thread() is threading.main_thread()
 
     def adopt(self, thing: CellResource) -> None:
-        """Ties something to the cell that is running now; what a press makes between two cells ends with its maker."""
+        """Assigns a resource to the running cell; what a click creates between two cells ends with its creator."""
         cell = self._current()
         if cell is not None:
             self._owned.setdefault(cell, []).append(weakref.ref(thing))
         self.keep(thing)
 
     def keep(self, thing: CellResource) -> None:
-        """Has something end with the kernel only."""
+        """Assigns a resource to the kernel."""
         self._keep[id(thing)] = thing
 
     def forget(self, thing: CellResource) -> None:
-        """Lets go of what has been closed."""
+        """Forgets closed resources."""
         self._keep.pop(id(thing), None)
 
     def begin(self, info: Any) -> None:
-        """A cell is about to run: what its last run has made ends."""
+        """A cell is about to run: the resources of its last run end."""
         self._running.set()
         for reference in reversed(self._owned.pop(_name(info.cell_id, info.raw_cell), [])):
             thing = reference()
@@ -90,16 +90,16 @@ class CellRegistry:
                 thing.close()
 
     def end(self, result: Any) -> None:
-        """A cell has ended; if it was interrupted, everything that moves stops.
+        """A cell has ended; if it was interrupted, all motions stop.
 
-        A cell that awaits is cancelled by an interrupt, and may then have no result at all.
+        A cell that awaits is cancelled by an interrupt, and may then have no result.
         """
         self._running.clear()
         if result is None or isinstance(result.error_in_exec, KeyboardInterrupt | asyncio.CancelledError):
             self.halt()
 
     def halt(self) -> None:
-        """Stops whatever any cell moves; what cannot be stopped does not keep the others moving."""
+        """Stops the motions of all cells; an error does not keep others from being stopped."""
         failures: list[Exception] = []
         for thing in list(self._keep.values()):
             try:
@@ -110,10 +110,10 @@ class CellRegistry:
             raise ExceptionGroup("not everything could be stopped", failures)
 
     def close(self) -> None:
-        """Ends everything."""
+        """Ends all resources."""
         self._owned.clear()
         for thing in reversed(list(self._keep.values())):
-            with suppress(Exception):  # The process ends: what cannot be closed must not keep the others open.
+            with suppress(Exception):  # The process ends: an error must not keep others open.
                 thing.close()
 
     def _current(self) -> str | None:
@@ -125,7 +125,7 @@ class CellRegistry:
 
 
 def kernel_cells() -> CellRegistry:
-    """Returns the kernel's own."""
+    """Returns the instance of the kernel."""
     global _kernel_cells
     if _kernel_cells is None:
         shell = None
@@ -148,11 +148,11 @@ def _name(cell_id: str | None, code: str | None) -> str:
 
 
 def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
-    """Has every interrupt of the kernel stop what moves, whatever its main thread does at that moment.
+    """Makes every interrupt of the kernel stop all motions, whatever its main thread does at that moment.
 
-    ipykernel ignores an interrupt while it is idle, swallows one that comes while it handles a widget's message, and
-    does not wake its event loop for one that is to cancel a cell which awaits. The interpreter informs a thread of
-    each (`signal.set_wakeup_fd`), also while the main thread is in a library.
+    ipykernel ignores an interrupt while it is idle, drops one that comes while it handles a widget's message, and does
+    not wake its event loop for one that is to cancel a cell which awaits. The interpreter informs a thread of each
+    (`signal.set_wakeup_fd`), also while the main thread is inside a library.
     """
     kernel = getattr(shell, "kernel", None)
     if kernel is None or not hasattr(kernel, "io_loop"):

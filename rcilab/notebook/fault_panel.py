@@ -1,4 +1,4 @@
-"""Faults: each of the manual's, really provoked on a private controller, and the flight recorder of the last stop."""
+"""Faults: each fault of the manual, provoked on a private controller, and the flight recorder of the last stop."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.exhibition import exhibit_fault
+from rcilab.app.displayed_motion import display_fault
 from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.fault_lab.table import FaultTable
-from rcilab.app.status_text import tell_error, tell_remedy
+from rcilab.app.status_text import describe_remedy, explain_error
 from rcilab.core.errors import RcilabError
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Text, message
-from rcilab.notebook.exhibit_plot import draw_exhibit
+from rcilab.notebook.demo_plot import draw_demo
 from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.part import Part
@@ -25,28 +25,28 @@ from rcilab.notebook.widget_sharing import lean
 
 
 class FaultPanel(Part):
-    """The twenty faults, which of them are set now, and the last milliseconds before a stop.
+    """All faults, those that are set now, and the last milliseconds before a stop.
 
-    "Provoke" has the chosen fault happen on a private virtual controller, which nobody else sees and which ends with
-    this panel; the robot of the notebook is not touched. `Scene`, `Timeline` and `MotionPlot` of the same arm go to the
-    moment of the fault, until somebody plans, poses or executes.
+    "Provoke" provokes the chosen fault on a private virtual controller, which has no other client and ends with this
+    panel; the robot of the notebook is not touched. `Scene`, `Timeline` and `MotionPlot` of the same arm show the
+    moment of the fault, until the next plan, goal or execution.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
-        self.exhibit: FaultDemo | None = None
-        """The fault on show; None as long as none was provoked."""
+        self.demo: FaultDemo | None = None
+        """The displayed fault; None before the first one."""
         self._faults = FaultTable(self.model)
-        self._failed = ""  # Why it could not be provoked.
+        self._failed = ""  # Why the last one failed.
         self._now, self._shown_text, self._record = block(), block(), block()
         self._set: tuple[FaultCode, ...] | None = None
         self._arm = PrivateArm()
-        self._work: LongTask[FaultCode, FaultDemo] = LongTask(text, "rcilab-gallery", self._take, self._tell)
+        self._work: LongTask[FaultCode, FaultDemo] = LongTask(text, "rcilab-fault-lab", self._take, self._tell)
         self.fault: Any = lean(
             ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(_name(fault, text), fault) for fault in self.model.description.faults],
@@ -62,11 +62,11 @@ class FaultPanel(Part):
         self.build([self._now, self.fault, self._buttons, self._shown_text, self._record], min_width="360px")
         self.fault.observe(lambda _: self._on_fault(), names="value")
         self._tell()
-        self.hear("robot", self._show)
-        self.hear("run", lambda: write(self._record, record_html(self.state, self.text)))
+        self.subscribe("robot", self._show)
+        self.subscribe("run", lambda: write(self._record, record_html(self.state, self.text)))
 
     def halt(self) -> None:
-        """Gives up what is being provoked; the private arm is brought to rest beside."""
+        """Cancels the provocation; the private arm is stopped meanwhile."""
         self._work.give_up()
 
     def end(self) -> None:
@@ -89,31 +89,31 @@ class FaultPanel(Part):
 
     @property
     def _shown(self) -> FaultDemo | None:
-        """The exhibit, if its fault is the one that is chosen."""
-        exhibit = self.exhibit
-        return exhibit if exhibit is not None and exhibit.fault is self.fault.value else None
+        """The demo, if it is that of the chosen fault."""
+        demo = self.demo
+        return demo if demo is not None and demo.fault is self.fault.value else None
 
     def _on_fault(self) -> None:
         if self._shown is None:
-            self.state.exhibit(None)
+            self.state.display(None)
         self._failed = ""
         self._tell()
 
     def _look(self) -> None:
         """Shows the moment of the fault in scene, timeline and curves."""
         if self._shown is not None:
-            self.state.exhibit(exhibit_fault(self._shown))
+            self.state.display(display_fault(self._shown))
 
     def _tell(self) -> None:
         fault: FaultCode | None = self.fault.value  # None: an arm of no maker has no faults.
-        text, exhibit = self.text, self._shown
+        text, demo = self.text, self._shown
         said = self._failed
         if self._work.is_busy and fault is not None:
             said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
         obstacle = self._faults.obstacle(fault)
-        self.moment.layout.display = "none" if exhibit is None else None
-        if exhibit is not None:
-            details = _exhibit_html(exhibit, text)
+        self.moment.layout.display = "none" if demo is None else None
+        if demo is not None:
+            details = _demo_html(demo, text)
         else:
             details = ("" if fault is None else _card_html(fault, text)) + soft(
                 text("fault.private") if obstacle is None else text.render(obstacle)
@@ -123,16 +123,16 @@ class FaultPanel(Part):
 
     def _provoke(self) -> None:
         fault: FaultCode = self.fault.value
-        self.exhibit, self._failed = None, ""
-        self.state.exhibit(None)
+        self.demo, self._failed = None, ""
+        self.state.display(None)
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
         self._tell()
 
     def _take(self, fault: FaultCode, found: FaultDemo | RcilabError) -> None:
         if isinstance(found, RcilabError):
-            self._failed = problem(self.text.render(message("learn.failed", error=tell_error(found))))
+            self._failed = problem(self.text.render(message("learn.failed", error=explain_error(found))))
             return
-        self.exhibit = found
+        self.demo = found
         self.fault.value = found.fault
         self._look()
 
@@ -159,12 +159,12 @@ def _card_html(fault: FaultCode, text: Text) -> str:
         f'<div class="rl-card rl-none"><b>{esc(fault.manual_name)}</b> '
         f'<span class="rl-soft">{esc(text("fault.bit", bit=int(fault)))}</span>'
         f"<p>{esc(text(f'fault.{fault.key}'))}</p>"
-        f'<p class="rl-soft">{esc(tell_remedy(fault, text))}</p></div>'
+        f'<p class="rl-soft">{esc(describe_remedy(fault, text))}</p></div>'
     )
 
 
-def _exhibit_html(exhibit: FaultDemo, text: Text) -> str:
-    factor = text.units.from_si(exhibit.condition.unit)[0]
-    picture = draw_exhibit(exhibit, text(f"condition.{exhibit.condition.id}"), text("plot.time"), factor)
-    script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(exhibit.script)}</pre></details>"
-    return f"{head_html(exhibit, text)}{picture}{body_html(exhibit, text)}{script}"
+def _demo_html(demo: FaultDemo, text: Text) -> str:
+    factor = text.units.from_si(demo.condition.unit)[0]
+    picture = draw_demo(demo, text(f"condition.{demo.condition.id}"), text("plot.time"), factor)
+    script = f"<details><summary>{esc(text('learn.script'))}</summary><pre>{esc(demo.script)}</pre></details>"
+    return f"{head_html(demo, text)}{picture}{body_html(demo, text)}{script}"

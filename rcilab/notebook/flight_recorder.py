@@ -1,4 +1,4 @@
-"""The flight recorder: what the joints did in the last milliseconds before a motion was stopped."""
+"""The flight recorder: the joints in the last milliseconds before a motion was stopped."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rcilab.notebook.style import head, soft, table
 from rcilab.notebook.svg_plot import Panel, draw
 from rcilab.views.plots import Quantity, build_frame, recorded_curves
 
-_RECORDED = 400  # Cycles before the end that are drawn: 0.4 s.
+_RECORDED = 400  # Drawn cycles before the end: 0.4 s.
 _LISTED = 8
 _QUANTITIES: tuple[Quantity, ...] = ("dq", "ddq", "jerk")
 _HEADS = ("cycle", "t", "success", "late", "joint", "velocity")
 
 
 def record_html(state: LabState, text: Text) -> str:
-    """Returns the last cycles of an execution that was not allowed to end, as curves and as a table."""
+    """Returns the last cycles of an execution that did not reach its end, as curves and as a table."""
     rows = _last_rows(state)
     if rows is None:
         return head(text("fault.recorder")) + soft(text("fault.no_record"))

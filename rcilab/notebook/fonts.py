@@ -1,4 +1,4 @@
-"""Which fonts a matplotlib figure is written in: its own have no Chinese characters."""
+"""Fonts of matplotlib figures: its own have no Chinese characters."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _CHINESE = (
     "Songti",
     "Droid Sans Fallback",
 )
-"""What a font with Chinese characters has in its name, as far as they are common on Linux, Windows and macOS."""
+"""Parts of the names of fonts with Chinese characters on Linux, Windows and macOS."""
 
 
 @contextmanager
 def writing(language: Language) -> Iterator[Language]:
-    """Has text that is made inside drawn in fonts that can write a language.
+    """Selects fonts that contain the characters of a language, for text that is created inside.
 
     Yields:
-        The language that can be written here: English where there is no font for Chinese, because rows of empty boxes
-        are of no use to a reader.
+        The language to use: English if there is no font for Chinese, as rows of empty boxes do not help a
+        reader.
     """
     family = chinese_font() if language == "zh" else None
     if family is None:
@@ -37,7 +37,7 @@ def writing(language: Language) -> Iterator[Language]:
         return
     from matplotlib import rc_context, rcParams
 
-    with rc_context({"font.family": [*rcParams["font.family"], family]}):  # The usual one writes what it can.
+    with rc_context({"font.family": [*rcParams["font.family"], family]}):  # The usual font for all characters it has.
         yield "zh"
 
 

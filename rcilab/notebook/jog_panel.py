@@ -1,4 +1,4 @@
-"""Sliders and typed numbers that pose the arm joint by joint: degrees for the hand, radians for the code."""
+"""Sliders and typed numbers for the joints: degrees on screen, radians in code."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from rcilab.notebook.widget_sharing import lean
 
 _STEP_DEG = 0.5
 _BUTTONS: dict[PoseName, str] = {"home": "home", "zero": "zero", "here": "arm", "undo": "undo"}
-"""Poses that a button takes, and what the catalogues call it."""
+"""Poses of buttons, and their names in the catalogues."""
 
 
 class JogPanel(Part):
-    """One slider and one number a joint, and the pose of the tool. It poses the goal; it never moves a robot.
+    """One slider and one number per joint, and the pose of the tool. It sets the goal; it never moves a robot.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        q: Where to begin, shape (n,), [rad]; the arm's home, or the goal of the other part, when absent.
-        continuous: Whether a slider reports while it is dragged, or once when it is let go.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        q: Initial joint angles, shape (n,), [rad]; defaults to the arm's home, or the goal of the other part.
+        continuous: Whether a slider reports while it is dragged, or once at the end of the drag.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
 
     Raises:
         InvalidValueError: The subject is unknown, or q is not n angles inside the limits.
@@ -70,11 +70,11 @@ class JogPanel(Part):
         buttons = [self._button(name) for name in _BUTTONS]
         self._pose, self._reach = block(), block()
         self.build([*rows, lean(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
-        self.hear("goal", self._show)
+        self.subscribe("goal", self._show)
 
     @property
     def q(self) -> JointVector:
-        """Joint angles of the goal, shape (n,), read-only, [rad]. Can be set; everything follows."""
+        """Joint angles of the goal, shape (n,), read-only, [rad]. Can be set; all parts follow."""
         return self.state.now.goal.q
 
     @q.setter
@@ -93,11 +93,11 @@ class JogPanel(Part):
                 field.show(angle)
         finally:
             self._writing = False
-        write(self._pose, self._tell_pose())
+        write(self._pose, self._describe_pose())
         reach = state.now.goal.reach
         write(self._reach, verdict(reach.tone, self.text(f"reach.tone.{reach.tone}"), self.text.render(reach.reason)))
 
-    def _tell_pose(self) -> str:
+    def _describe_pose(self) -> str:
         pose = self.model.forward(self.state.now.goal.q)
         numbers = np.round(np.concatenate((1e3 * pose.position, np.degrees(pose.rpy))), 1) + 0.0  # No -0.0.
         names = [self.text(f"target.{name}") for name in ("x", "y", "z", "roll", "pitch", "yaw")]
@@ -136,7 +136,7 @@ class JogPanel(Part):
 
 
 def _row(slider: Any, field: NumberField) -> Any:
-    """Returns the slider between its limits, which is where a hand looks for them, and the number."""
+    """Returns the slider with its limits at both ends, and the number."""
     low, high = (f"<span>{end:.0f}°</span>" for end in (slider.min, slider.max))
     before = block(f'<div class="rl-ends"><span>{slider.tooltip}</span>{low}</div>', width="8em", flex="0 0 auto")
     behind = block(high, width="2.6em", flex="0 0 auto")

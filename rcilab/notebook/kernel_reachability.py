@@ -1,17 +1,17 @@
-"""Where the browser is, as far as the kernel can know: what decides whether a page of the kernel's can be framed.
+"""Where the browser runs, as far as the kernel can know: whether it can show a page of the kernel in a frame.
 
-The rule, first line that fits:
+The rule; the first line that applies:
 
-    1  Colab                                                            static: its frames reach no port of ours
-    2  VS Code in a browser (code-server), which says where a port is   proxy, at the address that it says
+    1  Colab                                                            static: its frames reach no port of the kernel
+    2  VS Code in a browser (code-server), which names port addresses   proxy, at the address that it names
     3  VS Code with a kernel elsewhere: over ssh, in a container, ...,  static
-       or of a notebook server as in 4, whose paths its page has not
+       or of a notebook server as in 4, whose paths VS Code's page lacks
     4  a hub, a server that listens beyond loopback, a server below a   proxy where jupyter-server-proxy is installed,
-       path of its own (so something stands before it), or ssh          static where it is not
-    5  else the browser is on this machine                              loopback
+       path of its own (so there is something in front), or ssh         static otherwise
+    5  otherwise the browser is on this machine                         loopback
 
-The front end is known from the cell that runs: VS Code's cells have an address of its own. Where no cell runs, what VS
-Code has started is known by its variables (microsoft/vscode-jupyter hands its own environment on to its kernels).
+The front end is known from the running cell: VS Code's cells have a special address. If no cell runs, VS Code is
+recognised by its environment variables (microsoft/vscode-jupyter passes its environment to its kernels).
 """
 
 from __future__ import annotations
@@ -29,29 +29,29 @@ from rcilab.i18n.notebook_language import shell
 
 Way = Literal["loopback", "proxy", "static"]
 _LOOPBACK = ("127.0.0.1", "localhost", "::1", "")
-_CODE_CELL = "vscode-"  # What the addresses of its cells begin with.
-_CODE_SERVER = "CODE_SERVER_PARENT_PID"  # Others that tell where a port is want a login that VS Code's page has not.
+_CODE_CELL = "vscode-"  # Prefix of the addresses of its cells.
+_CODE_SERVER = "CODE_SERVER_PARENT_PID"  # Others that name port addresses need a login that VS Code's page lacks.
 _CODE_PORTS, _PORT = "VSCODE_PROXY_URI", "{{port}}"
 _CODE_ELSEWHERE = ("SSH_CONNECTION", "REMOTE_CONTAINERS", "CODESPACES")
-_CODE_REMOTE = "VSCODE_IPC_HOOK_CLI"  # Its kernels have it where VS Code's own part beside them is a server's.
+_CODE_REMOTE = "VSCODE_IPC_HOOK_CLI"  # Its kernels have it if VS Code's backend is that of a server.
 _CODE_SAME = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KernelReachability:
-    """How a page that the kernel serves on loopback reaches the browser."""
+    """How the browser reaches a page that the kernel serves on loopback."""
 
     way: Way
-    """loopback: by its own address; proxy: below the notebook server's; static: not at all."""
+    """loopback: by its own address; proxy: through the notebook server; static: not at all."""
     base: str = "/"
     """Path of the notebook server, with slashes at both ends."""
     ports: str = ""
-    """Where code-server shows the ports of its machine, {{port}} in place of the number; empty without one."""
+    """Address at which code-server shows the ports of its machine, with {{port}} for the number; empty without one."""
     proxy_helps: bool = True
-    """Whether jupyter-server-proxy beside the notebook server would make a static place a live one."""
+    """Whether jupyter-server-proxy on the notebook server would turn static into live."""
 
     def address(self, url: str) -> str:
-        """Returns where the browser finds a page of ours.
+        """Returns the address of our page for the browser.
 
         Args:
             url: Its address on loopback, http://127.0.0.1:PORT/PATH.
@@ -81,10 +81,10 @@ def find_place(
     """Returns how the browser of this notebook reaches the kernel, by the rule above.
 
     Args:
-        environment: Of the kernel; its own when absent.
-        server: What started it; looked up when absent.
-        has_proxy: Whether jupyter-server-proxy is installed; looked up when absent.
-        cell: What the notebook calls the cell that runs; looked up when absent.
+        environment: Environment of the kernel; defaults to that of this process.
+        server: The server that started it; looked up by default.
+        has_proxy: Whether jupyter-server-proxy is installed; looked up by default.
+        cell: Id of the running cell; looked up by default.
     """
     known = os.environ if environment is None else environment
     if "COLAB_RELEASE_TAG" in known:
@@ -103,7 +103,7 @@ def find_place(
 
 
 def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) -> bool:
-    """Returns whether VS Code shows the notebook. A server started in its terminal inherits its variables."""
+    """Returns whether VS Code shows the notebook. A server that runs in its terminal has its variables, too."""
     if cell is not None:
         return cell.startswith(_CODE_CELL)
     return server is None and any(name.startswith("VSCODE_") for name in known)
@@ -119,7 +119,7 @@ def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> KernelReacha
 
 
 def _find_cell() -> str | None:
-    """Returns what the notebook calls the cell that runs; None where none runs, or it has no name."""
+    """Returns the id of the running cell; None if no cell runs, or if it has no id."""
     found = shell()
     parent = found.get_parent() if hasattr(found, "get_parent") else {}
     name = parent.get("metadata", {}).get("cellId")
@@ -127,11 +127,11 @@ def _find_cell() -> str | None:
 
 
 def _find_server(environment: Mapping[str, str]) -> Server | None:
-    """Returns the server whose child this kernel is; None where no server of this machine is it."""
+    """Returns the server whose child this kernel is; None if no server of this machine is its parent."""
     parent = environment.get("JPY_PARENT_PID", "")
     if "ipykernel" not in sys.modules or not parent.isdecimal():
         return None
-    from jupyter_core.paths import jupyter_runtime_dir  # Asking jupyter_server itself would load it all: a second.
+    from jupyter_core.paths import jupyter_runtime_dir  # jupyter_server itself takes a second to load.
 
     try:
         entry: Any = json.loads((Path(jupyter_runtime_dir()) / f"jpserver-{parent}.json").read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""JupyterLab on the lessons, on this machine only: it asks the network for nothing, and nothing pops up."""
+"""JupyterLab with the lessons, on this machine only: it makes no network requests and shows no pop-ups."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ def lab_command(
     """Returns the command that opens JupyterLab on a directory, listening on loopback only.
 
     Args:
-        directory: Where the notebooks are.
-        port: TCP port; None takes Jupyter's own choice, 8888 or the next free one.
-        browser: Whether to open a browser too.
+        directory: Directory of the notebooks.
+        port: TCP port; None takes Jupyter's default, 8888 or the next free one.
+        browser: Whether to open a browser, too.
         allow_root: Whether root may run it, as in a container; Jupyter refuses otherwise.
 
     A directory with a page `index.md` is opened on that page.
 
     Raises:
-        UsageError: JupyterLab is not installed, there is no such directory, or root has not asked to be allowed.
+        UsageError: JupyterLab is not installed, there is no such directory, or root needs `allow_root`.
     """
     require_lab(allow_root=allow_root)
     if not os.path.isdir(directory):
         raise UsageError(f"there is no directory {directory}: name one that holds notebooks")
     command = [sys.executable, "-m", "jupyterlab", str(directory), "--ServerApp.ip=127.0.0.1"]
-    command.append("--LabApp.extension_manager=readonly")  # The other kind asks PyPI what there is.
+    command.append("--LabApp.extension_manager=readonly")  # The default one queries PyPI.
     if (directory / INDEX).is_file():
-        command.append(f"--LabApp.default_url=/lab/tree/{INDEX}")  # Our settings show it as a page, not as its source.
+        command.append(f"--LabApp.default_url=/lab/tree/{INDEX}")  # Our settings open it as a page, not as its source.
     command.append(f"--LabApp.workspaces_dir={_workspaces(directory)}")
     if port is not None:
         command += [f"--ServerApp.port={port}", "--ServerApp.port_retries=0"]
@@ -49,7 +49,7 @@ def lab_command(
 
 
 def _workspaces(directory: Path) -> Path:
-    """Returns where JupyterLab keeps the open tabs of a directory; shared, it looks for them in every other one."""
+    """Returns the workspace of a directory; with a shared one, JupyterLab would open its tabs in every other one."""
     from jupyter_core.paths import jupyter_config_dir
 
     digest = sha256(str(directory.resolve()).encode()).hexdigest()[:8]
@@ -57,13 +57,13 @@ def _workspaces(directory: Path) -> Path:
 
 
 def require_lab(*, allow_root: bool = False) -> None:
-    """Makes sure that JupyterLab can be started.
+    """Checks that JupyterLab can be started.
 
     Args:
         allow_root: See `lab_command`.
 
     Raises:
-        UsageError: It is not installed, or root has not asked to be allowed.
+        UsageError: It is not installed, or root needs `allow_root`.
     """
     require_installed("jupyterlab", "the lab")
     if os.geteuid() == 0 and not allow_root:
@@ -71,9 +71,9 @@ def require_lab(*, allow_root: bool = False) -> None:
 
 
 def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
-    """Returns what JupyterLab is started in: defaults of ours below the settings that a person has made.
+    """Returns the environment of JupyterLab: our defaults below the user's own settings.
 
-    Without them it asks at the first start whether it may fetch news, over whatever is being shown.
+    Without them it asks at the first start whether it may fetch news.
 
     Args:
         environment: Of this process.
@@ -84,6 +84,6 @@ def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def open_lab(command: list[str]) -> int:
-    """Becomes JupyterLab: this process is replaced, so that Ctrl-C reaches it and nothing is left behind."""
+    """Replaces this process by JupyterLab, so that Ctrl-C reaches it and no process is left."""
     sys.stdout.flush()
     os.execve(command[0], command, lab_environment(os.environ))

@@ -1,4 +1,4 @@
-"""The whole lab in one cell: scene, timeline, plots, and a tab for each thing a person does."""
+"""The whole lab in one cell: scene, timeline, plots, and a tab for each task."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ if TYPE_CHECKING:
     from rcilab.notebook.run_panel import RunPanel
     from rcilab.notebook.target_panel import TargetPanel
 
-_FRAME = 20  # [px] A tab's own frame is higher than the timeline below the scene by so much.
-_LOWEST_TAB = 420  # [px] A smaller scene has higher tabs beside it.
+_FRAME = 20  # [px] By which a tab's frame is higher than the timeline below the scene.
+_LOWEST_TAB = 420  # [px] Minimum height of the tabs next to a small scene.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
-"""Words of each tab, and the attribute of what is on it."""
+"""Text key of each tab, and the attribute with its part."""
 
 
 class Lab(Part):
-    """Everything in one cell; Stop is always in sight.
+    """Everything in one cell; Stop is always visible.
 
-    The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a hand can. What is on
-    a tab is made when the tab is opened, or the attribute asked for: the cell need not wait for hidden tabs.
+    The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a click can. The part
+    of a tab is created when the tab is opened, or the attribute is read: the cell does not wait for hidden tabs.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        view: Of the scene, see `Scene`.
-        height: Of the scene, [px].
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
-        place: Where the browser is; found out when absent.
+        subject: A model, a session, or another part of the same arm.
+        view: View of the scene, see `Scene`.
+        height: Height of the scene, [px].
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
+        place: Where the browser runs; detected by default.
 
     Raises:
         InvalidValueError: The subject, the view or the language is unknown.
@@ -67,7 +67,7 @@ class Lab(Part):
         self.plot = MotionPlot(self)
         self.jog = JogPanel(self)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
-        # No higher than the scene beside it with its timeline: what is below stays where it is from tab to tab.
+        # Not higher than the scene with its timeline: what is below keeps its place from tab to tab.
         tab = {"max_height": f"{max(height - _FRAME, _LOWEST_TAB)}px", "overflow": "hidden auto"}
         self._places: dict[str, Any] = {
             name: lean(ipywidgets.VBox, layout=tab, classes=("rl-tab",)) for name in _TABS.values()
@@ -96,10 +96,10 @@ class Lab(Part):
         )
         body = lean(ipywidgets.HBox, [left, self.tabs], layout={"flex_flow": "row wrap", "grid_gap": "10px"})
         self.build([bar, body, self.plot.widget], width="100%")
-        self._ends.append(self.state.hear("plan", self._show))
-        self.hear("robot", self._show)
+        self._ends.append(self.state.subscribe("plan", self._show))
+        self.subscribe("robot", self._show)
         if self.state.session is not None:
-            self._open("run")  # It looks after the robot that there is.
+            self._open("run")  # It connects to the robot of a session.
 
     @cached_property
     def target(self) -> TargetPanel:
@@ -108,7 +108,7 @@ class Lab(Part):
 
     @cached_property
     def plan(self) -> PlanPanel:
-        """Way, speed, law."""
+        """Path type, speed, time law."""
         return self._make("plan", "PlanPanel")
 
     @cached_property
@@ -123,15 +123,15 @@ class Lab(Part):
 
     @cached_property
     def faults(self) -> FaultPanel:
-        """Gallery and flight recorder."""
+        """Fault lab and flight recorder."""
         return self._make("faults", "FaultPanel")
 
     def halt(self) -> None:
-        """Brings the robot to rest; from any thread, without waiting."""
+        """Stops the robot; from any thread, without waiting."""
         self.state.halt()
 
     def end(self) -> None:
-        """Ends every part with what it started."""
+        """Ends all parts with what they started."""
         for part in reversed(self._parts):
             part.close()
 

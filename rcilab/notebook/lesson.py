@@ -1,4 +1,4 @@
-"""What the lessons share: the language they are read in, and the word on an exercise."""
+"""Functions of the lessons: the reader's language, and the result of an exercise."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ _WORDS: dict[Language, tuple[str, str]] = {"en": ("not yet", "right"), "zh": ("�
 
 
 def answer(is_right: bool, fact: str) -> None:
-    """Prints whether an exercise is solved, in the reader's language, and the number that decided it.
+    """Prints whether an exercise is solved, in the reader's language, and the deciding number.
 
     Args:
-        is_right: Whether it is.
-        fact: What was found, in symbols and units, so that it needs no translation: "T = 1.952 s".
+        is_right: Whether it is solved.
+        fact: The result, in symbols and units, which need no translation: "T = 1.952 s".
     """
     word = _WORDS[language()][bool(is_right)]
     print(f"{'✓' if is_right else '✗'} {word}: {fact}")

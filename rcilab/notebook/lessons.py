@@ -1,4 +1,4 @@
-"""The lessons that come with rcilab, and a student's copies of them, which are the student's: never overwritten."""
+"""The lessons of rcilab, and a student's copies of them, which are never overwritten."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from rcilab.core.atomic_file import read_own_text, write_atomic
 from rcilab.core.errors import UsageError
 
 INDEX = "index.md"
-"""The page of the course: every lesson by its title, English and Chinese apart."""
+"""The page of the course: every lesson by its title, English and Chinese separately."""
 FOLDER = "rcilab-notebooks"
 """Name of the folder of the copies, in the home directory."""
 
-_RECORD = ".rcilab-lessons.json"  # SHA-256 of each file as it was given out: a file that differs was edited.
+_RECORD = ".rcilab-lessons.json"  # SHA-256 of each file when it was copied: a file that differs was edited.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CopiedLessons:
-    """What `copy_lessons` has done; `str` makes a sentence of it."""
+    """The result of `copy_lessons`; `str` returns it as a sentence."""
 
     folder: Path
-    """Where the copies are."""
+    """Folder of the copies."""
     written: tuple[str, ...]
     """Files that are new, or newer versions of unedited copies."""
     beside: tuple[str, ...]
-    """Newer versions of copies that had been edited, under names of their own."""
+    """Newer versions of copies that had been edited, under new names."""
 
     def __str__(self) -> str:
         text = f"lessons: your copies are in {self.folder}"
@@ -54,11 +54,11 @@ def find_lessons() -> Path:
 
 
 def copy_lessons(folder: Path, source: Path | None = None) -> CopiedLessons:
-    """Copies the lessons into a folder; a copy that was edited stays as it is, and a newer lesson goes beside it.
+    """Copies the lessons into a folder; an edited copy is kept, and a newer lesson is put next to it.
 
     Args:
-        folder: Where to; it is made.
-        source: Where the lessons are; None finds them.
+        folder: Folder of the copies; it is created.
+        source: Folder of the lessons; None finds it.
 
     Raises:
         UsageError: The folder cannot be written, or there are no lessons.
@@ -84,12 +84,12 @@ def copy_lessons(folder: Path, source: Path | None = None) -> CopiedLessons:
 
 
 def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | None:
-    """Returns the name that a lesson is written to, or None where it has been given out already."""
+    """Returns the file name for a lesson, or None if it has been copied already."""
     digest = _digest(text)
     for candidate in _names(name):
         file = folder / candidate
         if not file.exists():
-            was_declined = candidate != name and given.get(candidate) == digest  # Offered beside, and deleted.
+            was_declined = candidate != name and given.get(candidate) == digest  # Copied once, and deleted.
             return None if was_declined else candidate
         found = _digest(_read_copy(file))
         if digest in (found, given.get(candidate)):
@@ -100,7 +100,7 @@ def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | N
 
 
 def _read_copy(file: Path) -> str:
-    """Returns the text of a copy; nothing where it is no longer one: something else, no text, or of many megabytes."""
+    """Returns the text of a copy; nothing if it is not a regular text file of reasonable size."""
     try:
         return read_own_text(file)
     except UnicodeDecodeError:
@@ -112,7 +112,7 @@ def _read_copy(file: Path) -> str:
 
 
 def _names(name: str) -> Iterator[str]:
-    """Yields 01_x.zh.ipynb, 01_x.new.zh.ipynb, 01_x.new2.zh.ipynb, ...: the ending names the language."""
+    """Yields 01_x.zh.ipynb, 01_x.new.zh.ipynb, 01_x.new2.zh.ipynb, ...: the ending gives the language."""
     yield name
     stem, _, ending = name.partition(".")
     number = 1

@@ -1,4 +1,4 @@
-"""Soft joint limits, and whether a virtual controller leads commands to a standstill inside them."""
+"""Soft joint limits, and whether a virtual controller stops commands inside them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.app.arm_features import tell_lack
+from rcilab.app.arm_features import explain_lack
 from rcilab.app.run.world_actions import SetWiring, WorldActions
 from rcilab.app.setup.setup_fields import exact_end, joint_limits_between
 from rcilab.control_process import SupervisorStatus
@@ -25,18 +25,18 @@ from rcilab.notebook.style import block, problem, soft, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 from rcilab.robots import describe_robot
 
-_WIDTHS = ("9.2em", "3.4em", "2.6em")  # So that both ends of a joint stand in a row.
+_WIDTHS = ("9.2em", "3.4em", "2.6em")  # With both ends of a joint in one row.
 
 
 class LimitFields:
-    """A folded group of `RunPanel`; what is typed is a proposal until it is sent.
+    """A folded group of `RunPanel`; typed values are sent by a button.
 
     Args:
-        state: What the parts share.
-        text: Words.
+        state: State of the lab.
+        text: The catalogue.
         world: Sets auto_limit at a virtual controller.
-        send: Sends a request to the robot that is connected, by its name.
-        button: Makes a button of the panel.
+        send: Sends a request to the connected robot, by its name.
+        button: Creates a button of the panel.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class LimitFields:
 
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller and the limits of the arm."""
-        lack = tell_lack(self._state.model, "joints")
+        lack = explain_lack(self._state.model, "joints")
         write(self._lack, why_html(self._text, lack))
         for field in chain.from_iterable(self.fields):
             field.box.disabled = lack is not None
@@ -91,7 +91,7 @@ class LimitFields:
         is_virtual = self._state.robot is not None and now.is_virtual
         self.auto.disabled = not is_ready or not is_virtual
         self._writing = True
-        # A folder that was never opened needs no look at the controller.
+        # A group that was never opened needs no status of the controller.
         self.auto.value = bool(self.fields) and is_virtual and now.world.auto_limit
         self._writing = False
         limits = self._state.model.limits.joint
@@ -99,7 +99,7 @@ class LimitFields:
             self._fill(limits)
 
     def take(self, error: RcilabError | None) -> None:
-        """Takes note of the answer: model, plan and checks have the limits that a controller has taken."""
+        """Takes the answer: model, plan and checks use the limits that a controller has accepted."""
         asked, self._asked = self._asked, None
         if error is None and asked is not None:
             self._state.limit_joints(asked.lower, asked.upper)
@@ -141,7 +141,7 @@ class LimitFields:
                 self._world.set_wiring(SetWiring(name="auto_limit", on=bool(change["new"])))
 
     def _on_open(self, change: Any) -> None:
-        """Makes the fields when they are wanted: fourteen of them would delay the cell."""
+        """Creates the fields when they are needed: fourteen of them would delay the cell."""
         if change["new"] != 0 or self.fields:
             return
         own = describe_robot(self._state.model.name).limits.joint

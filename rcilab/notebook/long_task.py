@@ -1,4 +1,4 @@
-"""What takes longer than a press may: done beside the kernel's threads, with how far it is, and Cancel."""
+"""Long tasks, done in another thread than the kernel's, with a progress bar and Cancel."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
 
-_LOOK = 0.1  # [s] Between two looks at what is being done.
+_LOOK = 0.1  # [s] Between two looks at the progress.
 
 
 class LongTask(Generic[Context, Result]):
-    """One job of a part at a time; a bar and a button that are there while it is done.
+    """One task of a part at a time; bar and button are visible meanwhile.
 
     Args:
-        text: Words of the part.
+        text: Catalogue of the part.
         name: Of the threads.
-        take: Called with what the job was about and what came of it, by the thread that watches it.
-        rest: Called when nothing is being done any more, whatever came of it.
-        shown_after: For how long work is not worth a bar, [s].
+        take: Called with the subject and the result of the task, by the watching thread.
+        rest: Called when no task is in progress any more, with any result.
+        shown_after: Shortest duration of a task with a progress bar, [s].
     """
 
     def __init__(
@@ -57,14 +57,14 @@ class LongTask(Generic[Context, Result]):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is being done."""
+        """Whether a task is in progress."""
         return self._work.progress is not None
 
     def start(self, about: Context, run: Callable[[ProgressCallback], Result]) -> None:
-        """Begins; what was being done is dropped.
+        """Starts a task; the one in progress is dropped.
 
         Args:
-            about: What it is about; comes back with the result.
+            about: Its subject; `take` gets it with the result.
             run: Does it.
         """
         self.end()
@@ -77,7 +77,7 @@ class LongTask(Generic[Context, Result]):
         self._watcher.start()
 
     def wait_if_code(self) -> None:
-        """Returns to the page at once; to code that has pressed, a cell or a program, when there is a result."""
+        """Returns to the page at once; to code, a cell or a program, when there is a result."""
         watcher = self._watcher
         if watcher is None or not kernel_cells().is_calling:
             return
@@ -88,11 +88,11 @@ class LongTask(Generic[Context, Result]):
             raise
 
     def give_up(self) -> None:
-        """Drops what is being done; from any thread, without waiting."""
+        """Drops the task in progress; from any thread, without waiting."""
         self._work.cancel()
 
     def end(self) -> None:
-        """Cancels the work and waits until its watcher has ended."""
+        """Cancels the task and waits for the end of its watching thread."""
         self._ending.set()
         self._work.cancel()
         watcher, self._watcher = self._watcher, None
@@ -108,7 +108,7 @@ class LongTask(Generic[Context, Result]):
                     self._take(*self._work.pop_result())
                     return
                 share = self._work.progress
-                if share is None:  # Given up.
+                if share is None:  # Cancelled.
                     return
                 self.progress.value = share
                 self._show(True)

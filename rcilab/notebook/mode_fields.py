@@ -1,4 +1,4 @@
-"""Which of the five modes, and the parameters that have an effect in it, each with its unit and range."""
+"""The choice of the mode, and the parameters that have an effect in it, each with its unit and range."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import is_only_planned, tell_lack
+from rcilab.app.arm_features import explain_lack, is_only_planned
 from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
 from rcilab.app.run.mode_parameters import held_rows, is_control_pending, name_group, shown_numbers
 from rcilab.control_process import SupervisorStatus
@@ -21,16 +21,16 @@ from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, why_html, write
 from rcilab.notebook.widget_sharing import lean
 
-_WIDTHS = ("8em", "3.4em", "4.2em")  # So that two fields stand in a row inside `Lab`.
+_WIDTHS = ("8em", "3.4em", "4.2em")  # With two fields in one row inside `Lab`.
 
 
 class ModeFields:
-    """Two groups of `RunPanel`: `choice` stands before Execute, `parameters` below it.
+    """Two groups of `RunPanel`: `choice` before Execute, `parameters` below it.
 
     Args:
-        state: What the parts share.
-        text: Words.
-        modes: Asks the robot.
+        state: State of the lab.
+        text: The catalogue.
+        modes: Sends requests to the robot.
     """
 
     def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
@@ -43,7 +43,7 @@ class ModeFields:
         )  # fmt: skip
         self._note, self._lack, self._held, self._said = block(), block(), block(), block()
         self.fields: dict[str, list[NumberField]] = {}
-        """By group, of the groups that were opened."""
+        """Fields by group, of the groups that were opened."""
         self.folders: dict[str, Any] = {group.name: self._folder(group) for group in self._groups}
         self.send = self._button("control.send", self._on_send)
         self.reset = self._button("control.reset", partial(self._ask, PressControl(what="reset")))
@@ -60,12 +60,12 @@ class ModeFields:
         self.mode.observe(self._on_mode, names="value")
 
     def show(self, status: SupervisorStatus | None) -> None:
-        """Follows mode, parameters and what the controller has of them."""
+        """Follows mode, parameters and the controller's values of them."""
         state, text = self._state, self._text
         self.mode.value = state.now.drive.mode
         is_moving = status is not None and status.phase in ("moving", "stopping")
         self.mode.disabled = is_moving or is_only_planned(state.model)
-        lack = tell_lack(state.model, state.now.drive.mode)
+        lack = explain_lack(state.model, state.now.drive.mode)
         write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if lack is None else text.render(lack)))
         for group in self._groups:
             folder, shown = self.folders[group.name], None if state.now.drive.mode in group.modes else "none"
@@ -77,15 +77,15 @@ class ModeFields:
             for group in self._groups:
                 if group.name in self.fields:
                     self._fill(group)
-        control_lack = tell_lack(state.model, "control")
+        control_lack = explain_lack(state.model, "control")
         write(self._lack, why_html(text, control_lack))
         self.reset.disabled = control_lack is not None
         pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
         self.send.layout.display = "none" if state.robot is None or state.now.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"
-        write(self._held, "" if status is None else self._tell_held(status, pending))
+        write(self._held, "" if status is None else self._describe_held(status, pending))
 
-    def _tell_held(self, status: SupervisorStatus, pending: bool) -> str:
+    def _describe_held(self, status: SupervisorStatus, pending: bool) -> str:
         state, text = self._state, self._text
         if state.now.drive.refusal is not None:
             return problem(text("ready.control_refused", error=text.render(state.now.drive.refusal)))
@@ -109,13 +109,13 @@ class ModeFields:
     def _ask(self, request: PressControl | SetControl) -> None:
         with self._state.lock:
             self._modes.handlers[type(request)](request)
-            self._state.tell("robot")
+            self._state.notify("robot")
 
     def _set_number(self, group: str, index: int, value: float) -> None:
         self._ask(SetControl(group=group, index=index, value=value))
 
     def _folder(self, group: ParameterGroup) -> Any:
-        """Returns a folder whose fields are made when it is opened: forty of them would delay the cell."""
+        """Returns a group whose fields are created when it is opened: forty of them would delay the cell."""
         inside = lean(ipywidgets.Box, layout={"flex_flow": "row wrap"})
         folder = lean(
             ipywidgets.Accordion, children=[inside], titles=(name_group(self._text, group),),

@@ -1,4 +1,4 @@
-"""The plan as curves against the limits, what broke one shaded, what happened beside it, and a cursor."""
+"""The plan as curves against the limits, violations shaded, the run next to it, and a cursor."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from rcilab.views.plots import (
     streamed_curves,
 )
 
-_BUCKETS = 200  # Of time; each shows its smallest and largest value, so no spike is lost.
+_BUCKETS = 200  # Intervals of time; each shows its smallest and largest value, so no spike is lost.
 _UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jerk": "deg/s³"}
 
 
 class MotionPlot(Part):
-    """Position, velocity, acceleration and jerk of the plan, thinned out so that no extreme value is lost.
+    """Position, velocity, acceleration and jerk of the plan, thinned out without losing any extreme value.
 
-    Grey lies beyond a limit; where the plan breaks one it is shaded red. After an execution the plan is dashed over
-    what happened, with the difference below. The cursor is where `Timeline` looks.
+    The area beyond a limit is grey; a violation of the plan is shaded red. After an execution the plan is dashed over
+    the run, with the difference below. The cursor is at the time of `Timeline`.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
+        subject: A model, a session, or another part of the same arm.
         joint: The joint to show in its own unit, from 1; 0 shows all of them in percent of their limits.
-        quantities: Which rows there are.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        quantities: The rows.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(
@@ -68,13 +68,13 @@ class MotionPlot(Part):
         bar = lean(ipywidgets.HBox, [self.joint, self._kinds], layout={"align_items": "center"})
         self.build([bar, self._curves, self._cursor], self._name, width="100%")
         self.joint.observe(lambda _: self._draw(), names="value")
-        self._ends.append(self.state.hear("run", self._draw))
-        self.hear("plan", self._draw)
-        self.hear("moment", self._point)
+        self._ends.append(self.state.subscribe("run", self._draw))
+        self.subscribe("plan", self._draw)
+        self.subscribe("moment", self._point)
 
     @property
     def html(self) -> str:
-        """The pictures as they are shown, SVG with a legend; a sentence while there is nothing to show."""
+        """The displayed pictures, SVG with a legend; a sentence while there is nothing to show."""
         return str(self._curves.value)
 
     def _draw(self) -> None:

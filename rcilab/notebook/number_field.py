@@ -1,4 +1,4 @@
-"""A number that is typed: taken when Enter is pressed or the field is left, refused with one kind sentence below."""
+"""A typed number: accepted when Enter is pressed or the field is left, or refused with one sentence below."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _LABELLED, _BARE = ("9.5em", "4em", "2.6em"), ("5.2em", "", "2.6em")
 
 
 class NumberField:
-    """A field with its unit behind it; what stands in it is a proposal until it is a finite number in its range.
+    """A field with its unit; its text is accepted once it is a finite number in its range.
 
     Args:
-        text: Words.
-        label: What the number is, in full.
+        text: The catalogue.
+        label: Full name of the number.
         unit: Its unit, such as "deg".
-        low: Smallest number that is taken, in that unit.
+        low: Smallest valid number, in that unit.
         high: Largest one.
-        take: Called with a number that is taken.
-        digits: Digits after the point that are shown; None: as many as it takes.
-        of: What the number is, where it stands beside the field instead of before it.
-        value: What stands in it at first.
-        widths: Of the field with its label, of the label, and of the unit.
+        take: Called with a valid number.
+        digits: Digits after the point; None: as many as needed.
+        of: Name of the number, if it stands in the field's row instead of before it.
+        value: Initial number.
+        widths: Widths of the field with its label, of the label, and of the unit.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class NumberField:
 
     @property
     def problem(self) -> bool:
-        """Whether what stands in the field was refused."""
+        """Whether the text of the field was refused."""
         return bool(self.said.value)
 
     def show(self, value: float) -> None:
-        """Shows a number, whatever was typed."""
+        """Shows a number in place of the text."""
         self._shown = self._write(value)
         write(self.said, "")
         if self.box.value != self._shown:
@@ -90,7 +90,7 @@ class NumberField:
             write(self.said, problem(self._text.render(parsed.problem)))
             return
         write(self.said, "")
-        self._shown = change["new"]  # It is what was meant: a rounded number may follow.
+        self._shown = change["new"]  # This text was meant: a rounded number may follow.
         self._take(parsed.value)
 
 

@@ -1,4 +1,4 @@
-"""The lab's own packages are an extra: the message for a missing one says how to install it."""
+"""The lab's packages are an extra: the error for a missing one says how to install it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from rcilab.core.errors import UsageError
 
 
 def require_installed(package: str, purpose: str) -> None:
-    """Does nothing when a package is here.
+    """Checks that a package is installed.
 
     Args:
         package: Name it is imported by.
-        purpose: What needs it, such as "plot".
+        purpose: The feature that needs it, such as "plot".
 
     Raises:
         UsageError: It is not installed; the message says how to install it.

@@ -1,4 +1,4 @@
-"""What every part of the notebook's lab is: it looks at a shared state, shows itself, and ends with its cell."""
+"""The base of every part of the lab: it shows a shared state, displays itself, and ends with its cell."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _PACKAGE = "rcilab.notebook"
 
 
 class Part(Closeable):
-    """A part: shows itself as the last line of a cell, combines with others, ends when its cell runs again.
+    """A part: displays itself as the last line of a cell, combines with others, ends when its cell runs again.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
 
     Raises:
         InvalidValueError: The subject is not one of these, or the language is unknown.
@@ -57,24 +57,24 @@ class Part(Closeable):
 
     @property
     def widget(self) -> Any:
-        """The ipywidgets widget, to be put into boxes of your own."""
+        """The ipywidgets widget, for boxes of your own."""
         return self._root
 
-    def hear(self, topic: Topic, act: Callable[[], None]) -> None:
-        """Follows a topic of the state until this part is closed; called once at once."""
-        self._ends.append(self.state.hear(topic, act))
+    def subscribe(self, topic: Topic, act: Callable[[], None]) -> None:
+        """Subscribes to a topic of the state until this part is closed; `act` is called once at once."""
+        self._ends.append(self.state.subscribe(topic, act))
         act()
 
     def build(self, children: Sequence[Any], *classes: str, **layout: str) -> None:
-        """Takes the widgets that this part is made of, one below the other."""
+        """Takes the widgets of this part, one below the other."""
         own = ipywidgets.Layout(**layout)
         self._root = lean(ipywidgets.VBox, [style_sheet(), *children], layout=own, classes=("rl-root", *classes))
 
     def halt(self) -> None:
-        """Stops what this part moves; most move nothing."""
+        """Stops the motion that this part has started; most parts start none."""
 
     def close(self) -> None:
-        """Takes the part away and ends what it started. May be called twice."""
+        """Removes the part and ends what it started. May be called twice."""
         if self._closed:
             return
         self._closed = True
@@ -85,7 +85,7 @@ class Part(Closeable):
         kernel_cells().forget(self)
 
     def end(self) -> None:
-        """Ends what a part has of its own: servers, threads, processes."""
+        """Ends the servers, threads and processes of a part."""
 
     def _repr_mimebundle_(self, **options: Any) -> Any:
         return self._root._repr_mimebundle_(**options)

@@ -1,4 +1,4 @@
-"""Plan: from where the arm stands to the goal, how fast and by which law, and whether it may run."""
+"""Plan: from the arm's position to the goal, with speed and time law, and whether it may run."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _SLOWEST = 1.0  # [%]
-_UNSEEN = 0.3  # [s] What is planned sooner needs no bar; most are.
+_UNSEEN = 0.3  # [s] Quicker plans, which most are, show no progress bar.
 
 
 class PlanPanel(Part):
-    """Way, speed and law; "Plan there" plans and checks. Nothing on it moves a robot.
+    """Path type, speed and time law; "Plan there" plans and checks. Nothing on it moves a robot.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
@@ -72,7 +72,7 @@ class PlanPanel(Part):
             text, "rcilab-plan", self._take, self._show, shown_after=_UNSEEN
         )
         self.progress, self.cancel = self._work.progress, self._work.cancel
-        self._slowed: tuple[Plan, SlowDown] | None = None  # What the last slow-down came to, beside the plan it left.
+        self._slowed: tuple[Plan, SlowDown] | None = None  # Result of the last slow-down, with the plan it applies to.
         self.build([
             self.way,
             lean(ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}),
@@ -93,8 +93,8 @@ class PlanPanel(Part):
         self.plan.on_click(lambda _: self._make_plan())
         self.slow_down.on_click(lambda _: self._slow_down())
         self._speed_field.show(100.0 * state.now.speed)
-        self._ends.append(state.hear("goal", self._show))
-        self.hear("plan", self._show)
+        self._ends.append(state.subscribe("goal", self._show))
+        self.subscribe("plan", self._show)
 
     def _set_speed(self, percent: float) -> None:
         self.state.ask(SetSpeed(speed=percent / 100.0))
@@ -114,11 +114,11 @@ class PlanPanel(Part):
         self.state.ask(SetLaw(law=change["new"]))
 
     def halt(self) -> None:
-        """Gives up what is being worked out."""
+        """Cancels the task in progress."""
         self._work.give_up()
 
     def end(self) -> None:
-        """Ends what is being worked out."""
+        """Ends the task in progress."""
         self._work.end()
 
     def _make_plan(self) -> None:
@@ -127,7 +127,7 @@ class PlanPanel(Part):
     def _slow_down(self) -> None:
         plan = self.state.now.plan
         if plan is not None:
-            report = plan.report  # What passes is slowed down for what is recommended, as on the page.
+            report = plan.report  # A plan that conforms is slowed down to meet the recommendations, as on the page.
             self._begin(plan, lambda progress: report.slow_down(recommended=report.ok, progress=progress))
 
     def _begin(self, about: Plan | None, run: Callable[[ProgressCallback], Plan | Message | SlowDown]) -> None:
@@ -140,7 +140,7 @@ class PlanPanel(Part):
             self.state.show(message("plan.failed", error=describe_error(found)))
         elif not isinstance(found, SlowDown):
             self.state.show(found)
-        elif about is not None and about is self.state.now.plan:  # Else it was planned again.
+        elif about is not None and about is self.state.now.plan:  # Else there is a new plan.
             if found.motion is None or found.report is None:
                 self._slowed = about, found
                 return
@@ -168,14 +168,14 @@ class PlanPanel(Part):
             said += " " + text("target.leads_short", short=text.render(plan.short))
         if not state.is_goal_of_plan and plan.short is None:
             said += " " + text("plan.moved")
-        write(self._said, verdict(tone, text(word), said) + self._told_of_slowing(plan))
+        write(self._said, verdict(tone, text(word), said) + self._describe_slowing(plan))
 
     def _is_to_slow_down(self, plan: Plan) -> bool:
-        """Whether the plan breaks a condition, or one that is only recommended and not the rest of a slow-down."""
+        """Whether the plan violates a condition, or a recommendation that was not left over by a slow-down."""
         is_rest = self._slowed is not None and self._slowed[0] is plan
         return not plan.report.ok or (bool(plan.report.warnings) and not is_rest)
 
-    def _told_of_slowing(self, plan: Plan) -> str:
+    def _describe_slowing(self, plan: Plan) -> str:
         if self._slowed is None or self._slowed[0] is not plan:
             return ""
         found = self._slowed[1]

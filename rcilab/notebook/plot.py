@@ -1,4 +1,4 @@
-"""A motion as curves: angle, velocity, acceleration and jerk against their limits, the plan beside what happened."""
+"""A motion as curves: angle, velocity, acceleration and jerk against their limits, the plan next to the run."""
 
 from __future__ import annotations
 
@@ -38,20 +38,20 @@ BEYOND_LIMIT_COLOR = "#808080"
 
 _RESOLUTION = 110  # [dots an inch] Sharp in a notebook, small in a file.
 _HEADROOM = 1.12
-"""How much of the limit a panel shows: all of it and a little of what lies beyond."""
+"""Share of the limit that a panel shows: all of it and a little more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Panel:
-    """One row of the figure: what one condition bounds, joint by joint."""
+    """One row of the figure: the quantity of one condition, joint by joint."""
 
     condition: Condition
     values: Array
-    """As the controller will see it, shape (N, n)."""
+    """As the controller evaluates it, shape (N, n)."""
     lower: Array
     upper: Array
     actual: Array | None
-    """What happened, shape (M, n): measured angles and velocities, differences of the commanded angles; or None."""
+    """From the run, shape (M, n): measured angles and velocities, differences of the commanded angles; or None."""
 
 
 def plot(
@@ -64,19 +64,19 @@ def plot(
 ) -> Figure:
     """Draws angle, velocity, acceleration and jerk of a motion against the arm's limits.
 
-    Velocity, acceleration and jerk are backward differences at 1 ms, because those are what the controller checks. Grey
-    lies beyond a limit; where joints have different limits the grey gets darker at each. What `check` finds is hatched
-    in red over the time it lasts, and the title counts the places, a jump of all joints as one. With a run, what the
-    robot did is drawn as a broad line under the dashed plan (acceleration and jerk: of its commanded angles), and a
-    fifth panel shows the difference; all of it on the plan's time, with the robot's play-out delay (`run.delay`) taken
-    out. Needs no display: the figure shows itself in a notebook and takes `savefig` anywhere.
+    Velocity, acceleration and jerk are backward differences at 1 ms, because the controller checks these. The area
+    beyond a limit is grey; if joints have different limits it gets darker at each. Violations of `check` are hatched in
+    red over their duration, and the title gives their number, where a jump of all joints counts once. With a run, its
+    data is drawn as a broad line under the dashed plan (acceleration and jerk: of its commanded angles), and a fifth
+    panel shows the difference; all on the plan's time, without the robot's play-out delay (`run.delay`). No display is
+    needed: the figure displays itself in a notebook, and `savefig` writes it to a file.
 
     Args:
-        motion: What to draw: a motion, or a run, which brings its plan; of a callback, what it commanded is drawn.
-        model: The arm it is for; its limits are drawn.
-        run: What came of it on a robot, as `execute` returned it.
+        motion: A motion, or a run, which contains its plan; for a callback, its commands are drawn.
+        model: The arm, whose limits are drawn.
+        run: The run of the motion on a robot, from `execute`.
         joints: Numbers of the joints to draw, from 1; None draws all.
-        language: "en" or "zh"; that of the notebook when absent. Without a Chinese font here it is English.
+        language: "en" or "zh"; defaults to that of the notebook. Without a Chinese font it is English.
 
     Raises:
         InvalidValueError: A joint number does not exist on this arm, or an argument has another type.
@@ -121,11 +121,11 @@ def _new_figure(rows: int) -> Figure:
     from matplotlib.figure import Figure
 
     class NotebookFigure(Figure):
-        """A figure that IPython can show although pyplot, and with it a back end, was never loaded."""
+        """A figure that IPython can display without pyplot and its back end."""
 
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()
-            FigureCanvasAgg(self).print_png(picture)  # What `savefig` does, but without drawing it all beforehand.
+            FigureCanvasAgg(self).print_png(picture)  # As `savefig`, without drawing the figure twice.
             return picture.getvalue()
 
     figure = NotebookFigure(figsize=(9.0, 0.6 + 1.75 * rows), dpi=_RESOLUTION, layout="constrained")
@@ -149,7 +149,7 @@ def _backward_differences(q: Array, order: int) -> Array:
     """Returns backward differences at 1 ms of commanded angles, with the cycles in which the controller holds the goal.
 
     Args:
-        q: Joint angles, one row a cycle, shape (N, n), [rad]; the arm is at rest in the first row.
+        q: Joint angles, one row per cycle, shape (N, n), [rad]; the arm stands still in the first row.
         order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
 
     Returns:
@@ -176,14 +176,14 @@ def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int],
 
 
 def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> None:
-    """Greys what lies beyond each limit.
+    """Shades the area beyond each limit.
 
     Args:
-        ax: Where to.
-        lower: Lower bounds of the joints drawn.
-        upper: Upper bounds of the joints drawn.
-        everything: Widen the panel until all limits are in it; angles are drawn as large as they are instead, because
-            a wrist that may turn by 360 degrees would flatten every other curve.
+        ax: Axes to draw into.
+        lower: Lower bounds of the drawn joints.
+        upper: Upper bounds of the drawn joints.
+        everything: Whether the panel shows all limits; otherwise it fits the angles, because a wrist that may turn by
+            360 degrees would flatten every other curve.
     """
     low, high = ax.get_ylim()
     if everything:
@@ -200,7 +200,7 @@ def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> N
 
 
 def _shade_violations(ax: Axes, panel: _Panel, violations: Sequence[Violation], joints: Sequence[int]) -> None:
-    """Hatches the time over which some joint is beyond its bound, and marks the worst sample of each violation."""
+    """Hatches the time in which a joint violates its bound, and marks the worst sample of each violation."""
     broken = [v for v in violations if v.condition.id == panel.condition.id and v.joint - 1 in joints]
     for begin, end in _union((v.time - CYCLE_TIME, v.time + (v.count - 1) * CYCLE_TIME) for v in broken):
         ax.axvspan(begin, end, facecolor=VIOLATION_COLOR, edgecolor=VIOLATION_COLOR, alpha=0.2, hatch="///", zorder=0.7)
@@ -209,7 +209,7 @@ def _shade_violations(ax: Axes, panel: _Panel, violations: Sequence[Violation], 
 
 
 def _union(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Returns spans of time that cover the same and do not overlap; a difference speaks of the cycle before it."""
+    """Returns the union of time spans, without overlaps; a difference belongs to the cycle before it."""
     merged: list[tuple[float, float]] = []
     for begin, end in sorted(spans):
         if merged and begin <= merged[-1][1]:
@@ -220,15 +220,15 @@ def _union(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def _plan_times(run: Run) -> Array:
-    """Returns the times of the plan that the rows of a run show, shape (N,), [s]: without the play-out delay."""
+    """Returns the times of the plan for the rows of a run, shape (N,), [s]: without the play-out delay."""
     return run.t - run.delay * CYCLE_TIME
 
 
 def _motion_and_run(motion: object, run: object) -> tuple[Motion, Run | None]:
-    """Returns what is drawn, and what came of it.
+    """Returns the motion to draw, and its run.
 
     Raises:
-        InvalidValueError: One of them is something else.
+        InvalidValueError: An argument has another type.
     """
     if isinstance(motion, Run):
         return motion.plan or motion.commanded(), motion
@@ -251,7 +251,7 @@ def _color(joint: int) -> str:
 
 
 def _title(model: RobotModel, motion: Motion, report: Report, text: Text) -> str:
-    # A jump shows in one first difference, two second and three third ones: within HOLD_SAMPLES cycles it is one.
+    # A jump shows in one first, two second and three third differences: within HOLD_SAMPLES cycles it counts once.
     reach = HOLD_SAMPLES * CYCLE_TIME
     count = len(_union((v.time - CYCLE_TIME, v.time + v.count * CYCLE_TIME + reach) for v in report.violations))
     if not count and report.warnings:

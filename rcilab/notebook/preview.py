@@ -28,25 +28,25 @@ if TYPE_CHECKING:
     from rcilab.motion.motion import Motion
 
 HEIGHT = 420  # [px]
-_RATE = 30  # [1/s] Keyframes; the viewer turns smoothly between them.
-_HOLD = 1.0  # [s] The arm rests at the goal before the motion starts again.
-_REPETITIONS = 1000  # For as long as anybody looks.
-_MIDDLE = (0.2, 0.0, 0.5)  # [m] What the camera turns about.
-_CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] seen from there
+_RATE = 30  # [1/s] Keyframes; the viewer interpolates between them.
+_HOLD = 1.0  # [s] Pause at the goal before the motion starts again.
+_REPETITIONS = 1000  # Practically without end.
+_MIDDLE = (0.2, 0.0, 0.5)  # [m] Point that the camera turns about.
+_CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] From that point.
 
 
 class Preview(Closeable):
-    """An arm in a meshcat viewer; shows itself in a notebook. Nothing in it can move a robot.
+    """An arm in a meshcat viewer; displays itself in a notebook. Nothing in it can move a robot.
 
-    Live, it is served on loopback by the kernel, and `show` moves it while you look. Static, it is part of the
-    notebook (about 1.5 MB), needs no kernel, and keeps the pose or the motion that it was made with.
+    Live, the kernel serves it on loopback, and `show` moves the arm. Static, it is part of the notebook (about
+    1.5 MB), needs no kernel, and keeps its initial pose or motion.
 
     Args:
-        what: A motion to play over and over, its goal as a ghost; or joint angles, shape (n,), [rad], to stand at.
+        what: A motion to repeat, with its goal as a ghost; or joint angles, shape (n,), [rad].
         model: The arm.
-        live: Whether to serve it.
+        live: Whether the kernel serves it.
         height: Height in the notebook, [px].
-        language: "en" or "zh"; that of the notebook when absent.
+        language: "en" or "zh"; defaults to that of the notebook.
 
     Raises:
         InvalidValueError: The pose is not n finite numbers, the motion is for another number of joints, or the language
@@ -68,7 +68,7 @@ class Preview(Closeable):
         require_model(model)
         motion = _motion_in(what)
         pose = as_vector(cast("ArrayLike", what) if motion is None else motion.start, model.n, "q", "rad")
-        with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
+        with warnings.catch_warnings():  # meshcat 0.3 uses pyzmq's deprecated event loop.
             warnings.simplefilter("ignore", DeprecationWarning)
             from rcilab.views.meshcat_scene import MeshcatScene
 
@@ -91,13 +91,13 @@ class Preview(Closeable):
 
     @property
     def url(self) -> str | None:
-        """Where the browser finds the viewer, to open it in a window of its own; None when it is not live."""
+        """Address of the viewer for the browser, to open it in a separate window; None if it is not live."""
         if not self._live:
             return None
         return self._place.address(self._scene.url + ("" if self._moving else "?plain"))  # A pose needs no play button.
 
     def show(self, q: ArrayLike) -> None:
-        """Puts the arm into a pose, shape (n,), [rad]; an animation ends.
+        """Moves the arm to joint angles, shape (n,), [rad]; an animation ends.
 
         Raises:
             UsageError: The preview is static, or was closed.
@@ -109,7 +109,7 @@ class Preview(Closeable):
         self._arm.show(q)
 
     def html(self) -> str:
-        """Returns the scene, animation included, as one HTML page that needs neither kernel nor network."""
+        """Returns the scene, with its animation, as one HTML page that needs neither kernel nor network."""
         return self._scene.as_html() if self._live else self._markup
 
     def save(self, file: str | os.PathLike[str]) -> None:
@@ -128,7 +128,7 @@ class Preview(Closeable):
             ) from error
 
     def close(self) -> None:
-        """Stops serving and keeps what was shown as a static scene; calling it again does nothing."""
+        """Stops serving and keeps the current scene as a static one; may be called twice."""
         if self._live:
             self._markup = self._scene.as_html()
             self._scene.close()
@@ -149,7 +149,7 @@ class Preview(Closeable):
         )
 
     def _animate(self, motion: Motion | None) -> None:
-        """Hands the viewer a track of orientations for each joint; None takes them away."""
+        """Sends the viewer a track of orientations for each joint; None removes them."""
         from meshcat.animation import Animation, AnimationClip, AnimationTrack
 
         visualizer = self._scene.visualizer
@@ -174,15 +174,15 @@ def preview(
     height: int = HEIGHT,
     language: str | None = None,
 ) -> Preview:
-    """Returns a 3D scene that plays a motion, or shows a pose, inside the notebook.
+    """Returns a 3D scene that plays a motion, or shows joint angles, inside the notebook.
 
     Args:
-        motion: What to play; or joint angles, shape (n,), [rad], to show the arm standing there.
+        motion: A motion to repeat; or joint angles, shape (n,), [rad].
         model: The arm.
-        live: Served by the kernel (True) or part of the notebook (False); None serves it wherever the browser can
-            reach the kernel, see `rcilab.notebook.kernel_reachability`.
+        live: Served by the kernel (True) or part of the notebook (False); None serves it if the browser can reach the
+            kernel, see `rcilab.notebook.kernel_reachability`.
         height: Height in the notebook, [px].
-        language: "en" or "zh"; that of the notebook when absent.
+        language: "en" or "zh"; defaults to that of the notebook.
 
     Raises:
         InvalidValueError: The pose is not n finite numbers.
@@ -193,7 +193,7 @@ def preview(
 
 
 def aim_camera(visualizer: Any) -> None:
-    """Looks at the middle of the arm. meshcat 0.3's camera always turns about the origin, so the arm goes there."""
+    """Points the camera at the middle of the arm. meshcat 0.3's camera always turns about the origin: the arm moves."""
     T_viewer_base = np.eye(4)
     T_viewer_base[:3, 3] = -np.array(_MIDDLE)
     visualizer.set_transform(T_viewer_base)
@@ -204,18 +204,18 @@ def aim_camera(visualizer: Any) -> None:
 
 
 def _motion_in(what: Motion | ArrayLike) -> Motion | None:
-    """Returns what is to be played, if it is a motion."""
+    """Returns the motion, if it is one."""
     return what if isinstance(what, Motion) else None
 
 
 def _keyframes(motion: Motion) -> tuple[Array, Array]:
-    """Returns times, shape (K,), [s], and joint angles there, shape (K, n), the hold at the goal included."""
+    """Returns times, shape (K,), [s], and their joint angles, shape (K, n), with the pause at the goal."""
     count = math.ceil(motion.duration * _RATE) + 1
     times = np.append(np.linspace(0.0, motion.duration, count), motion.duration + _HOLD)
     return times, np.array([motion.at(t).q for t in times])
 
 
 def _xyzw(axis: Array, angles: Array) -> list[list[float]]:
-    """Returns turns about an axis as quaternions in the viewer's order."""
+    """Returns rotations about an axis as quaternions in the viewer's order."""
     half = 0.5 * angles[:, np.newaxis]
     return np.hstack((np.sin(half) * axis, np.cos(half))).tolist()

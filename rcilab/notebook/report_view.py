@@ -1,4 +1,4 @@
-"""The report of the plan in the controller's own terms: every condition, its worst value, its bound, its source."""
+"""The report of the plan: every condition, its worst value, its bound, its source."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from rcilab.i18n.condition_values import value_against_bound
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import Tone, block, esc, soft, verdict, write
 
-_TIGHT = 0.95  # From this share of a bound on, a row is amber.
+_TIGHT = 0.95  # Share of a bound from which on a row is amber.
 _LISTED = 8
 
 
 class ReportView(Part):
-    """Verdict first, then what is broken in sentences, then every condition as a bar against its bound.
+    """The verdict, the violations as sentences, then every condition as a bar against its bound.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        report: A report of yours to show; the report of the plan when absent.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        report: A report to show; defaults to that of the plan.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, report: Report | None = None, *, language: str | None = None) -> None:
@@ -26,11 +26,11 @@ class ReportView(Part):
         self._own = report
         self._verdict, self._rows = block(), block()
         self.build([self._verdict, self._rows], min_width="360px")
-        self.hear("plan", self._show)
+        self.subscribe("plan", self._show)
 
     @property
     def report(self) -> Report | None:
-        """What is shown; None while there is no plan."""
+        """The displayed report; None while there is no plan."""
         if self._own is not None:
             return self._own
         return None if self.state.now.plan is None else self.state.now.plan.report

@@ -1,4 +1,4 @@
-"""What is said of the robot on Run: how it stands, how well the milliseconds are kept, what came of it."""
+"""Texts about the robot on Run: its status, its timing, the result of requests."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.session_connection import BusyError
-from rcilab.app.status_text import phase_code, tell_error, tell_status, tell_success
+from rcilab.app.status_text import describe_status, describe_success, explain_error, phase_code
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import SAFETY_STOP, ControlError, ModelError, RcilabError
 from rcilab.i18n.error_messages import describe_note
@@ -19,24 +19,24 @@ from rcilab.recording.run import describe_end
 
 
 def name_phase(status: SupervisorStatus | None, text: Text) -> str:
-    """Returns the two or three words for what the robot does."""
+    """Returns the short name of the robot's status."""
     if status is None:
         return text("phase.closed")
     return text(phase_code(status))
 
 
-def tell_trouble(status: SupervisorStatus | None, text: Text) -> str:
-    """Returns why a robot that ought to be there is not; empty where nothing is wrong."""
-    return "" if status is None or status.phase not in ("lost", "crashed") else text.render(tell_status(status))
+def describe_trouble(status: SupervisorStatus | None, text: Text) -> str:
+    """Returns why the connection to the robot is lost; empty if it is not."""
+    return "" if status is None or status.phase not in ("lost", "crashed") else text.render(describe_status(status))
 
 
-def tell_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
-    """Returns why something was not done."""
+def describe_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
+    """Returns why a request failed."""
     if isinstance(error, BusyError):
         return message("robot.busy", what=message(f"what.{error.in_progress}"))
     if isinstance(error, ModelError) and model.name not in driven_robots():
         return message("robot.no_rci", model=model.name)
-    return tell_error(error, status)
+    return explain_error(error, status)
 
 
 def health_html(status: SupervisorStatus, text: Text) -> str:
@@ -46,7 +46,7 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
         ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
         ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
         ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
-        ("success", text.render(tell_success(status))),
+        ("success", text.render(describe_success(status))),
         ("rate", f"{status.rate_hz:.0f} Hz"),
     ]
     late = status.lateness
@@ -61,14 +61,14 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
 def outcome_html(
     outcome: Outcome, model: RobotModel, status: SupervisorStatus | None, text: Text, *, is_left_alone: bool = False
 ) -> str:
-    """Returns what came of something that was asked for.
+    """Returns the result of a request.
 
     Args:
-        outcome: Of what.
+        outcome: The result.
         model: The arm.
-        status: How the robot stands.
-        text: Words.
-        is_left_alone: Whether the page is gone: that is why a motion was stopped.
+        status: Status of the robot.
+        text: The catalogue.
+        is_left_alone: Whether the motion was stopped because the page is closed.
     """
     error, run = outcome.error, outcome.run
     stopped = verdict("warn", "▲", text("run.left_alone" if is_left_alone else "run.stopped"))
@@ -83,7 +83,9 @@ def outcome_html(
             return verdict("bad", "✗", text("run.faulted", faults=faults) + found)
         if outcome.what == "execute":
             return stopped
-        why = message("notice.failed", what=message(f"what.{outcome.what}"), error=tell_refusal(error, model, status))
+        why = message(
+            "notice.failed", what=message(f"what.{outcome.what}"), error=describe_refusal(error, model, status)
+        )
         return verdict("bad", "✗", text.render(why))
     if run is not None and run.stopped:
         return stopped

@@ -1,4 +1,4 @@
-"""Run: which robot, power, mode, Execute and Stop, the timing, and how a motion ended."""
+"""Run: the robot, power, mode, Execute and Stop, the timing, and how a motion ended."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import is_only_planned, tell_lack
+from rcilab.app.arm_features import explain_lack, is_only_planned
 from rcilab.app.connection import Robot
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import parameter_obstacle
@@ -29,7 +29,7 @@ from rcilab.notebook.browser_watchdog import LEFT_ALONE
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.part import Part
-from rcilab.notebook.robot_words import health_html, name_phase, outcome_html, tell_refusal, tell_trouble
+from rcilab.notebook.robot_words import describe_refusal, describe_trouble, health_html, name_phase, outcome_html
 from rcilab.notebook.signal_fields import SignalFields
 from rcilab.notebook.speed_fields import SpeedFields
 from rcilab.notebook.state import LabState
@@ -38,26 +38,26 @@ from rcilab.notebook.subshell_routing import hear_at_once
 from rcilab.notebook.widget_sharing import lean
 from rcilab.recording.run import Run
 
-_LOOK = 0.1  # [s] Between two looks at the robot.
+_LOOK = 0.1  # [s] Between two reads of the robot's status.
 _TARGETS = ("ideal", "mujoco", "address")
 
 
 class _Connection:
-    """The robot of a lab, which the features of the application ask.
+    """The robot of a lab, with the interface that the application uses.
 
     Args:
-        state: What the parts share.
+        state: State of the lab.
     """
 
     def __init__(self, state: LabState) -> None:
         self._state = state
 
     def status(self) -> SupervisorStatus:
-        """Returns its status; "closed" while none is connected."""
+        """Returns its status; "closed" without a connection."""
         return self._state.status or SupervisorStatus()
 
     def supervisor(self) -> Robot:
-        """Returns what takes requests.
+        """Returns the object that takes requests.
 
         Raises:
             StartingError: No robot is connected.
@@ -73,16 +73,16 @@ class _Connection:
 
 
 class RunPanel(Part):
-    """Everything that moves a robot is here, and nothing on it moves one by a drag.
+    """All controls that move a robot; no drag on it moves one.
 
-    With a model it connects to a virtual controller of its own, or to an address; a control process outside of the
-    kernel runs the 1 kHz loop. With a session it uses that one. Modes and parameters are those of the page. A robot
-    that is not virtual is moved, or gets other parameters, only after the question has been answered. A motion is
-    stopped when the page is gone, the kernel is interrupted, restarted or dead, or the cell is run again.
+    With a model it connects to its own virtual controller, or to an address; a control process outside of the kernel
+    runs the 1 kHz loop. With a session it uses that one. Modes and parameters are those of the page. A robot that is
+    not virtual is moved, or gets other parameters, only after a confirmation. A motion is stopped when the page is
+    closed, when the kernel is interrupted, restarted or dead, or when the cell runs again.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
@@ -153,9 +153,9 @@ class RunPanel(Part):
         self.target.observe(lambda _: self._show(), names="value")
         if self.state.session is not None:
             self._take(SessionConnection(self.state.session))
-        self._ends.append(self.state.hear("plan", self._on_plan))
-        self._ends.append(self.state.hear("goal", self._show))
-        self.hear("robot", self._show)
+        self._ends.append(self.state.subscribe("plan", self._on_plan))
+        self._ends.append(self.state.subscribe("goal", self._show))
+        self.subscribe("robot", self._show)
 
     def halt(self) -> None:
         """Stops the robot; from any thread, without waiting."""
@@ -167,12 +167,12 @@ class RunPanel(Part):
 
     def _send(self, what: str, ask: Callable[[Robot], PendingRequest]) -> None:
         robot = self.state.robot
-        assert robot is not None  # The buttons that ask it are disabled without one.
+        assert robot is not None  # Without one, the buttons are disabled.
         with self.state.lock:
             self._requests.add(what, ask(robot.supervisor()))
 
     def _on_recover(self) -> None:
-        """Clears the faults; where the connection is lost, makes a new one."""
+        """Clears the faults; reconnects a lost connection."""
         robot, status = self.state.robot, self.state.status
         if isinstance(robot, RobotConnection) and status is not None and status.phase in ("lost", "crashed"):
             self._requests.add("recover", robot.supervisor().reconnect())
@@ -192,15 +192,15 @@ class RunPanel(Part):
         robot.open(self.model, target if target == VIRTUAL else str(parse_address(target, self.model)), plant)
         self.state.store.update(plant=plant)
         self._take(robot)
-        self.state.tell("robot")
+        self.state.notify("robot")
 
     def _on_failure(self, error: RcilabError) -> None:
-        """Shows why there is no connection; called in the thread that makes it."""
+        """Shows why there is no connection; called in the connecting thread."""
         self._take_in(Outcome(what="connect", error=error))
 
     def _on_disconnect(self) -> None:
         self._release()
-        self.state.tell("robot")
+        self.state.notify("robot")
 
     def _take(self, robot: RobotConnection | SessionConnection) -> None:
         is_virtual = robot.is_virtual if isinstance(robot, SessionConnection) else robot.name == VIRTUAL
@@ -229,7 +229,7 @@ class RunPanel(Part):
             self.state.free_joints()
 
     def _watch(self, robot: RobotConnection | SessionConnection) -> None:
-        """Shows the robot, reports an operator at the page, and stops the robot when the page is gone."""
+        """Shows the robot, reports an operator at the page, and stops the robot when the page is closed."""
         while not self._ending.wait(_LOOK):
             self._heart.beat()
             if self._heart.is_gone:
@@ -248,7 +248,7 @@ class RunPanel(Part):
             self._follow_world(robot.status())
             with self.state.lock:
                 self._mode_actions.tick(robot.status())
-            self.state.tell("robot")
+            self.state.notify("robot")
 
     def _follow_world(self, status: SupervisorStatus) -> None:
         with self.state.lock:
@@ -280,7 +280,7 @@ class RunPanel(Part):
         if self.state.now.is_virtual:
             self._move()
             return
-        assert plan is not None  # Without one there is an obstacle.
+        assert plan is not None  # Without one, there is an obstacle.
         question = ask_to_move(plan, self.state.now.target)
         write(self._question, verdict("warn", "▲", self.text.render(question)))
         self._answers.layout.display = None
@@ -289,7 +289,7 @@ class RunPanel(Part):
         self._forget_question()
         reason, plan = _obstacle(self.state), self.state.now.plan
         if reason is None and plan is not None:
-            self.state.exhibit(None)
+            self.state.display(None)
             self.state.look_at(None)
             self.state.outcome = None
             write(self._outcome, "")
@@ -299,7 +299,8 @@ class RunPanel(Part):
                     self._requests.execute(plan)
             except PlanningError as error:
                 write(
-                    self._outcome, problem(self.text.render(tell_refusal(error, self.state.model, self.state.status)))
+                    self._outcome,
+                    problem(self.text.render(describe_refusal(error, self.state.model, self.state.status))),
                 )
 
     def _forget_question(self) -> None:
@@ -332,7 +333,7 @@ class RunPanel(Part):
         )
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
         write(self._said, verdict(tone, name_phase(status, text), name))
-        trouble = tell_trouble(status, text) or ("" if reason is None else text.render(reason))
+        trouble = describe_trouble(status, text) or ("" if reason is None else text.render(reason))
         is_cells = isinstance(state.robot, SessionConnection) and state.robot.is_cells
         if is_cells and not self._was_cells:
             write(self._outcome, "")
@@ -379,16 +380,16 @@ class RunPanel(Part):
             try:
                 act()
             except RcilabError as error:
-                write(self._outcome, problem(self.text.render(tell_refusal(error, self.model, self.state.status))))
+                write(self._outcome, problem(self.text.render(describe_refusal(error, self.model, self.state.status))))
 
         button.on_click(press)
         return button
 
 
 def _obstacle(state: LabState) -> Message | None:
-    """Returns what stands in the way of Execute, or None when it may be pressed."""
+    """Returns what prevents Execute, or None if it may be pressed."""
     status = state.status
-    lack = tell_lack(state.model, "simulation" if is_only_planned(state.model) else state.now.drive.mode)
+    lack = explain_lack(state.model, "simulation" if is_only_planned(state.model) else state.now.drive.mode)
     if lack is not None:
         return lack
     if status is None:

@@ -1,4 +1,4 @@
-"""The arm in 3D inside a cell: live in meshcat or viser where the browser reaches the kernel, else as a film."""
+"""The arm in 3D inside a cell: live in meshcat or viser if the browser reaches the kernel, else as an animation."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ VIEWS: tuple[View, ...] = ("auto", "meshcat", "viser", "static")
 _REACHED: Color = (70, 190, 130)
 _REFUSED: Color = (230, 80, 70)
 _ZOOM = 1.35
-_SAME_POSE = 1e-4  # [rad] Closer than this a ghost would only flicker in the arm.
+_SAME_POSE = 1e-4  # [rad] At a smaller distance a ghost would only flicker in the arm.
 
 
 class Scene(Part):
-    """The arm, its goal as a green ghost, and the moment of the plan that is looked at as a blue one.
+    """The arm, its goal as a green ghost, and the arm at the time of `Timeline` as a blue one.
 
-    With a robot the solid arm is where the robot is; without one it follows the goal, and the time of the plan.
+    With a robot the solid arm shows the robot; without one it follows the goal, and the time of `Timeline`.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        view: "meshcat" or "viser", served on loopback; "static", a film inside the notebook; "auto" takes meshcat
-            where the browser can reach the kernel (see `rcilab.notebook.kernel_reachability`), else the film.
+        subject: A model, a session, or another part of the same arm.
+        view: "meshcat" or "viser", served on loopback; "static", an animation inside the notebook; "auto" takes meshcat
+            if the browser can reach the kernel (see `rcilab.notebook.kernel_reachability`), else the animation.
         height: [px]
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
-        place: Where the browser is; found out when absent.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
+        place: Where the browser runs; detected by default.
 
     Raises:
         InvalidValueError: The subject, the view or the language is unknown.
@@ -74,25 +74,25 @@ class Scene(Part):
             self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
             self._write_frame(f'src="{html.escape(place.address(self._picture.url))}"')
             for topic in ("goal", "moment", "robot"):
-                self.hear(topic, self._picture.draw)
-            self.hear("plan", self._picture.draw_path)
+                self.subscribe(topic, self._picture.draw)
+            self.subscribe("plan", self._picture.draw_path)
         else:
             helps = "scene.static" if place.way == "static" and place.proxy_helps else "scene.static_here"
             write(self._note, soft(self.text("scene.asked" if view == "static" else helps)))
-            self.hear("plan", self._show_film)
+            self.subscribe("plan", self._show_film)
 
     @property
     def url(self) -> str | None:
-        """Address of the live scene on loopback; None when it is a film."""
+        """Address of the live scene on loopback; None for an animation."""
         return None if self._picture is None else self._picture.url
 
     def flush(self) -> None:
-        """Returns once everything that was drawn has been sent to every open page; meshcat only, else at once."""
+        """Returns once all drawings have been sent to every open page; meshcat only, else at once."""
         if self._picture is not None:
             self._picture.flush()
 
     def save(self, file: str) -> None:
-        """Writes the scene as one HTML page that needs neither kernel nor network: the plan as a film, or the pose."""
+        """Writes the scene as one HTML page that needs neither kernel nor network: an animation, or the pose."""
         self._make_film().save(file)
 
     def end(self) -> None:
@@ -114,11 +114,11 @@ class Scene(Part):
 
 
 class _LivePicture:
-    """What the served page shows; drawn by the thread that changes the state, one at a time."""
+    """The drawing of the served page; done by the thread that changes the state, one at a time."""
 
     def __init__(self, part: Scene, view: Literal["meshcat", "viser"]) -> None:
         self._state = part.state
-        self._door: Any = None
+        self._guarded_server: Any = None
         self._meshcat: Any = None
         canvas = self._open_viser() if view == "viser" else self._open_meshcat()
         self._canvas = canvas
@@ -131,7 +131,7 @@ class _LivePicture:
         self._path: Plan | None = None
 
     def draw(self) -> None:
-        """Puts the three arms where they belong now."""
+        """Moves the three arms to their current positions."""
         state, status = self._state, self._state.status
         seen = state.seen_arm
         moment = None if state.moment is None or seen is None else seen.motion.at(state.moment).q
@@ -147,7 +147,7 @@ class _LivePicture:
             self._goal.set_look(color=tint)
 
     def draw_path(self) -> None:
-        """Draws the way of the tool, coloured by how hard the joints are driven."""
+        """Draws the path of the tool, coloured by the utilisation of the joints' limits."""
         plan = self._state.seen_arm
         if plan is self._path:
             return
@@ -164,8 +164,8 @@ class _LivePicture:
 
     def close(self) -> None:
         """Stops serving."""
-        if self._door is not None:
-            self._door.close()
+        if self._guarded_server is not None:
+            self._guarded_server.close()
         if self._meshcat is not None:
             self._meshcat.close()
 
@@ -179,7 +179,7 @@ class _LivePicture:
             arm.set_visible(visible)
 
     def _open_meshcat(self) -> Canvas:
-        with warnings.catch_warnings():  # meshcat 0.3 loads pyzmq's old event loop, which says that it is old.
+        with warnings.catch_warnings():  # meshcat 0.3 uses pyzmq's deprecated event loop.
             warnings.simplefilter("ignore", DeprecationWarning)
             from rcilab.views.meshcat_scene import MeshcatScene
 
@@ -192,6 +192,6 @@ class _LivePicture:
     def _open_viser(self) -> Canvas:
         from rcilab.views.viser_scene import ViserScene
 
-        self._door, port = open_page(0)
+        self._guarded_server, port = open_page(0)
         self.url = f"http://{LOOPBACK}:{port}/"
-        return ViserScene(self._door.viser, shadows=False)
+        return ViserScene(self._guarded_server.viser, shadows=False)

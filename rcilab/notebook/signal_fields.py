@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import tell_lack
+from rcilab.app.arm_features import explain_lack
 from rcilab.app.connection import Robot
 from rcilab.app.run.signal_actions import signal_rows
 from rcilab.control_process import PendingRequest, SupervisorStatus
@@ -19,7 +19,7 @@ from rcilab.notebook.style import block, esc, head, soft, verdict, why_html, wri
 from rcilab.notebook.widget_sharing import lean
 
 SendRequest = Callable[[str, Callable[[Robot], PendingRequest]], None]
-"""Sends a request to the robot, and reports how it ended by the name that is given."""
+"""Sends a request to the robot; the end of the request is reported by this name."""
 
 
 class SignalFields:
@@ -27,9 +27,9 @@ class SignalFields:
 
     Args:
         model: The arm.
-        text: Words.
-        send: Sends a request to the robot that is connected, by its name.
-        button: Makes a button of the panel.
+        text: The catalogue.
+        send: Sends a request to the connected robot, by its name.
+        button: Creates a button of the panel.
     """
 
     def __init__(self, model: RobotModel, text: Text, send: SendRequest, button: Callable[..., Any]) -> None:
@@ -66,7 +66,7 @@ class SignalFields:
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller."""
         is_ready = status is not None and status.phase in ("idle", "fault")
-        lack, unable = tell_lack(self._model, "signals"), tell_lack(self._model, "reboot")
+        lack, unable = explain_lack(self._model, "signals"), explain_lack(self._model, "reboot")
         write(self._lack, why_html(self._text, lack))
         write(self._reboot_lack, why_html(self._text, unable))
         self.output.disabled = lack is not None
@@ -76,7 +76,7 @@ class SignalFields:
         if not is_ready:
             self._ask(False)
         self._address = "" if status is None else status.address or status.target
-        write(self._levels, "" if status is None else self._tell_levels(status))
+        write(self._levels, "" if status is None else self._describe_levels(status))
 
     def _set_output(self, level: bool) -> None:
         signal = int(self.output.value)
@@ -86,7 +86,7 @@ class SignalFields:
         self._ask(False)
         self._send("reboot", lambda robot: robot.reboot())
 
-    def _tell_levels(self, status: SupervisorStatus) -> str:
+    def _describe_levels(self, status: SupervisorStatus) -> str:
         rows = "".join(
             f"<tr><th>{esc(output)}</th><td>{esc(self._level(is_set))}</td>"
             f"<th>{esc(name)}</th><td>{esc(self._level(is_high))}</td></tr>"

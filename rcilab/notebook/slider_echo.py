@@ -1,7 +1,7 @@
-"""What a browser's slider reports when it is given numbers between its steps.
+"""The reports of a browser's slider after it was set to numbers between its steps.
 
-It rounds them and reports the result like a hand's; taken for one it would move what the slider shows by up to half a
-step, and when the report comes late, after other numbers were given, back to where it was.
+The browser rounds such numbers and reports the result like a drag. Taken for a drag it would change the value by up to
+half a step, and a late report, after other numbers were set, would restore an old value.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ from __future__ import annotations
 from typing import Any
 
 _ROUNDING = 1e-6
-_LONGEST = 20  # Numbers that are remembered: more than are given while a cell runs before a browser draws.
+_LONGEST = 20  # Number of remembered numbers: more than are set while a cell runs before a browser draws.
 
 
 class SliderEcho:
-    """Distinguishes what a slider reports: a hand, or numbers that it was given.
+    """Distinguishes the reports of a slider: drags, or echoes of numbers that were set.
 
     Args:
-        slider: Of ipywidgets.
+        slider: A slider of ipywidgets.
     """
 
     def __init__(self, slider: Any) -> None:
@@ -24,13 +24,13 @@ class SliderEcho:
         self._given: list[float] = [slider.value]
 
     def give(self, number: float) -> None:
-        """Notes what the slider is given; to be called before it is."""
+        """Registers a number; to be called before the slider is set."""
         self._given = [*self._given[1 - _LONGEST :], number]
 
     def is_hand(self, number: float) -> bool:
-        """Returns whether a report is from a hand: nothing that the slider was given since the last one rounds to it.
+        """Returns whether a report is a drag: no number that was set since the last report rounds to it.
 
-        The newest number is what it shows; those before it are forgotten once it is reported back, or a hand came.
+        The slider shows the newest number; earlier ones are forgotten after its echo or a drag.
         """
         if abs(number - self._given[-1]) <= self._half_step:
             self._given = self._given[-1:]

@@ -1,4 +1,4 @@
-"""Pause, Go on, and the part of the planned speed that motions run at: also while they do."""
+"""Pause, resume, and the speed override of motions, which can be changed during a motion."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _STEP = 5.0  # [%]
 
 
 class SpeedFields:
-    """Part of `RunPanel`: `buttons` stand beside Execute, `fields` below it.
+    """Part of `RunPanel`: `buttons` in the row of Execute, `fields` below it.
 
     Args:
-        state: What the parts share.
-        text: Words.
-        modes: Asks the robot.
+        state: State of the lab.
+        text: The catalogue.
+        modes: Sends requests to the robot.
     """
 
     def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
@@ -68,10 +68,10 @@ class SpeedFields:
             finally:
                 self._writing = False
         refusal = self._state.now.drive.override_refusal
-        said = "" if not running or status is None else soft(self._tell_way(status, is_held))
+        said = "" if not running or status is None else soft(self._describe_way(status, is_held))
         write(self._way, said + ("" if refusal is None or not running else problem(self._text.render(refusal))))
 
-    def _tell_way(self, status: SupervisorStatus, is_held: bool) -> str:
+    def _describe_way(self, status: SupervisorStatus, is_held: bool) -> str:
         speed_override = f"{100.0 * status.speed_override:.0f}"
         place = f"{status.motion_plan_time or 0.0:.1f}"
         return (
@@ -91,7 +91,7 @@ class SpeedFields:
     def _ask(self, act: Callable[[], None]) -> None:
         with self._state.lock:
             act()
-            self._state.tell("robot")
+            self._state.notify("robot")
 
     def _button(self, code: str, act: Any, *, icon: str, style: str) -> Any:
         button = lean(

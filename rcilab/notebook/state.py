@@ -1,7 +1,7 @@
-"""What the parts of a notebook's lab share: the application's state and commands, the robot, the moment shown.
+"""The shared state of a lab's parts: the application's state and requests, the robot, the displayed time.
 
-A part is given a model, a session or another part; parts of the same state move together. Goal, plan and settings are
-the values of `rcilab.app`, changed by its requests as the page changes them.
+A part gets a model, a session or another part; parts of the same state change together. Goal, plan and settings are
+values of `rcilab.app`, changed by its requests as on the page.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeGuard
 from numpy.typing import ArrayLike
 
 from rcilab.app.app_state import AppState
-from rcilab.app.exhibition import exhibit_run
+from rcilab.app.displayed_motion import display_run
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
 from rcilab.app.goal.target_status import evaluate_joints
@@ -36,7 +36,7 @@ from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import require_motion
 
 if TYPE_CHECKING:
-    from rcilab.app.exhibition import Exhibition
+    from rcilab.app.displayed_motion import DisplayedMotion
     from rcilab.app.robot_connection import RobotConnection
     from rcilab.app.run.robot_requests import Outcome
     from rcilab.app.session_connection import SessionConnection
@@ -46,42 +46,42 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
-"""goal: where the arm is wanted; plan: a motion and its report; moment: what time of it is looked at; robot: its
-status; run: what came of an execution."""
+"""goal: joint angles or pose; plan: a motion and its report; moment: the displayed time of the plan; robot: its
+status; run: the result of an execution."""
 Way = Literal["joint", "line"]
 WAYS: tuple[Way, ...] = ("joint", "line")
-_PLANNED = 0.5  # Part of the work when a plan is checked, too; as measured.
+_PLANNED = 0.5  # Progress at the end of planning, before the check; as measured.
 
 
 class LabState:
-    """One arm and what is wanted of it. Safe to use from any thread: one change at a time, each heard by everybody.
+    """One arm, and the goal, plan and run of the notebook. Safe to use from any thread: changes are made one at a time.
 
     Args:
         model: The arm.
-        session: A session to execute in; None leaves it to `RunPanel` to connect.
+        session: The session that executes; None: `RunPanel` connects.
     """
 
     def __init__(self, model: RobotModel, session: RobotSession | None = None) -> None:
         require_model(model)
-        self._own_limits = model.limits.joint  # Without soft limits set here.
+        self._own_limits = model.limits.joint  # The arm's own, without soft limits set here.
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotConnection | SessionConnection | None = None
-        self._rest: JointVector = readonly_copy(model.home)  # Where the arm is as long as no robot reports it.
+        self._rest: JointVector = readonly_copy(model.home)  # Position of the arm while no robot reports one.
         self.store: StateStore[AppState] = StateStore(AppState(model=model, goal=goal_at(model, self._rest)))
         self.goals = GoalActions(self.store, _Arm(self), plans_at_once=False)
         self._handlers: Handlers = {**self.goals.handlers, PlanGoal: lambda _: self.make_plan()}
         self.moment: float | None = None
-        """Time of the plan that is looked at, [s]; None looks at the arm as it is."""
-        self.exhibition: Exhibition | None = None
-        """A fault, or what a cell did, looked at in place of the plan until the next plan, pose or execution."""
+        """The displayed time of the plan, [s]; None shows the arm's position."""
+        self.displayed: DisplayedMotion | None = None
+        """A fault, or the run of a cell, displayed in place of the plan until the next plan, goal or execution."""
         self.outcome: Outcome | None = None
-        """How the last execution ended, of the plan or of a cell; None: none yet, or one is in progress."""
-        self._as_run: Plan | None = None  # The plan as it was run, where its speed override was changed on the way.
+        """The end of the last execution, of the plan or of a cell; None: none yet, or one is in progress."""
+        self._as_run: Plan | None = None  # The plan as it was run, if its speed override was changed during the run.
         self._hearers: dict[Topic, list[Callable[[], None]]] = {}
 
-    def hear(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
-        """Calls `act` at every change of a topic; returns what ends that."""
+    def subscribe(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
+        """Calls `act` after every change of a topic; returns a function that ends the subscription."""
         with self.lock:
             self._hearers.setdefault(topic, []).append(act)
 
@@ -92,8 +92,8 @@ class LabState:
 
         return end
 
-    def tell(self, *topics: Topic) -> None:
-        """Calls the listeners of what has changed."""
+    def notify(self, *topics: Topic) -> None:
+        """Calls the subscribers of topics."""
         with self.lock:
             for topic in topics:
                 for act in list(self._hearers.get(topic, ())):
@@ -101,7 +101,7 @@ class LabState:
 
     @property
     def now(self) -> AppState:
-        """The values of this moment; of a session with the tool, the load and the soft limits that it has set since."""
+        """The current values; with a session, tool, load and soft limits are its current ones."""
         if self.session is not None and self.session.model is not self.store.state.model:
             self.store.update(model=self.session.model)
         return self.store.state
@@ -112,51 +112,51 @@ class LabState:
         return self.now.model
 
     def ask(self, request: Request) -> None:
-        """Carries out a request of a feature at once; every part that shows what it changes follows."""
+        """Carries out a request of a feature at once; all parts that show its result follow."""
         with self.lock:
             goal = self.now.goal
             self._handlers[type(request)](request)
             if self.now.goal is not goal:
                 self._leave_preview()
-                self.tell("goal")
+                self.notify("goal")
 
     def set_drive(self, **changes: Any) -> None:
-        """Changes how motions are executed: fields of `DriveState`."""
+        """Changes settings of the execution: fields of `DriveState`."""
         with self.lock:
             self.store.update(drive=replace(self.now.drive, **changes))
 
     @property
     def status(self) -> SupervisorStatus | None:
-        """The status of the robot; None while none is connected."""
+        """The status of the robot; None without a connection."""
         return None if self.robot is None else self.robot.status()
 
     @property
     def here(self) -> JointVector:
-        """Where a plan begins: at the robot's commanded angles, without a robot where the arm was left, [rad]."""
+        """Start of plans: the robot's commanded angles, or without a robot the arm's last position, [rad]."""
         status = self.status
         return self._rest if status is None or status.q_c is None else readonly_copy(status.q_c)
 
     @property
     def seen(self) -> Plan | None:
-        """What timeline and curves show: the plan, as it was run if it was, or what is on show in its place."""
-        return self._played if self.exhibition is None else self.exhibition.plan
+        """The plan of timeline and curves: as it was run, or what is displayed in its place."""
+        return self._played if self.displayed is None else self.displayed.plan
 
     @property
     def seen_arm(self) -> Plan | None:
-        """Where the scene shows the arm at a moment."""
-        return self._played if self.exhibition is None else self.exhibition.scene
+        """The arm's position in the scene at a time."""
+        return self._played if self.displayed is None else self.displayed.scene
 
     @property
     def seen_run(self) -> Run | None:
-        """What happened beside what is seen."""
-        if self.exhibition is not None:
-            return self.exhibition.run
+        """The run that belongs to the displayed plan."""
+        if self.displayed is not None:
+            return self.displayed.run
         recording = self.now.recording
         return None if recording is None else recording.run
 
     @property
     def _played(self) -> Plan | None:
-        """The plan; as it was run, where its speed override was changed on the way."""
+        """The plan; as it was run, if its speed override was changed during the run."""
         plan, run = self.now.plan, self.seen_run
         if plan is None or run is None or run.plan is None or not run.has_speed_override:
             return plan
@@ -165,7 +165,7 @@ class LabState:
         return self._as_run
 
     def pose(self, q: ArrayLike) -> None:
-        """Sets the goal to joint angles, shape (n,), [rad]; the plan stays until it is planned again.
+        """Sets the goal to joint angles, shape (n,), [rad]; the plan is kept until the next one.
 
         Raises:
             InvalidValueError: An angle is outside its limits.
@@ -181,24 +181,24 @@ class LabState:
             self.store.remember()
             self.goals.pose(readonly_copy(angles))
             self._leave_preview()
-            self.tell("goal")
+            self.notify("goal")
 
     def aim(self, target: Pose) -> None:
-        """Sets the goal to a pose of the tool in base: the nearest branch, or the reachable pose nearest to it."""
+        """Sets the goal to a pose of the tool in base: the nearest branch, or the nearest reachable pose."""
         with self.lock:
             self.store.remember()
             self.goals.aim(target)
             self._leave_preview()
-            self.tell("goal")
+            self.notify("goal")
 
     def make_plan(self) -> None:
-        """Plans from where the arm stands to the goal and checks it, collisions too."""
+        """Plans from the arm's position to the goal and checks the plan, with collisions."""
         self.show(self.planning()(lambda part: None))
 
     def planning(self) -> Callable[[ProgressCallback], Plan | Message]:
-        """Returns what plans from where the arm stands now to the present goal, and checks it, collisions too.
+        """Returns a function that plans from the arm's position to the goal of now, and checks, with collisions.
 
-        It takes long, so it is not for a thread that others wait for.
+        It takes long: do not call it in a thread that others wait for.
         """
         with self.lock:
             make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
@@ -211,31 +211,31 @@ class LabState:
         return run
 
     def take_motion(self, motion: Motion) -> None:
-        """Takes a motion that was planned elsewhere; it is checked as any other."""
+        """Takes a motion that was planned elsewhere; it is checked like any other."""
         require_motion(motion)
         mode = self.now.drive.mode
         report = check(motion, self.model, mode=mode)
         self.show(replace(build_plan_view(self.model, motion, report), mode=mode, complete=True))
 
     def follow(self, mode: Mode) -> None:
-        """Chooses how motions are commanded; the plan is checked by the conditions of that mode.
+        """Chooses the command mode; the plan is checked by the conditions of that mode.
 
         Args:
             mode: One of `rcilab.core.state.MODES`.
         """
         with self.lock:
             choose_mode(self.store, require_mode(mode))
-            self.tell("plan")
+            self.notify("plan")
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan, or why none was found."""
+        """Shows a plan, or why there is none."""
         with self.lock:
             self.goals.show(made)
-            self.moment, self.exhibition = None, None
-            self.tell("plan", "moment")
+            self.moment, self.displayed = None, None
+            self.notify("plan", "moment")
 
     def limit_joints(self, lower: ArrayLike, upper: ArrayLike) -> None:
-        """Takes soft limits that the controller has: reach, plans and checks keep inside; the plan is checked anew.
+        """Takes the controller's soft limits: workspace, plans and checks use them; the plan is checked again.
 
         Args:
             lower: Shape (n,), [rad].
@@ -246,36 +246,36 @@ class LabState:
                 self.store.update(model=self.model.with_joint_limits(lower, upper))
             goal = self.now.goal
             self.store.update(goal=replace(goal, reach=evaluate_joints(self.model, goal.q)))
-            self.tell("goal")
+            self.notify("goal")
             if self.now.plan is not None:
                 self.take_motion(self.now.plan.motion)
 
     def free_joints(self) -> None:
-        """Restores the arm's range from before the soft limits of a controller that is gone."""
+        """Restores the arm's range without the soft limits of a disconnected controller."""
         own, now = self._own_limits, self.model.limits.joint
         if now is not own:
             self.limit_joints(own.lower, own.upper)
 
     def take(self, outcome: Outcome) -> None:
-        """Shows how an execution ended: that of the plan beside it, that of a cell in its place."""
+        """Shows the end of an execution: with the plan, or for a cell in place of the plan."""
         with self.lock:
             run = outcome.run
             if outcome.what == "cell":
-                self.exhibit(None if run is None else exhibit_run(run, self.model))
-            elif run is not None and run.has_speed_override:  # The times of the plan are others now.
+                self.display(None if run is None else display_run(run, self.model))
+            elif run is not None and run.has_speed_override:  # The times of the plan have changed.
                 self.moment = None
-                self.tell("plan", "moment")
-            self.outcome = outcome  # Last: other threads that see it find what it is about in place.
-            self.tell("run")
+                self.notify("plan", "moment")
+            self.outcome = outcome  # Last: another thread that reads it finds the rest in place.
+            self.notify("run")
 
     def halt(self) -> None:
-        """Brings the robot to rest; from any thread, without waiting."""
+        """Stops the robot; from any thread, without waiting."""
         robot = self.robot
         if robot is not None:
             robot.stop()
 
     def look_at(self, moment: float | None) -> None:
-        """Looks at a time of what is seen, [s]; None looks at the arm as it is."""
+        """Displays a time of the plan, [s]; None displays the arm's position."""
         with self.lock:
             if self.seen is None:
                 moment = None
@@ -283,33 +283,33 @@ class LabState:
                 moment = min(max(moment, 0.0), self.seen.motion.duration)
             if moment != self.moment:
                 self.moment = moment
-                self.tell("moment")
+                self.notify("moment")
 
-    def exhibit(self, exhibition: Exhibition | None) -> None:
-        """Looks at a fault, or at what a cell did, in place of the plan; None looks at the plan again."""
+    def display(self, displayed: DisplayedMotion | None) -> None:
+        """Displays a fault, or the run of a cell, in place of the plan; None displays the plan again."""
         with self.lock:
-            if exhibition is None and self.exhibition is None:
+            if displayed is None and self.displayed is None:
                 return
-            self.exhibition = exhibition
-            self.moment = None if exhibition is None else exhibition.moment
-            self.tell("plan", "moment")
+            self.displayed = displayed
+            self.moment = None if displayed is None else displayed.moment
+            self.notify("plan", "moment")
 
     def leave_arm(self, q: ArrayLike) -> None:
-        """Says where the robot stood when it was disconnected; what is planned stays."""
+        """Takes the robot's position at its disconnection; the plan is kept."""
         with self.lock:
             self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
 
     @property
     def is_goal_of_plan(self) -> bool:
-        """Whether the plan still leads to the goal."""
+        """Whether the plan leads to the goal."""
         plan, goal = self.now.plan, self.now.goal
         return plan is not None and bool(abs(plan.motion.goal - goal.q).max() < 1e-6)
 
     def _leave_preview(self) -> None:
-        self.exhibit(None)
+        self.display(None)
         if self.moment is not None:
             self.moment = None
-            self.tell("moment")
+            self.notify("moment")
 
 
 @dataclass(frozen=True, slots=True)
@@ -319,13 +319,13 @@ class _Standing:
 
 
 class _Arm:
-    """Where the arm of a lab is, also without a robot."""
+    """The position of the arm of a lab, also without a robot."""
 
     def __init__(self, state: LabState) -> None:
         self._state = weakref.ref(state)
 
     def status(self) -> ArmStatus:
-        """Returns the robot's status; without one the arm is where it was left."""
+        """Returns the robot's status; without a robot, the last position."""
         state = self._state()
         assert state is not None
         status = state.status
@@ -333,17 +333,17 @@ class _Arm:
 
 
 _of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()
-"""By the id of a session, which a state keeps alive for as long as it lives itself."""
+"""By the id of a session, which the state keeps alive as long as itself."""
 
 
 def state_of(subject: object) -> LabState:
-    """Returns what a part looks at.
+    """Returns the state of a subject.
 
     Args:
-        subject: A model, a session (all parts of one session share its state), another part, or a state.
+        subject: A model, a session (all its parts share a state), another part, or a state.
 
     Raises:
-        InvalidValueError: It is not one of them.
+        InvalidValueError: It is none of these.
     """
     if isinstance(subject, LabState):
         return subject
@@ -357,6 +357,6 @@ def state_of(subject: object) -> LabState:
 
 
 def _is_session(subject: object) -> TypeGuard[RobotSession]:
-    """Returns whether it is a session, without loading its module: where that is not loaded, there is no session."""
+    """Returns whether it is a session, without loading the module of sessions: if it is not loaded, there is none."""
     module = sys.modules.get("rcilab.execution.session")
     return module is not None and isinstance(subject, module.RobotSession)

@@ -1,4 +1,4 @@
-"""How the parts look, in a light and in a dark notebook: one style sheet and the few shapes that recur."""
+"""The look of the parts, in light and dark notebooks: one style sheet and a few common shapes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PHASE_TONES: dict[str, Tone] = {
     "starting": "warn",
     "connecting": "warn",
 }
-"""Of a robot that does well, or is about to; every other phase is bad."""
+"""Phases of a robot that is ready or starting; all others are bad."""
 
 esc = html.escape
 
@@ -32,7 +32,7 @@ def _sheet() -> str:
 
 
 def style_sheet() -> Any:
-    """Returns the widget that carries the style sheet, one for all parts; it takes no room."""
+    """Returns the widget with the style sheet, one for all parts; it is invisible."""
     return once("sheet", lambda: lean(ipywidgets.HTML, f"<style>{_sheet()}</style>", layout={"display": "none"}))
 
 
@@ -42,35 +42,35 @@ def block(content: str = "", **layout: str) -> Any:
 
 
 def write(widget: Any, content: str) -> None:
-    """Shows other HTML, if it is other."""
+    """Shows other HTML, if it differs."""
     wrapped = f'<div class="rl">{content}</div>' if content else ""
     if widget.value != wrapped:
         widget.value = wrapped
 
 
 def verdict(tone: Tone, word: str, rest: str) -> str:
-    """Returns a line with a coloured edge: a word that says it all, and the sentence."""
+    """Returns a line with a coloured edge: the verdict in one word, and the sentence."""
     lead, follows = with_space(word, rest)
     return f'<p class="rl-verdict rl-{tone}" role="status"><b>{esc(lead)}</b>{esc(follows)}</p>'
 
 
 def soft(text: str) -> str:
-    """Returns a quiet line."""
+    """Returns a line in a muted colour."""
     return f'<p class="rl-soft">{esc(text)}</p>'
 
 
 def why_html(text: Text, why: Message | None) -> str:
-    """Returns why something is off, beside it; empty for None."""
+    """Returns why a control is disabled; empty for None."""
     return "" if why is None else soft(text.render(why))
 
 
 def problem(text: str) -> str:
-    """Returns what is wrong with what was typed."""
+    """Returns the problem of a typed value."""
     return f'<p class="rl-problem" role="alert">{esc(text)}</p>' if text else ""
 
 
 def head(text: str) -> str:
-    """Returns a heading of a group of controls."""
+    """Returns the heading of a group of controls."""
     return f'<p class="rl-head">{esc(text)}</p>'
 
 
@@ -82,7 +82,7 @@ def table(heads: list[str], rows: list[list[str]], *, right: bool = False) -> st
 
 
 def close_tree(widget: Any) -> None:
-    """Closes a widget with all that is its own; ipywidgets keeps what is not closed as long as the kernel lives."""
+    """Closes a widget with all its parts; ipywidgets keeps open ones as long as the kernel runs."""
     for child in getattr(widget, "children", ()):
         close_tree(child)
     for name in ("layout", "style"):

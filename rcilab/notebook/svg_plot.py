@@ -1,6 +1,6 @@
-"""Curves as SVG: drawn once by the kernel, laid out by the browser; colours follow the notebook.
+"""Curves as SVG: drawn once by the kernel, arranged by the browser; colours follow the notebook.
 
-Every panel has a cursor over it. They lie where one line of style says, so that moving them costs no new picture.
+Every panel has a cursor. One line of style places them all, so moving them needs no new picture.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.notebook.style import esc
 from rcilab.views.plots import Frame
 
-_WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it to its place.
+_WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 40.0, 6.0, 20.0, 20.0
 _ACROSS, _HIGH = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
 INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
@@ -37,13 +37,13 @@ class Panel:
 
 
 def draw(panels: Sequence[Panel], joints: Sequence[int], time: str, limit: str) -> str:
-    """Returns the pictures side by side as the room allows, and the legend.
+    """Returns the pictures, as many in a row as fit, and the legend.
 
     Args:
-        panels: All have the same time axis.
-        joints: Which joint each curve is, from 0: its colour and its name in the legend.
-        time: What the time axis is called.
-        limit: What a limit is called.
+        panels: Panels with the same time axis.
+        joints: Joint of each curve, from 0: its colour and its name in the legend.
+        time: Name of the time axis.
+        limit: Name of a limit.
     """
     pictures = "".join(
         f'<div class="rl-panel">{_picture(panel, joints, time, limit)}<div class="rl-cursor"></div></div>'
@@ -56,7 +56,7 @@ def draw(panels: Sequence[Panel], joints: Sequence[int], time: str, limit: str) 
 
 
 def share_of(t: float, end: float) -> float:
-    """Returns where a time is across a panel, 0 to 1."""
+    """Returns the position of a time on a panel, 0 to 1."""
     return (_LEFT + _ACROSS * t / end) / _WIDTH
 
 
@@ -69,7 +69,7 @@ def ticks(low: float, high: float, count: int) -> list[float]:
 
 
 def number(value: float) -> str:
-    """Returns what a tick is called."""
+    """Returns the label of a tick."""
     return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:g}"
 
 
@@ -109,7 +109,7 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
 
 
 def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
-    """Returns grey beyond both limits."""
+    """Returns the grey areas beyond both limits."""
     if not math.isfinite(frame.upper):
         return ""
     upper, lower = float(y(frame.upper)), float(y(frame.lower))
@@ -136,7 +136,7 @@ def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _curve(x: Array, y: Array, color: str, style: str) -> str:
-    """Returns a line; what leaves the panel runs along its edge."""
+    """Returns a line; outside the panel it follows the edge."""
     known = np.isfinite(y)
     inside = np.clip(y[known], _TOP, _TOP + _HIGH)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[known].tolist(), inside.tolist(), strict=True))

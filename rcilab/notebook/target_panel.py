@@ -1,4 +1,4 @@
-"""Target: the pose of the tool in numbers, the branches that reach it, and the circle of the arm angle."""
+"""Target: the pose of the tool as numbers, its branches, and the circle of the arm angle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import ipywidgets
 import numpy as np
 
 from rcilab.app.goal.goal_actions import ChooseBranch, SetArmAngle
-from rcilab.app.goal.target_status import margin, telling_joints
+from rcilab.app.goal.target_status import distinguishing_joints, margin
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.notebook.arc_circle import draw_circle
@@ -20,16 +20,16 @@ from rcilab.notebook.style import block, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
 _NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
-_FURTHEST = 3000.0  # [mm] No arm of ours reaches half as far.
+_FURTHEST = 3000.0  # [mm] More than twice the reach of any arm.
 _WHOLE_TURN = 360.0  # [deg]
 
 
 class TargetPanel(Part):
-    """Where the tool shall be. The arm takes the nearest branch; the others, and every elbow, can be chosen.
+    """The target pose of the tool. The arm takes the nearest branch; the others, and every arm angle, can be chosen.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
@@ -61,7 +61,7 @@ class TargetPanel(Part):
         rows += [block(head(text("target.branches"))), self._table, self.branches]
         self._writing = False
         self.build(rows, min_width="360px")
-        self.hear("goal", self._show)
+        self.subscribe("goal", self._show)
 
     def _arm_angle_rows(self) -> list[Any]:
         text = self.text
@@ -149,7 +149,7 @@ class TargetPanel(Part):
             write(self._table, soft(text(code)))
             return
         here, rows, chosen = state.here, [], None
-        joints = telling_joints(np.asarray(list(solutions)))
+        joints = distinguishing_joints(np.asarray(list(solutions)))
         for number, q in enumerate(solutions):
             least = margin(self.model, q)
             away = float(np.abs(q - here).max())

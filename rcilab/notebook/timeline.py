@@ -1,4 +1,4 @@
-"""One moment of the plan, for everything that looks at it: scene and plots move together. No robot moves."""
+"""The displayed time of the plan, shared by scene and plots. No robot moves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, write
 from rcilab.notebook.widget_sharing import lean
 
-_INTERVAL = 50  # [ms] between two pictures; more than a software-rendered scene shows.
+_INTERVAL = 50  # [ms] Between two pictures; faster than a software-rendered scene.
 _RATES = (1.0, 0.5, 0.25, 0.1)
 
 
@@ -18,8 +18,8 @@ class Timeline(Part):
     """Play, pause and a slider over the milliseconds of the plan.
 
     Args:
-        subject: A model, a session, or another part to look at the same arm as.
-        language: "en" or "zh"; when absent that of a part that is given, else that of the notebook.
+        subject: A model, a session, or another part of the same arm.
+        language: "en" or "zh"; defaults to that of a given part, else of the notebook.
     """
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
@@ -67,12 +67,12 @@ class Timeline(Part):
         self.slider.observe(self._on_slider, names="value")
         self.rate.observe(self._on_rate, names="value")
         self.live.on_click(lambda _: self._look_away())
-        self.hear("plan", self._on_plan)
-        self.hear("moment", self._show)
+        self.subscribe("plan", self._on_plan)
+        self.subscribe("moment", self._show)
 
     @property
     def moment(self) -> float | None:
-        """Time of the plan that is looked at, [s]; None looks at the arm as it is. Can be set."""
+        """The displayed time of the plan, [s]; None shows the arm's position. Can be set."""
         return self.state.moment
 
     @moment.setter
@@ -105,7 +105,7 @@ class Timeline(Part):
 
     def _look_away(self) -> None:
         self.play.playing = False
-        self.state.exhibit(None)
+        self.state.display(None)
         self.state.look_at(None)
 
     def _show(self) -> None:

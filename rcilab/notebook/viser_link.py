@@ -1,4 +1,4 @@
-"""A motion on a page of its own: a link out of the notebook, on loopback, with a time slider and a play button."""
+"""A motion on a separate page: a link from the notebook, on loopback, with a time slider and a play button."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.views.viser_stage import add_environment, place_camera
 
 LOOPBACK = "127.0.0.1"
-_TICK = 1.0 / 30.0  # [s] As often as a slider sends, and more than software rendering shows.
-_HOLD = 1.0  # [s] The arm rests at the goal before the motion starts again.
+_TICK = 1.0 / 30.0  # [s] The rate of a slider's messages, faster than software rendering.
+_HOLD = 1.0  # [s] Pause at the goal before the motion starts again.
 _HIDE_WARNING = """document.head.insertAdjacentHTML("beforeend",
 "<style>#webgl-software-rendering { display: none }</style>")"""  # viser's box covers the arm in a small frame.
 _MARKUP = """<p>viser: <a href="{url}" target="_blank">{url}</a></p>
@@ -30,16 +30,16 @@ _MARKUP = """<p>viser: <a href="{url}" target="_blank">{url}</a></p>
 class PreviewPage(Closeable):
     """A page that plays one motion: the arm solid, its goal as a ghost. Nothing on it can move a robot.
 
-    Shows itself in a notebook as a link and a frame. Close it, or let it end with the kernel.
+    Displays itself in a notebook as a link and a frame. Close it, or let it end with the kernel.
 
     Args:
-        motion: What to play.
+        motion: The motion.
         model: The arm.
         port: TCP port on loopback; 0 takes any free one.
-        language: "en" or "zh"; that of the notebook when absent.
+        language: "en" or "zh"; defaults to that of the notebook.
 
     Raises:
-        InvalidValueError: There is no such language.
+        InvalidValueError: The language is not supported.
         UsageError: The port is taken.
     """
 
@@ -47,13 +47,13 @@ class PreviewPage(Closeable):
         require_motion(motion)
         require_model(model)
         self._motion = motion
-        self._door, self.port = open_page(port)
-        scene = ViserScene(self._door.viser, shadows=False)
+        self._guarded_server, self.port = open_page(port)
+        scene = ViserScene(self._guarded_server.viser, shadows=False)
         ArmView(scene, "goal", model, "plan").show(motion.goal)
         self._arm = ArmView(scene, "arm", model)
         self._arm.show(motion.start)
         text = Text(chosen_language(language), "rcilab.notebook")
-        gui = self._door.viser.gui
+        gui = self._guarded_server.viser.gui
         last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
         self._play = gui.add_checkbox(text("timeline.play"), True)
         self._slider = gui.add_slider(text("timeline.time"), min=0.0, max=last, step=0.001, initial_value=0.0)
@@ -69,15 +69,15 @@ class PreviewPage(Closeable):
 
     @property
     def time(self) -> float:
-        """Where in the motion the page is, [s]."""
+        """The time of the motion on the page, [s]."""
         return float(self._slider.value)
 
     def close(self) -> None:
-        """Takes the page away; calling it again does nothing."""
+        """Closes the page; may be called twice."""
         if not self._closed.is_set():
             self._closed.set()
             self._player.join()
-            self._door.close()
+            self._guarded_server.close()
 
     def __repr__(self) -> str:
         return f"<PreviewPage {self.url}>"
@@ -86,7 +86,7 @@ class PreviewPage(Closeable):
         return _MARKUP.format(url=self.url, height=height)
 
     def _run(self) -> None:
-        """Plays, and follows the hand: a time that is not the one we set last was set on the page."""
+        """Plays, and follows the slider: a time that differs from the last one set here was set on the page."""
         t, shown, resting = 0.0, 0.0, 0.0
         while not self._closed.wait(_TICK):
             wanted = self._slider.value
@@ -104,23 +104,23 @@ class PreviewPage(Closeable):
 
 
 def serve_preview(motion: Motion, model: RobotModel, *, port: int = 0, language: str | None = None) -> PreviewPage:
-    """Returns a page on loopback that plays a motion; in a notebook it shows itself as a link and a frame.
+    """Returns a page on loopback that plays a motion; in a notebook it displays itself as a link and a frame.
 
     Args:
-        motion: What to play.
+        motion: The motion.
         model: The arm.
         port: TCP port on loopback; 0 takes any free one.
-        language: "en" or "zh"; that of the notebook when absent.
+        language: "en" or "zh"; defaults to that of the notebook.
 
     Raises:
-        InvalidValueError: There is no such language.
+        InvalidValueError: The language is not supported.
         UsageError: The port is taken.
     """
     return PreviewPage(motion, model, port=port, language=language)
 
 
 def open_page(port: int) -> tuple[GuardedServer, int]:
-    """Returns a viser page on loopback with nothing but the room an arm stands in, and its TCP port.
+    """Returns a viser page on loopback with an empty environment, and its TCP port.
 
     Args:
         port: TCP port; 0 takes any free one.

@@ -1,7 +1,7 @@
-"""Widgets that cost a browser little: what looks alike shares one layout and one style.
+"""Widgets that cost a browser little: equal layouts and styles are shared.
 
-Each layout and each style is a model of its own, sent to the browser in a message of its own; with one of each for
-every label and button, two thirds of what a cell sends would say nothing new.
+Each layout and each style is a separate model with a message of its own; with one of each for every label and button,
+two thirds of a cell's messages would be redundant.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ _shared: dict[object, Any] = {}
 
 
 def lean(kind: type[Any], *content: Any, classes: tuple[str, ...] = (), **traits: Any) -> Any:
-    """Returns a widget. A layout or a style that is a dictionary, or none, is shared with all that have the same.
+    """Returns a widget. A layout or style that is a dictionary, or absent, is shared with all that have the same.
 
-    Give a widget whose layout changes a `Layout` of its own.
+    For a widget whose layout changes, pass a `Layout` object.
 
     Args:
         kind: Class of the widget.
-        content: As its class takes it: the children of a box, say.
-        classes: Of style sheets.
-        traits: Likewise; `layout` and `style` may be dictionaries.
+        content: Positional arguments of its class, such as the children of a box.
+        classes: Classes of style sheets.
+        traits: Keyword arguments of its class; `layout` and `style` may be dictionaries.
     """
     traits["layout"] = _look(ipywidgets.Layout, traits.get("layout"))
     style = kind.class_traits().get("style")
@@ -32,11 +32,11 @@ def lean(kind: type[Any], *content: Any, classes: tuple[str, ...] = (), **traits
 
 
 def once(name: str, make: Any) -> Any:
-    """Returns a widget that is made once and shown in many places.
+    """Returns a widget that is created once and shown in many places.
 
     Args:
-        name: Which.
-        make: Makes it.
+        name: Its key.
+        make: Creates it.
     """
     known = _shared.get(name)
     if known is None or known.comm is None:  # Every widget of the kernel was closed.
@@ -45,7 +45,7 @@ def once(name: str, make: Any) -> Any:
 
 
 def is_shared(widget: Any) -> bool:
-    """Returns whether a layout, a style or a widget belongs to others too."""
+    """Returns whether a layout, a style or a widget is shared."""
     return any(widget is known for known in _shared.values())
 
 

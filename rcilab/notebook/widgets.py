@@ -1,4 +1,4 @@
-"""Sliders that pose an arm: degrees for the hand, radians for the code."""
+"""Sliders for the joints of an arm: degrees on screen, radians in code."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ _STEP_DEG = 0.5
 
 
 class JointSliders:
-    """One slider a joint, its limits at its ends, and the pose of the tool below; shows itself in a notebook.
+    """One slider per joint, its limits at its ends, and the pose of the tool below; displays itself in a notebook.
 
     Args:
         model: The arm.
-        q: Where to begin, shape (n,), [rad]; the arm's home when absent.
-        show: Called with the joint angles, shape (n,), [rad], at the start and at every change: `preview.show`, say.
-        continuous: Whether a slider reports while it is dragged, or once when it is let go. Take False where `show`
-            is slow; ipywidgets drops what comes too fast, so dragging is safe either way.
-        language: "en" or "zh"; that of the notebook when absent.
+        q: Initial joint angles, shape (n,), [rad]; defaults to the arm's home.
+        show: Called with the joint angles, shape (n,), [rad], at the start and after every change, e.g. `preview.show`.
+        continuous: Whether a slider reports while it is dragged, or once at the end of the drag. Choose False if `show`
+            is slow; ipywidgets drops changes that come too fast, so dragging is safe either way.
+        language: "en" or "zh"; defaults to that of the notebook.
 
     Raises:
         InvalidValueError: q is not n angles inside the limits, the model is not one, or the language is unknown.
@@ -47,7 +47,7 @@ class JointSliders:
         language: str | None = None,
     ) -> None:
         self._model = require_model(model)
-        kernel_cells()  # From now on it looks whether the page is there while an arm moves.
+        kernel_cells()  # From now on it watches the page while an arm moves.
         self._text = text = Text(chosen_language(language), "rcilab.notebook")
         self._show = show
         self._setting = False
@@ -84,7 +84,7 @@ class JointSliders:
         return self.widget._repr_mimebundle_(**options)
 
     def _set(self, q: JointVector) -> None:
-        """Takes angles as they are; the sliders show them rounded, and their own news is not listened to."""
+        """Sets angles as they are; the sliders show them rounded, and their echoes are ignored."""
         self._q = readonly_copy(q)
         self._setting = True
         try:
@@ -147,7 +147,7 @@ def _joint_slider(name: str, lower: float, upper: float, continuous: bool) -> An
 
 
 def _with_limits(slider: Any) -> Any:
-    """Returns the slider between its limits, which is where a hand looks for them."""
+    """Returns the slider with its limits at both ends."""
     label = ipywidgets.Layout(width="4em", display="flex", justify_content="center")
     return ipywidgets.HBox([
         ipywidgets.Label(f"{slider.min:.0f}°", layout=label),

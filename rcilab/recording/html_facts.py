@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.error_base import plain_text
 from rcilab.core.fault import name_faults
+from rcilab.core.state import COMPLIANT_MODES
 from rcilab.i18n.error_messages import describe_note
 
 if TYPE_CHECKING:
@@ -46,10 +47,11 @@ def describe_stop(stopped: str, faults: Iterable[object], text: Text) -> str:
 
 
 def describe_goal(run: Run, text: Text) -> str:
-    """Returns where a run that was not stopped ended: at its goal, beside it, or at the last command of a callback."""
+    """Returns where a run that was not stopped ended: at its goal, next to it, or at the last command of a callback."""
     if run.missed_goal is not None:
         joint, angle = run.missed_goal
-        return text("run.beside_goal", joint=joint, angle=angle)
+        is_compliant = run.setup.mode in COMPLIANT_MODES
+        return text("run.yielded" if is_compliant else "run.missed_goal", joint=joint, angle=angle)
     return text("facts.goal" if run.plan is not None else "facts.last")
 
 

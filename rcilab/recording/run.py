@@ -295,7 +295,7 @@ class Run:
     def goal_error(self) -> JointVector | None:
         """Measured joint angles at the end minus the goal, shape (n,), [rad]; None unless it ran to the end of a plan.
 
-        In a compliant mode the arm yields to friction and to errors of the model, and ends beside its goal.
+        In a compliant mode the arm yields to friction and to errors of the model, and ends next to its goal.
         """
         if self.plan is None or self.stopped or self.faults or not self.is_complete or not len(self.cycles):
             return None

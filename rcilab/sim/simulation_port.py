@@ -47,7 +47,7 @@ class SimulationPort:
         self._handle, self._clock = handle, clock
         self._listener = _listen(host if ipaddress.ip_address(host).is_loopback else _FALLBACK, port)
         self._guests: dict[socket.socket, LineReader] = {}
-        self._heard: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
+        self._last_message: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
         self.sockets: Sequence[socket.socket] = (self._listener,)
         """Sockets to poll; another object whenever it changes."""
 
@@ -91,7 +91,7 @@ class SimulationPort:
             ).coded("world_full", most=MOST_GUESTS, seconds=f"{IDLE:g}")
             _turn_away(guest, Refused(str(full), full.code, full.facts))
             return
-        self._guests[guest], self._heard[guest] = LineReader(), self._clock()
+        self._guests[guest], self._last_message[guest] = LineReader(), self._clock()
         self.sockets = (self._listener, *self._guests)
 
     def _read(self, guest: socket.socket) -> None:
@@ -104,7 +104,7 @@ class SimulationPort:
         if not data:
             self._drop(guest)
             return
-        self._heard[guest] = self._clock()
+        self._last_message[guest] = self._clock()
         try:
             for line in self._guests[guest].feed(data):
                 request_id, request = decode_world_request(line)
@@ -128,13 +128,13 @@ class SimulationPort:
 
     def _drop_idle(self) -> None:
         """Drops the client that has been idle for the longest time, if longer than `IDLE`."""
-        guest = min(self._heard, key=self._heard.__getitem__)
-        if self._clock() - self._heard[guest] > IDLE:
+        guest = min(self._last_message, key=self._last_message.__getitem__)
+        if self._clock() - self._last_message[guest] > IDLE:
             self._drop(guest)
 
     def _drop(self, guest: socket.socket) -> None:
         guest.close()
-        del self._guests[guest], self._heard[guest]
+        del self._guests[guest], self._last_message[guest]
         self.sockets = (self._listener, *self._guests)
 
 

@@ -1,1 +1,1 @@
-"""The page: panels, scene and plots in viser, who may open it and who holds the controls."""
+"""The page: panels, scene and plots in viser, access and controls."""

@@ -1,6 +1,6 @@
-"""The token that a page may ask for: made here, or given where no other user of the machine can read it.
+"""The token of the page: generated here, or given where no other user of the machine can read it.
 
-Never on a command line: every local user can read those of others.
+Never on a command line, which every local user can read.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from rcilab.core.errors import UsageError
 from rcilab.views.access_control import is_loopback
 
 VARIABLE = "RCILAB_TOKEN"
-SHORTEST = 16  # Characters. 16 random letters cannot be found by trying.
-_BYTES = 24  # Of chance in a token that is made here: 32 URL-safe characters.
+SHORTEST = 16  # Characters: 16 random letters cannot be guessed.
+_BYTES = 24  # Random bytes of a generated token: 32 URL-safe characters.
 
 _REDIRECT = """<!DOCTYPE html><meta charset="utf-8"><title>rcilab</title>
 <meta http-equiv="refresh" content="0; url={url}"><a href="{url}">rcilab workbench</a>
@@ -27,10 +27,10 @@ _REDIRECT = """<!DOCTYPE html><meta charset="utf-8"><title>rcilab</title>
 
 
 def require_token(token: str, where: str) -> str:
-    """Returns a token that is good enough.
+    """Returns a token after its check.
 
     Raises:
-        UsageError: It is too short, or holds what cannot be typed.
+        UsageError: It is too short, or contains characters that cannot be typed.
     """
     if len(token) < SHORTEST:
         raise UsageError(f"the token in {where} has {len(token)} characters; give it at least {SHORTEST}")
@@ -42,16 +42,16 @@ def require_token(token: str, where: str) -> str:
 def find_token(
     host: str, *, is_private: bool = False, file: Path | None = None, environ: Mapping[str, str] = os.environ
 ) -> str | None:
-    """Returns the token that pages must bring: the given one, else a new one where one is needed, else None.
+    """Returns the token that pages must send: the given one, else a new one if one is needed, else None.
 
     Args:
-        host: Address to listen on; on any but loopback a token is needed.
-        is_private: Whether one is needed on loopback, too, where every account of this machine can open the page.
-        file: Holds the token in its first line.
-        environ: May hold it as RCILAB_TOKEN; the file counts first.
+        host: Address to listen on; a token is needed on any but loopback.
+        is_private: Whether one is needed on loopback, too, where every account of this machine could open the page.
+        file: File with the token in its first line.
+        environ: May contain it as RCILAB_TOKEN; the file takes precedence.
 
     Raises:
-        UsageError: The token is too short or can be read by others, or the host is no address.
+        UsageError: The token is too short or can be read by others, or the host is not an address.
     """
     if file is not None:
         return _token_in(file)
@@ -74,9 +74,9 @@ def is_local(host: str) -> bool:
 
 @contextmanager
 def private_address(url: str) -> Iterator[str]:
-    """Yields the address of a file that leads a browser to `url`; only this user can read it, while the block lasts.
+    """Yields the address of a file that redirects a browser to `url`; only this user can read it, inside the block.
 
-    A browser is started with its address on the command line, where a token must not stand.
+    A browser's address is on its command line, where a token must not be.
     """
     with NamedTemporaryFile("w", prefix="rcilab-", suffix=".html", encoding="utf-8") as file:  # Mode 0600.
         file.write(_REDIRECT.format(url=url))

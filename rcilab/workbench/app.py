@@ -1,4 +1,4 @@
-"""The workbench as a whole: opens the page first, then everything that takes time, and closes it all again."""
+"""The workbench: opens the page first, then everything that takes time, and closes it all again."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
 from rcilab.app.scene.scene_actions import HighlightBranch
 from rcilab.app.setup.setup_actions import OpenTab
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store, UiState
 from rcilab.app.view_actions import CommitField, DrawInSoftware, Seek, SetView
 from rcilab.views.access_control import AccessPolicy
@@ -39,17 +39,17 @@ if TYPE_CHECKING:
 
     from rcilab.recording.run import Run
 
-_LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Heights of a page's window that plots are laid out for.
+_LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Range of window heights for the layout of plots.
 _BEAT = 0.4  # [s] The control process stops a motion after 2 s without an operator.
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkbenchConfig:
-    """How a workbench is started."""
+    """Options of a workbench."""
 
     model: str = "xMatePro7"
     target: str = "virtual"
-    """"virtual" for a virtual controller of its own, or the address of a controller, rci://HOST:PORT."""
+    """"virtual" for an own virtual controller, or the address of a controller, rci://HOST:PORT."""
     host: str = "127.0.0.1"
     """Address to listen on; anything but loopback needs a token."""
     port: int = security.DEFAULT_PORT
@@ -57,20 +57,20 @@ class WorkbenchConfig:
     token: str | None = None
     """Secret that every page must bring, at least 16 characters; `access.find_token` makes one."""
     language: str | None = None
-    """None is the one that was chosen last on this port, at first English."""
+    """None is the last one on this port, or English."""
     quality: str | None = None
-    """"full" or "light"; None is full, or light where the browser draws without a graphics card."""
+    """"full" or "light"; None is full, or light in a browser without a graphics card."""
     runs: Path | None = None
-    """Folder that every motion is recorded in, cycle by cycle; None keeps the last one in memory only."""
+    """Folder for recordings of every motion, cycle by cycle; None keeps only the last run, in memory."""
     replay: Run | None = None
-    """A run to look at; nothing is connected then until asked for."""
+    """A run to show; nothing is connected then until the operator does."""
 
 
 class Workbench:
-    """The page and what is behind it. `with Workbench(config) as bench: print(bench.url)`.
+    """The page with everything behind it. `with Workbench(config) as bench: print(bench.url)`.
 
     Args:
-        config: How to start.
+        config: Its options.
 
     Raises:
         ModelError: No robot has this name, or it cannot be driven at an address.
@@ -85,7 +85,7 @@ class Workbench:
         self._config = config
         self._bound = security.bind(config.host, config.port, config.token)
         self.port: int = self._bound.getsockname()[1]
-        """Port the page is served on."""
+        """Port of the page."""
         goal = goal_at(model, model.home)
         state = UiState(
             model=model,
@@ -98,19 +98,19 @@ class Workbench:
         if replay is not None:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
-        self.session = RobotConnection(lambda error: self.store.say("bad", tell_error(error, self.session.status())))
-        is_own = config.port and replay is None  # A free port is not reused, and a replay only shows a run.
+        self.session = RobotConnection(lambda error: self.store.say("bad", explain_error(error, self.session.status())))
+        is_own = config.port and replay is None  # No autosave on a free port, which is not reused, nor for a replay.
         autosave = Autosave(autosave_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()
         self.dispatcher = Dispatcher(self.store, self.session, self._deliver, autosave, self._presence)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
-        self._views: dict[int, ViserEnvironment] = {}  # By page. Owned by the event loop.
+        self._views: dict[int, ViserEnvironment] = {}  # By client id. Owned by the event loop.
 
     @property
     def url(self) -> str:
-        """What to open in a browser."""
+        """Address for a browser."""
         host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self._config.host, self._config.host)
         secret = f"?token={quote(self._config.token, safe='')}" if self._config.token else ""
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{secret}"
@@ -118,17 +118,19 @@ class Workbench:
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
         ask = self.dispatcher.ask
-        self.live = live.LiveChannel(self.session.stop, self._receive, lambda: self._door.guard.count_malformed())
+        self.live = live.LiveChannel(
+            self.session.stop, self._receive, lambda: self._guarded_server.guard.count_malformed()
+        )
         gate = AccessPolicy(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
-        self._door = GuardedServer(
+        self._guarded_server = GuardedServer(
             self._bound,
             gate,
             decorate=self._decorate,
             routes={live.LIVE_PATH: self.live.serve},
-            may_act=lambda page: self.store.state.lease.allows(page),
+            may_act=lambda page: self.store.state.control_lock.allows(page),
             refuse=lambda page: ask(Refuse(page=page)),
         )
-        self.server = self._door.viser
+        self.server = self._guarded_server.viser
         self._opened = True
         self._follow_pages()
         if self._config.replay is None:
@@ -141,7 +143,7 @@ class Workbench:
         threading.Thread(target=self._beat, name="operator", daemon=True).start()
 
     def close(self) -> None:
-        """Brings a motion to rest, ends the processes, closes the page. May be called twice."""
+        """Stops a motion, ends the processes, closes the page. May be called twice."""
         if self._stopped.is_set():
             return
         self._stopped.set()
@@ -151,10 +153,10 @@ class Workbench:
         self.dispatcher.close()
         self.session.close()
         self.renderer.close()
-        self._door.close()
+        self._guarded_server.close()
 
     def _deliver(self, page: int | None, name: str, stream: IO[bytes], is_cancelled: Callable[[], bool]) -> bool:
-        """Has a page's browser save a file; a page that has gone wants it no more. Returns whether all was sent."""
+        """Makes a page's browser save a file; cancelled when the page closes. Returns whether all was sent."""
         client = self.server.get_clients().get(-1 if page is None else page)
         return client is not None and send_file(client, name, stream, is_cancelled)
 
@@ -177,7 +179,7 @@ class Workbench:
         return decorate(index, self.store.state.quality)
 
     def _receive(self, page: int, message: live.PageMessage) -> None:
-        """Acts on a message of a page's live connection."""
+        """Handles a message of a page's live connection."""
         if isinstance(message, live.Here):
             self._here(page)
         elif isinstance(message, live.Home):
@@ -212,18 +214,18 @@ class Workbench:
         raise AssertionError(message)
 
     def _bring_back(self, page: int) -> None:
-        """Shows a page what it showed at first; what other pages see is theirs."""
+        """Resets the camera of a page; those of other pages stay."""
         if page in self._views:
             self._views[page].reset()
 
     def _here(self, page: int) -> None:
-        """Hears that a page is there; only that of the operator counts for the robot side."""
-        self._presence.heard(page)
-        if self.store.state.lease.holder == page:
+        """Registers a heartbeat of a page; only that of the operator counts for the robot."""
+        self._presence.mark_seen(page)
+        if self.store.state.control_lock.holder == page:
             self.session.heartbeat()
 
     def _beat(self) -> None:
-        """Asks the pages continuously whether an operator is there to press Stop."""
+        """Asks the pages continuously for heartbeats."""
         while not self._stopped.wait(_BEAT):
             self.live.beat()
 

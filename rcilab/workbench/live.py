@@ -1,6 +1,6 @@
-"""The websocket of our page next to viser's: status to the bar; Stop, seeking, chosen rows and signs of life from it.
+"""The websocket of our page next to viser's: status to the bar; Stop, seeking, chosen rows and heartbeats from it.
 
-It does not depend on which tab or panel is shown, so Stop stays reachable whatever the page looks like.
+It does not depend on the open tab or panel, so Stop is always reachable.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from websockets.exceptions import ConnectionClosed
 
 LIVE_PATH = "/rcilab/live"
 
-_LARGEST_MESSAGE = 4096  # [bytes] The longest message of a page has some hundred.
+_LARGEST_MESSAGE = 4096  # [bytes] The longest message of a page has some hundreds.
 
 _Index: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=99)]
 _Key: TypeAlias = Annotated[int, msgspec.Meta(ge=0, lt=10**9)]
 
 
 class PageMessage(msgspec.Struct, tag_field="kind", tag=str.lower):
-    """What a page may send: JSON objects whose `kind` is the name of a class below."""
+    """A message of a page: a JSON object whose `kind` is the name of a class below."""
 
 
 class Hello(PageMessage):
-    """Which of viser's clients the page is, with the key that only this client was given."""
+    """The page's client id of viser, with the key that only this client got."""
 
     page: int
     key: str
@@ -40,21 +40,21 @@ class Stop(PageMessage):
 
 
 class Here(PageMessage):
-    """The page answers a beat: there is a page on which Stop can be pressed."""
+    """The page answers a heartbeat: Stop can be pressed there."""
 
 
 class Home(PageMessage):
-    """The page's camera is to go back to where it was at first."""
+    """The page's camera is to be reset."""
 
 
 class Seek(PageMessage):
-    """A plot was clicked at this part of its time axis, 0 to 1."""
+    """A plot was clicked at this place of its time axis, 0 to 1."""
 
     place: float
 
 
 class Size(PageMessage):
-    """Height of the page's window, [px], when it gets the controls and when it changes."""
+    """Height of the page's window, [px], sent when the page gets the controls and after changes."""
 
     height: float
 
@@ -66,25 +66,25 @@ class Tab(PageMessage):
 
 
 class Entered(PageMessage):
-    """What was typed is complete."""
+    """The typed text is complete."""
 
 
 class Take(PageMessage):
-    """The page wants the controls."""
+    """The page asks for the controls."""
 
 
 class Answer(PageMessage):
-    """Whether the page, which was asked for the controls, hands them over."""
+    """Answer of the page with the controls: whether it hands them over."""
 
     yes: bool
 
 
 class Software(PageMessage):
-    """The browser draws without a graphics card."""
+    """The browser has no graphics card."""
 
 
 class Peek(PageMessage):
-    """The branch, from 0, that is under the mouse or has the focus; None when it is left."""
+    """The branch, from 0, under the mouse or with the focus; None when it is left."""
 
     branch: _Index | None
 
@@ -102,13 +102,13 @@ class Condition(PageMessage):
 
 
 class Edit(PageMessage):
-    """Something was done in the list of waypoints."""
+    """An action in the list of waypoints."""
 
     what: Literal["select", "move", "up", "down", "delete", "duplicate", "undo", "redo"]
     key: _Key
-    """Of the waypoint."""
+    """Key of the waypoint."""
     place: _Key
-    """Where to move it, from 0."""
+    """Its new place, from 0."""
 
 
 _DECODER = msgspec.json.Decoder(
@@ -131,13 +131,13 @@ _DECODER = msgspec.json.Decoder(
 
 
 class LiveChannel:
-    """Sends one JSON object to every page when it changes, and receives the few messages a page has for us.
+    """Sends one JSON object to every page when it changes, and receives the messages of pages.
 
     Args:
         on_stop: Called for every Stop, from any page that may open the websocket.
-        on_message: Called with a page's client id and its message; must return at once. Messages of pages that have
-            not proved which client they are do not get here.
-        on_malformed: Called for what is not a message of a page; it is dropped.
+        on_message: Called with a page's client id and its message; must return at once. Messages of pages that have not
+            proved their client id are dropped.
+        on_malformed: Called for an invalid message; it is dropped.
     """
 
     def __init__(
@@ -151,18 +151,18 @@ class LiveChannel:
         self._keys: dict[int, str] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._latest: dict[str, Any] = {"server": secrets.token_hex(8)}
-        """What pages show; from `server` they see that another workbench answers at this address."""
+        """The object that pages show; by `server` they notice that another workbench answers at this address."""
 
     def introduce(self, page: int) -> str:
-        """Returns the key of a client that has just connected; the page brings it along on its live connection."""
+        """Returns the key of a client that has just connected; the page sends it on its live connection."""
         return self._keys.setdefault(page, secrets.token_urlsafe(16))
 
     def forget(self, page: int) -> None:
-        """Drops the key of a client that has gone."""
+        """Drops the key of a client that has disconnected."""
         self._keys.pop(page, None)
 
     async def serve(self, connection: Any) -> None:
-        """Serves one page until it goes; runs on the server's event loop."""
+        """Serves one page until it disconnects; runs on the server's event loop."""
         self._loop = asyncio.get_running_loop()
         self._pages[connection] = None
         try:
@@ -175,11 +175,11 @@ class LiveChannel:
             self._pages.pop(connection, None)
 
     def receive(self, raw: str | bytes, page: int | None = None) -> int | None:
-        """Acts on one message.
+        """Handles one message.
 
         Args:
-            raw: As it came.
-            page: Client id of the page it came from, as far as it is known.
+            raw: The message.
+            page: Client id of the page, if it is known.
 
         Returns:
             The client id from now on.
@@ -203,14 +203,14 @@ class LiveChannel:
         return hello.page
 
     def publish(self, **values: Any) -> None:
-        """Shows new values; only those that changed are sent. Called by one thread, the renderer's."""
+        """Publishes new values; only changed ones are sent. Called by one thread, the renderer's."""
         changed = {name: value for name, value in values.items() if self._latest.get(name) != value}
         if changed:
             self._latest = {**self._latest, **changed}
             self._send(json.dumps(changed))
 
     def beat(self) -> None:
-        """Asks every page whether it is still there. A page answers even while its timers are throttled in the back."""
+        """Sends a heartbeat to every page. A page answers even while its timers are throttled in the background."""
         self._send('{"beat": 1}')
 
     def _send(self, text: str) -> None:

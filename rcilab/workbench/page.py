@@ -1,4 +1,4 @@
-"""Our page out of viser's: the bar with status and Stop, the Esc key, the time cursor in the plots."""
+"""The page, made from viser's: the bar with status and Stop, the Esc key, the time cursor in the plots."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _BRAND = (11, 111, 194)
 def decorate(index: bytes, quality: str = "full") -> bytes:
     """Returns viser's `index.html` with our style sheet and script in its head.
 
-    The bar must be there in every tab and with every panel folded away, and the Esc key must work while a text field
-    has the focus; viser's own controls and hotkeys can do neither.
+    The bar must be visible in every tab and with every panel folded, and the Esc key must work while a text field has
+    the focus; viser's own controls and hotkeys cannot do either.
 
     Args:
-        index: As viser has it.
-        quality: How the scene is to be drawn: "light" does without smoothed edges, which a browser cannot change later.
+        index: The page of viser.
+        quality: Quality of the scene: "light" has no smoothed edges, which a browser cannot change later.
     """
     assets = files("rcilab.workbench") / "assets"
     style = (assets / "page.css").read_bytes()
-    scripts = ("heartbeat", "page", "marks", "names", "rows", "pick", "branches", "folds", "retell", "labels")
+    scripts = ("heartbeat", "page", "marks", "names", "rows", "pick", "branches", "folds", "resend", "labels")
     script = b"\n".join((assets / f"{name}.js").read_bytes() for name in scripts)
     head = b"<style>" + style + b"</style><script>" + script + b"</script></head>"
     page = index.replace(b"<title>Viser</title>", b"<title>rcilab workbench</title>", 1)
@@ -35,13 +35,13 @@ def decorate(index: bytes, quality: str = "full") -> bytes:
 
 
 def introduce(client: viser.ClientHandle, key: str) -> None:
-    """Informs a page which of the server's clients it is, and the key that proves it on its live connection."""
+    """Informs a page of its client id, and of the key that proves it on its live connection."""
     call = f"window.rcilabPage?.({client.client_id}, {json.dumps(key)});"
     run_javascript(client, call)
 
 
 def dress(server: viser.ViserServer, theme: str) -> None:
-    """Colours the page light or dark."""
+    """Sets the page's colours, light or dark."""
     server.gui.configure_theme(
         brand_color=_BRAND, show_logo=False, show_share_button=False, control_width="medium", dark_mode=theme == "dark"
     )

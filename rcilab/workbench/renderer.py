@@ -1,4 +1,4 @@
-"""At once, but at most thirty times a second: lets stage, panels and bar show what of state and robot has changed."""
+"""Shows changes of state and robot in stage, panels and bar: at once, but at most thirty times a second."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.failures import Failures
-from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.played_motion import moment_played
 from rcilab.app.store import Store
@@ -26,7 +26,7 @@ from rcilab.workbench.panels.fault_injection import FaultInjectionPanel
 from rcilab.workbench.panels.health import HealthPanel
 from rcilab.workbench.panels.jog import JogPanel
 from rcilab.workbench.panels.learn import LearnPanel
-from rcilab.workbench.panels.learn_exhibit import LearnExhibitPanel
+from rcilab.workbench.panels.learn_demo import LearnDemoPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
 from rcilab.workbench.panels.mode import ModePanel
 from rcilab.workbench.panels.path_type import PathTypePanel
@@ -58,11 +58,11 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_PERIOD = 1.0 / 30.0  # [s] The display's rate is enough, and it leaves the processor to the robot.
-_AT_REST = 0.25  # [s] So often counters and clocks are shown while nothing else changes.
+_PERIOD = 1.0 / 30.0  # [s] The display's rate, which leaves processor time to the robot.
+_AT_REST = 0.25  # [s] Interval of counters and clocks while nothing else changes.
 _READ = 0.25
-"""[s] Where the scene is drawn lightly and a hand drags the goal in it, numbers and plots come so long after
-the arm: a page that draws in software shows the arm once it has applied all that came with it."""
+"""[s] During a drag with light graphics, numbers and plots follow the arm after this time: a page with software
+rendering shows the arm only once it has applied all updates that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmStatePanel, PosesPanel),
@@ -83,7 +83,7 @@ _TABS = (
         FaultInjectionPanel,
         HealthPanel,
     ),
-    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnExhibitPanel),
+    ("tab.learn", "school", LearnLessonPanel, LearnPanel, LearnDemoPanel),
     ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
 )
 
@@ -94,12 +94,12 @@ def tab_name(index: int) -> str:
 
 
 class Renderer:
-    """Owns every handle of the page. It reads snapshots and knows no sockets.
+    """Owns every handle of the page. It reads snapshots; it does not use sockets.
 
     Args:
         server: The page.
-        store: Where the state is.
-        session: Where the robot is.
+        store: Has the state.
+        session: The robot.
         live: The bar.
         ask: Takes requests.
     """
@@ -112,13 +112,13 @@ class Renderer:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
-        self._tabs: list[PersistentTab] = []  # Of the main panel, then that of the timeline's window.
+        self._tabs: list[PersistentTab] = []  # Those of the main panel, then that of the timeline's window.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
         self._shown: tuple[object, ...] = ()
         self._next = 0.0
         self._goal: object = None
-        self._owed: float | None = None  # [s] Since when the panels show another goal.
+        self._owed: float | None = None  # [s] Since when the panels show an old goal.
         self._drawn: tuple[object, ...] = ()
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -126,7 +126,7 @@ class Renderer:
         """Failures of our own code; one a second at most is printed."""
 
     def start(self) -> None:
-        """Draws once, then goes on in a thread of its own."""
+        """Draws once, then continues in a separate thread."""
         self.show()
         thread = threading.Thread(target=self._run, name="renderer", daemon=True)
         thread.start()
@@ -139,14 +139,14 @@ class Renderer:
             self._thread.join(5.0)
 
     def place_at(self, share: float) -> float:
-        """Returns the place in the motion, 0 to 1, that stands at a part of the plots' time axis."""
-        state = exhibited(self._store.state)
+        """Returns the place in the motion, 0 to 1, at a place of the plots' time axis."""
+        state = displayed_state(self._store.state)
         if state.plan is None:
             return 0.0
         return moment_played(state, share * self._timeline.end) / max(state.plan.motion.duration, CYCLE_TIME)
 
     def show(self) -> bool:
-        """Shows one snapshot, and returns whether there was anything to show; like the last it costs nothing."""
+        """Shows one snapshot, and returns whether anything had changed; without changes it costs nothing."""
         state, status = self._store.state, self._session.status()
         shown, now = (state, *_traits(status)), time.monotonic()
         if shown == self._shown and now < self._next:
@@ -156,15 +156,15 @@ class Renderer:
         return True
 
     def _draw(self, state: UiState, status: SupervisorStatus) -> bool:
-        """Shows a snapshot, first what is in the scene: a hand may be dragging it. Returns whether that was all."""
+        """Shows a snapshot, the scene first, as it may be dragged. Returns whether everything was updated."""
         if _looks(state) != self._built:
-            with self._server.atomic():  # In one piece: a wake of viser's loop a message doubles the time it takes.
+            with self._server.atomic():  # As one batch: waking viser's loop for each message doubles the time.
                 self._build(state)
         if state.theme != self._theme:
             self._theme = state.theme
             dress(self._server, state.theme)
-        seen = exhibited(state)
-        self._stage.show(exhibited(state, scene=True), status, self._text)
+        seen = displayed_state(state)
+        self._stage.show(displayed_state(state, scene=True), status, self._text)
         self._marks.show(seen)
         is_whole = not self._can_wait(state, status)
         if is_whole:
@@ -173,7 +173,7 @@ class Renderer:
         return is_whole
 
     def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:
-        """Returns whether numbers and plots give way to the arm that follows a hand; news of the robot never do."""
+        """Returns whether numbers and plots wait for the dragged arm; changes of the robot never do."""
         is_dragged = state.goal is not self._goal and self._stage.is_held
         if state.quality != "light" or not is_dragged or self._drawn != _traits(status):
             return False
@@ -187,7 +187,7 @@ class Renderer:
             panel.show(seen if panel is self._timeline else state, status)
 
     def _build(self, state: UiState) -> None:
-        """Makes the panels anew: another language or unit has other words, another arm other joints."""
+        """Creates the panels again: another language or unit changes texts, another arm its joints."""
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         if not self._tabs:
             self._lay_out(gui)
@@ -207,7 +207,7 @@ class Renderer:
         self._panels.append(self._timeline)
 
     def _lay_out(self, gui: Any) -> None:
-        """Makes the places that panels fill; they stay as people have arranged them."""
+        """Creates the containers of the panels; they stay as arranged by the operator."""
         group, window = gui.add_tab_group(), gui.add_panel()
         window.dock_left()
         window.set_width(_TIMELINE_WIDTH)
@@ -222,16 +222,16 @@ class Renderer:
             began, has_drawn = time.monotonic(), True
             try:
                 has_drawn = self.show()
-            except Exception as error:  # A panel that fails must not freeze the others for good.
+            except Exception as error:  # A panel that fails must not stop the others.
                 self.errors.report(error)
-            if has_drawn:  # A slow page must not starve others.
+            if has_drawn:  # A slow page must not delay others.
                 self._ending.wait(max(0.3 * _PERIOD, began + _PERIOD - time.monotonic()))
             else:
                 self._store.changed.wait(_PERIOD)
 
 
 def _traits(status: SupervisorStatus) -> tuple[object, ...]:
-    """Returns what of the robot side is shown at once when it changes; the rest counts up all the time."""
+    """Returns the values of the robot whose changes are shown at once; the others change all the time."""
     q, q_c = ((None if angles is None else angles.tobytes()) for angles in (status.q, status.q_c))
     return (
         status.phase, status.code, status.message, status.incident, status.address, status.robot_mode, status.faults,
@@ -240,5 +240,5 @@ def _traits(status: SupervisorStatus) -> tuple[object, ...]:
 
 
 def _looks(state: UiState) -> tuple[object, ...]:
-    """Returns what the panels are built for."""
+    """Returns the values that the panels are created for."""
     return state.language, state.units, state.model.name

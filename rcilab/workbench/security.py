@@ -1,6 +1,6 @@
-"""The front door of the workbench: which address it may be opened on, and what to say when that does not work.
+"""Before the workbench opens: the addresses it may listen on, and the errors if that is not possible.
 
-Who may come in through it is decided by `rcilab.views.access_control`.
+Access to the open page is controlled by `rcilab.views.access_control`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.workbench.access import is_local, require_token
 
 DEFAULT_PORT = 8080
-_FILES = 48  # Open ones: 22 with an idle arm, three more a page. A tuning value.
+_FILES = 48  # Open files: 22 with an idle arm, three more per page. A tuning value.
 
 
 def check_host(host: str, token: str | None) -> None:
-    """Raises UsageError when the address is open to others and no token guards it, or too short a one."""
+    """Raises UsageError if other machines can reach the address without a token, or with too short a one."""
     if token is not None:
         require_token(token, "WorkbenchConfig")
     elif not is_local(host):
@@ -31,11 +31,11 @@ def check_host(host: str, token: str | None) -> None:
 
 
 def require_openable(host: str, token: str | None, target: str, model: str) -> RobotModel:
-    """Returns the arm to open with; refuses what can be known to fail before anything is loaded that takes time.
+    """Returns the model to open with; reports errors that can be known before anything slow is loaded.
 
     Args:
         host: Address to listen on.
-        token: Secret that every page must bring.
+        token: Secret that every page must send.
         target: "virtual", or the address of a controller.
         model: Name of the arm.
 
@@ -53,7 +53,7 @@ def require_openable(host: str, token: str | None, target: str, model: str) -> R
 
 
 def _require_files() -> None:
-    """Takes as many open files as the page may need, or says that it may not."""
+    """Raises the limit of open files to what the page may need; an error if that is not possible."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != resource.RLIM_INFINITY and soft < _FILES:
         if hard != resource.RLIM_INFINITY and hard < _FILES:
@@ -64,7 +64,7 @@ def _require_files() -> None:
 def bind(host: str, port: int, token: str | None = None) -> socket.socket:
     """Returns a listening socket on exactly this port; port 0 takes any free one.
 
-    A name may resolve to another address than it did when it was checked: what counts is the address of the socket.
+    A name may resolve to another address than when it was checked: the address of the socket counts.
 
     Raises:
         UsageError: The port is taken, or the address is not ours or needs a token; the message says what to change.

@@ -1,4 +1,4 @@
-"""What panels are made of: controls that ask, and show the state without fighting the hand that moves them."""
+"""Controls of panels: they send requests, and follow the state without disturbing the operator's input."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from rcilab.i18n.units import Unit
 
 Ask: TypeAlias = Callable[[Request], None]
 
-HAND_AWAY = 0.6  # [s] A control touched less long ago is not written to.
-_TYPING_PAUSE = 0.7  # [s] A typed number counts when no key came for so long.
-_ANSWER = 0.2  # [s] What a typed number came to stands in the state after that.
-_STANDS = 3.0  # [s] So long a number that was taken stands as it was typed; to write is to disturb the hand.
-_ENTERED = 0.5  # [s] The same of a number that was entered: the hand is done with it.
+HAND_AWAY = 0.6  # [s] A control that was used within this time is not written to.
+_TYPING_PAUSE = 0.7  # [s] A typed number is taken after this time without a key.
+_ANSWER = 0.2  # [s] After this time the state contains the result of a typed number.
+_STANDS = 3.0  # [s] For this time an accepted number stays as typed, in order not to disturb the operator.
+_ENTERED = 0.5  # [s] The same for a number that was entered.
 _NOBODY: Mapping[int | None, float] = MappingProxyType({})
 
 
 def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> None:
-    """Asks for something when a button is pressed.
+    """Sends a request when a button is pressed.
 
-    Callbacks are async on purpose: viser then runs them on its event loop, in the order of the events. They only put
-    a value into a queue.
+    Callbacks are async on purpose: viser then runs them on its event loop, in the order of the events. They only put a
+    value into a queue.
     """
 
     @button.on_click
@@ -42,17 +42,17 @@ def on_press(button: Any, ask: Ask, make: Callable[[int | None], Request]) -> No
 
 
 def why_html(text: Text, why: Message | None) -> str:
-    """Returns why something is off, beside it; empty for None."""
+    """Returns why a control is disabled; empty for None."""
     return "" if why is None else f'<p class="rl-note rl-why">{esc(text.render(why))}</p>'
 
 
 class BoundControl:
-    """A slider, dropdown or checkbox that asks when a person moves it and follows the state otherwise.
+    """A slider, dropdown or checkbox that sends requests and otherwise follows the state.
 
     Args:
         handle: The viser control.
         ask: Takes requests.
-        make: Builds the request from the control's value and the page's client id.
+        make: Creates the request from the control's value and the page's client id.
     """
 
     def __init__(self, handle: Any, ask: Ask, make: Callable[[Any, int | None], Request | None]) -> None:
@@ -61,7 +61,7 @@ class BoundControl:
 
         @handle.on_update
         async def _(event: Any) -> None:
-            if event.client_id is None:  # We set it ourselves.
+            if event.client_id is None:  # Set by this process.
                 return
             self._touched = time.monotonic()
             request = make(event.target.value, event.client_id)
@@ -69,25 +69,25 @@ class BoundControl:
                 ask(request)
 
     def show(self, value: Any) -> None:
-        """Writes the state's value, unless a person is moving the control."""
+        """Writes the state's value, unless the control is in use."""
         before, self._seen = self._seen, self.handle.value
         if value != self._seen == before and time.monotonic() - self._touched > HAND_AWAY:
-            self.handle.value = self._seen = value  # What was not there before is a hand's, whose word is on its way.
+            self.handle.value = self._seen = value  # An unknown value is the operator's, whose request is on its way.
 
     def exchange(self, options: tuple[str, ...], value: str) -> None:
-        """Gives a dropdown other options and one of them as value; viser alone would show the first one meanwhile."""
+        """Gives a dropdown other options with one of them as value; viser alone would show the first one meanwhile."""
         self.handle.options = options
         self.handle.value = self._seen = value
 
 
 class NumberField:
-    """A text box for a number: a proposal while it is typed, asked for once it is entered or the typing has paused.
+    """A text box for a number: sent once it is entered or the typing has paused.
 
     Args:
         handle: From `gui.add_text`.
         ask: Takes requests.
-        field: Name of the field in `TypeField`. It may be exchanged; what was typed before is asked for at once.
-        unit: What the number is shown and typed in, from `Text.unit`; None for a number that has one unit only.
+        field: Name of the field in `TypeField`. It may be replaced; text typed before is sent at once.
+        unit: Unit in which the number is shown and typed, from `Text.unit`; None for a number with one unit only.
     """
 
     def __init__(self, handle: Any, ask: Ask, field: str, unit: Unit | None = None) -> None:
@@ -95,9 +95,9 @@ class NumberField:
         self._unit = unit or Unit("", 1.0)
         self._typed: tuple[float, str, int | None, str] | None = None
         self._committed, self._stands_for = float("-inf"), _STANDS
-        self._answer: str | None = None  # What the state made of it.
-        self._is_typed = False  # Whether what stands here is as it was typed.
-        self._shown: str | None = None  # The field that it was shown for last.
+        self._answer: str | None = None  # The state's number for it.
+        self._is_typed = False  # Whether the text is as it was typed.
+        self._shown: str | None = None  # The field that it was last shown for.
         self._problem: Message | None = None
         self._beside: str | None = None  # The state's number when the problem came; None: it came elsewhere.
 
@@ -107,16 +107,16 @@ class NumberField:
                 self._typed = (time.monotonic(), event.target.value, event.client_id, self.field)
 
     def disable(self, is_off: bool) -> None:
-        """Greys it, or makes it usable again."""
+        """Disables or enables it."""
         self._handle.disabled = is_off
 
     def show(self, text: str, problem: Message | None, entered: Mapping[int | None, float] = _NOBODY) -> None:
-        """Commits what was typed, or writes the state's number; called at the display's rate.
+        """Sends the typed text, or writes the state's number; called at the display's rate.
 
         Args:
-            text: The state's number as it is to be shown, in degrees or millimetres where it has a unit of the page.
-            problem: What is wrong with the typed number; it is then left as it is, until the state's number changes.
-            entered: When a page last said that what is typed in it is complete, `UiState.entered`.
+            text: The state's number as text, in degrees or millimetres if it has a unit of the page.
+            problem: The problem of the typed number; the text then stays, until the state's number changes.
+            entered: When a page last reported that its text is complete, `UiState.entered`.
         """
         typed = self._typed
         if typed is not None:
@@ -142,13 +142,13 @@ class NumberField:
             self._handle.value = said
 
     def _is_about(self, problem: Message, said: str) -> bool:
-        """Returns whether a problem came while the field showed this number, or what was typed in its place."""
+        """Returns whether a problem came while the field showed this number, or the text typed in its place."""
         if problem != self._problem:
             self._problem, self._beside = problem, said if self._shown == self.field else None
         return self._shown == self.field and said == self._beside
 
     def _stands(self, said: str) -> bool:
-        """Returns whether what was typed is left as it is: the answer is on its way, or has not changed since."""
+        """Returns whether the typed text stays: its answer is on its way, or has not changed since."""
         past = time.monotonic() - self._committed
         if past < _ANSWER:
             return True
@@ -158,7 +158,7 @@ class NumberField:
 
 
 class PageText:
-    """A text box whose words lead somewhere: they are those of the page that typed them, and gone with its controls.
+    """A text box whose text belongs to the page that typed it, as long as that page has the controls.
 
     Args:
         handle: From `gui.add_text`.
@@ -174,12 +174,12 @@ class PageText:
                 self._page = event.client_id
 
     def of(self, page: int | None) -> str:
-        """Returns what this page has typed, or what stands there of our own doing; "" when another page typed it."""
+        """Returns the text of this page, or the one set by this process; "" if another page typed it."""
         return self.handle.value if page is None or self._page in (None, page) else ""
 
-    def show(self, lease: ControlLock, text: str) -> bool:
-        """Writes the state's own words in place of those of a page without the controls; returns whether it did."""
-        is_over = self._page is not None and lease.holder not in (None, self._page)
+    def show(self, lock: ControlLock, text: str) -> bool:
+        """Replaces the text of a page without the controls by the state's own; returns whether it did."""
+        is_over = self._page is not None and lock.holder not in (None, self._page)
         if is_over:
             self._page, self.handle.value = None, text
         return is_over
@@ -200,7 +200,7 @@ class Html:
 
 
 def esc(text: object) -> str:
-    """Returns text that HTML shows as it is."""
+    """Returns text escaped for HTML."""
     return html.escape(str(text))
 
 
@@ -210,6 +210,6 @@ def shown(number: float) -> str:
 
 
 def shown_pose(pose: Pose) -> tuple[str, ...]:
-    """Returns x, y, z [mm] and roll, pitch, yaw [deg] for fields; a half turn is 180, whichever way rounding led."""
+    """Returns x, y, z [mm] and roll, pitch, yaw [deg] for fields; a half turn is 180, regardless of rounding."""
     turns = [shown(degrees) for degrees in np.degrees(pose.rpy)]
     return (*(shown(1000.0 * place) for place in pose.position), *("180.00" if t == "-180.00" else t for t in turns))

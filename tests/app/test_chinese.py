@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.text import Text
 from rcilab.conformance.check import check
 from rcilab.conformance.explain import explain_limit
@@ -190,7 +190,7 @@ def require_chinese(said: str) -> None:
 def test_what_goes_wrong_is_said_in_chinese(what):
     with pytest.raises(RcilabError) as caught:
         PROVOKED[what]()
-    told = tell_error(caught.value)
+    told = explain_error(caught.value)
     require_chinese(Text("zh", Units(angle="rad", length="m")).render(told))
     for language, stop in (("zh", "。"), ("en", ".")):
         for code in ("notice.refused", "ready.setup_refused", "ready.control_refused", "learn.failed", "notice.error"):
@@ -245,6 +245,6 @@ def test_exports_say_what_is_missing_in_chinese():
 
 
 def test_what_has_no_text_in_the_catalogues_keeps_its_english_sentence():
-    said = tell_error(CertificateError("x")), tell_error(RcilabError("joint 1 is at 0.35 rad"))
+    said = explain_error(CertificateError("x")), explain_error(RcilabError("joint 1 is at 0.35 rad"))
     assert Text("zh").render(said[0]).startswith("未执行")
     assert Text("zh").render(said[1]) == "joint 1 is at 0.35 rad。"

@@ -21,13 +21,13 @@ MODEL = load_model("xMatePro7")
 
 
 def test_the_first_page_gets_the_controls_and_they_are_free_when_it_goes():
-    lease = ControlLock().arrive(7).arrive(9)
-    assert lease.holder == 7
-    assert lease.allows(7)
-    assert not lease.allows(9)
-    assert lease.leave(7).holder is None
-    assert lease.leave(7).arrive(11).holder == 11  # Such as the same page, loaded anew.
-    assert lease.leave(7).leave(9).pages == ()
+    lock = ControlLock().arrive(7).arrive(9)
+    assert lock.holder == 7
+    assert lock.allows(7)
+    assert not lock.allows(9)
+    assert lock.leave(7).holder is None
+    assert lock.leave(7).arrive(11).holder == 11  # Such as the same page, loaded anew.
+    assert lock.leave(7).leave(9).pages == ()
 
 
 def test_the_holder_decides_and_free_controls_are_taken_at_once():
@@ -48,18 +48,18 @@ def test_our_own_doing_is_always_allowed():
 
 @given(st.lists(st.tuples(st.sampled_from(["arrive", "leave", "take", "ask", "yes", "silent"]), st.integers(0, 4))))
 def test_holder_and_asker_are_open_pages_and_never_the_same(events):
-    lease = ControlLock()
+    lock = ControlLock()
     for name, page in events:
         act = {
-            "ask": lambda lease, page: lease.ask(page, 0.0),
-            "yes": lambda lease, page: lease.answer(page, yes=True),
-            "silent": lambda lease, page: lease.fall_silent(0.0),
-        }.get(name, lambda lease, page, name=name: getattr(lease, name)(page))
-        lease = act(lease, page)
-        assert len(set(lease.pages)) == len(lease.pages)
-        assert lease.holder is None or lease.holder in lease.pages
-        assert lease.asking is None or (lease.asking in lease.pages and lease.holder not in (None, lease.asking))
-        assert lease.number(lease.holder) == (lease.pages.index(lease.holder) + 1 if lease.holder is not None else 0)
+            "ask": lambda lock, page: lock.ask(page, 0.0),
+            "yes": lambda lock, page: lock.answer(page, yes=True),
+            "silent": lambda lock, page: lock.fall_silent(0.0),
+        }.get(name, lambda lock, page, name=name: getattr(lock, name)(page))
+        lock = act(lock, page)
+        assert len(set(lock.pages)) == len(lock.pages)
+        assert lock.holder is None or lock.holder in lock.pages
+        assert lock.asking is None or (lock.asking in lock.pages and lock.holder not in (None, lock.asking))
+        assert lock.number(lock.holder) == (lock.pages.index(lock.holder) + 1 if lock.holder is not None else 0)
 
 
 class Robot:
@@ -85,8 +85,8 @@ class Desk:
         self.wait(0.1, 1, 2)
 
     @property
-    def lease(self) -> ControlLock:
-        return self.store.state.lease
+    def lock(self) -> ControlLock:
+        return self.store.state.control_lock
 
     def wait(self, seconds: float, *answering: int) -> None:
         """Lets time pass in which only these pages answer."""
@@ -94,7 +94,7 @@ class Desk:
         while self.time < end:
             self.time += 0.1
             for page in answering:
-                self.presence.heard(page)
+                self.presence.mark_seen(page)
             self.actions.tick()
 
     @property
@@ -109,48 +109,48 @@ def desk() -> Desk:
 
 def test_a_frozen_tab_loses_the_controls_and_gets_them_back_unless_somebody_took_them(desk):
     desk.wait(OPERATOR_TIMEOUT + 0.2, 2)
-    assert desk.lease.holder is None
-    assert desk.told == "lease.silent"
+    assert desk.lock.holder is None
+    assert desk.told == "control_lock.silent"
     desk.wait(0.3, 1, 2)
-    assert desk.lease.holder == 1
+    assert desk.lock.holder == 1
     desk.wait(OPERATOR_TIMEOUT + 0.2, 2)
     desk.actions.take_controls(TakeControls(page=2))
     desk.wait(0.3, 1, 2)
-    assert desk.lease.holder == 2
+    assert desk.lock.holder == 2
 
 
 def test_a_question_without_an_answer_is_a_yes_but_not_while_the_arm_moves(desk):
     desk.robot.phase = "moving"
     desk.actions.take_controls(TakeControls(page=2))
-    assert desk.told == "lease.asked"
+    assert desk.told == "control_lock.asked"
     desk.wait(PATIENCE + 1.0, 1, 2)
-    assert desk.lease.holder == 1
+    assert desk.lock.holder == 1
     desk.robot.phase = "idle"
     desk.wait(0.2, 1, 2)
-    assert desk.lease.holder == 2
-    assert desk.told == "lease.unanswered"
+    assert desk.lock.holder == 2
+    assert desk.told == "control_lock.unanswered"
 
 
 def test_who_is_told_no_may_ask_again(desk):
     desk.actions.take_controls(TakeControls(page=2))
     desk.actions.answer(AnswerControls(page=2, yes=True))
-    assert desk.lease.holder == 1
+    assert desk.lock.holder == 1
     desk.actions.answer(AnswerControls(page=1, yes=False))
-    assert desk.told == "lease.kept"
-    assert desk.lease.asking is None
+    assert desk.told == "control_lock.kept"
+    assert desk.lock.asking is None
     desk.actions.take_controls(TakeControls(page=2))
     desk.actions.answer(AnswerControls(page=1, yes=True))
-    assert desk.lease.holder == 2
+    assert desk.lock.holder == 2
 
 
 def test_the_only_page_left_gets_the_controls_once_the_arm_stands(desk):
     desk.robot.phase = "moving"
     desk.actions.page_went(PageClosed(page=1))
     desk.wait(OPERATOR_TIMEOUT + 1.0, 2)
-    assert desk.lease.holder is None
+    assert desk.lock.holder is None
     desk.robot.phase = "idle"
     desk.wait(0.2, 2)
-    assert desk.lease.holder == 2
+    assert desk.lock.holder == 2
 
 
 def test_a_page_that_still_loads_is_waited_for(desk):
@@ -158,7 +158,7 @@ def test_a_page_that_still_loads_is_waited_for(desk):
     desk.actions.page_went(PageClosed(page=2))
     desk.actions.page_came(PageOpened(page=3))
     desk.wait(10.0)
-    assert desk.lease.holder == 3
+    assert desk.lock.holder == 3
 
 
 def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):

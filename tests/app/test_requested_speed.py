@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rcilab.app.run.requested_speed import RequestedSpeed, tell_override_refusal
+from rcilab.app.run.requested_speed import RequestedSpeed, describe_override_refusal
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import ConnectionLostError, PlanningError
 
@@ -55,7 +55,7 @@ def test_nothing_is_asked_of_an_arm_that_no_motion_moves(status: SupervisorStatu
 
 def test_a_refusal_says_what_cannot_be_and_nothing_once_the_motion_is_over() -> None:
     def code(error: PlanningError | ConnectionLostError, speed_override: float, status: SupervisorStatus) -> str | None:
-        told = tell_override_refusal(error, speed_override, status)
+        told = describe_override_refusal(error, speed_override, status)
         return None if told is None else told.code
 
     assert code(PlanningError("no"), 0.0, MOVING) == "pace.no_pause"

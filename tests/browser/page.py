@@ -79,7 +79,7 @@ class BenchPage:
                 break
         self.wait(lambda: self.state.language == "en", "the page's own language")
         self.wait(lambda: self.status.phase == "idle", "an idle arm")
-        self.wait(lambda: self.state.lease.holder is not None, "the controls in this page's hand")
+        self.wait(lambda: self.state.control_lock.holder is not None, "the controls in this page's hand")
         if not self.rows().is_visible():
             self.open_tab("Jog")
         self.wait(lambda: self.alerts() == [], "no complaint of an earlier test")

@@ -17,25 +17,25 @@ pytestmark = pytest.mark.browser
 
 def test_a_page_that_is_held_up_by_drawing_keeps_the_controls(page) -> None:
     store = page.bench.store
-    wait_for(lambda: store.state.lease.holder is not None, what="a holder", timeout=20.0, tab=page.tab)
-    holder = store.state.lease.holder
+    wait_for(lambda: store.state.control_lock.holder is not None, what="a holder", timeout=20.0, tab=page.tab)
+    holder = store.state.control_lock.holder
     page.tab.evaluate("setTimeout(() => { const end = Date.now() + 3500; while (Date.now() < end); }, 0)")
     end, holders = time.monotonic() + 3.0, set()
     while time.monotonic() < end:  # Without a word to the page: it could not answer.
-        holders.add(store.state.lease.holder)
+        holders.add(store.state.control_lock.holder)
         time.sleep(0.05)
     assert holders == {holder}
 
 
 def test_a_page_that_is_closed_is_gone_at_once(chromium, page) -> None:
     store = page.bench.store
-    before = store.state.lease.pages
+    before = store.state.control_lock.pages
     context = chromium.new_context(viewport={"width": 400, "height": 300})
     tab = context.new_page()
     tab.goto(f"{page.bench.url}?fixedDpr=0.2")
-    wait_for(lambda: len(store.state.lease.pages) == len(before) + 1, what="another page", timeout=30.0, tab=tab)
+    wait_for(lambda: len(store.state.control_lock.pages) == len(before) + 1, what="another page", timeout=30.0, tab=tab)
     tab.close()
-    wait_for(lambda: store.state.lease.pages == before, what="the page to be gone", timeout=2.0 + 3.0)
+    wait_for(lambda: store.state.control_lock.pages == before, what="the page to be gone", timeout=2.0 + 3.0)
     context.close()
 
 
@@ -51,7 +51,7 @@ def test_a_moving_arm_stops_when_the_page_that_holds_the_controls_is_gone(chromi
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             page.wait_until_drawn()
             page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
-            page.wait(lambda: page.state.lease.holder is not None, "a holder", 20.0)
+            page.wait(lambda: page.state.control_lock.holder is not None, "a holder", 20.0)
             bench.dispatcher.ask(SetSpeed(speed=0.01))
             page.plan_to(1, 50.0)
             bench.dispatcher.ask(RobotCommand(what="execute"))

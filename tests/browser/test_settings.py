@@ -80,7 +80,7 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     other.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
     other.wait_until_drawn()
     close_toasts(other.tab)
-    page.wait(lambda: len(page.state.lease.pages) == 2, "two pages")
+    page.wait(lambda: len(page.state.control_lock.pages) == 2, "two pages")
     before = np.array(page.state.goal.q)
     other.type_joint(1, "33")
     other.wait(lambda: "holds the controls" in other.toast(), "to be told that it only watches")
@@ -107,7 +107,10 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     other.wait(lambda: other.tab.evaluate(seen) is True, "handles for the page that has the controls now")
     page.wait(lambda: page.tab.evaluate(seen) is False, "none for the first page")
     context.close()
-    page.wait(lambda: page.state.lease.pages == (page.state.lease.holder,), "the controls back with the first page")
+    page.wait(
+        lambda: page.state.control_lock.pages == (page.state.control_lock.holder,),
+        "the controls back with the first page",
+    )
     page.wait(lambda: page.tab.evaluate(seen) is True, "the handles back")
 
 

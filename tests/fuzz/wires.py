@@ -121,7 +121,7 @@ def open_page(bench: Workbench, *, reads: bool = True) -> Iterator[ClientConnect
         link.send(camera)
         wait(lambda: set(bench.server.get_clients()) != before, "the page")
         (page,) = set(bench.server.get_clients()) - before
-        wait(lambda: page in bench.store.state.lease.pages, "the page to be listed")
+        wait(lambda: page in bench.store.state.control_lock.pages, "the page to be listed")
         bar.send(json.dumps({"kind": "hello", "page": page, "key": bench.live.introduce(page)}))
 
         def answer() -> None:
@@ -145,8 +145,8 @@ def fuzz_page(count: int, seed: int) -> None:
             additional_headers={"Origin": f"http://127.0.0.1:{bench.port}"},
         )
         link.send(corpus[-2])  # Its camera: from then on it is a page.
-        wait(lambda: bench.store.state.lease.holder is not None, "the controls")
-        page = bench.store.state.lease.holder
+        wait(lambda: bench.store.state.control_lock.holder is not None, "the controls")
+        page = bench.store.state.control_lock.holder
         assert page is not None
         words = _words(page, bench.live.introduce(page))
         for number, message in enumerate(spoilt(corpus, count, seed)):

@@ -1,4 +1,4 @@
-"""FaultPanel: a fault of the gallery beside the notebook's own robot, which it never touches."""
+"""FaultPanel: a fault of the fault lab beside the notebook's own robot, which it never touches."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ def text_of(widget: Any) -> str:
     return html.unescape(re.sub(r"<[^>]*>", "", widget.value))
 
 
-def require_at_moment(exhibit: FaultDemo, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
+def require_at_moment(demo: FaultDemo, scene: Scene, timeline: Timeline, plot: MotionPlot) -> None:
     picture = scene._picture
     assert picture is not None
-    assert timeline.moment == pytest.approx(exhibit.time)
-    assert timeline.slider.value == round(1000.0 * exhibit.time)
-    np.testing.assert_allclose(picture._arm._shown, exhibit.moved.at(exhibit.time).q)
+    assert timeline.moment == pytest.approx(demo.time)
+    assert timeline.slider.value == round(1000.0 * demo.time)
+    np.testing.assert_allclose(picture._arm._shown, demo.moved.at(demo.time).q)
     assert 'class="rl-violation"' in plot.html
     assert "left:" in plot._cursor.value
     assert scene.state.now.plan is None  # It is never one to execute.
@@ -54,15 +54,15 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             panel.provoke.click()
             assert panel.provoke.disabled
             assert panel.cancel.layout.display is None
-            wait_for(lambda: panel.exhibit is not None and not panel.provoke.disabled, 30.0, "the exhibit")
-            assert panel.exhibit is not None
+            wait_for(lambda: panel.demo is not None and not panel.provoke.disabled, 30.0, "the demo")
+            assert panel.demo is not None
             said = text_of(panel._shown_text)
             assert "kCommandJointAccelerationDiscontinuity" in said
             assert f"{math.degrees(5000.0):.0f}°/s³" in said  # Five thousand rad/s^3, in the degrees of every widget.
             for part in (
-                panel.exhibit.describe("explanation", "zh"),
-                *panel.exhibit.tell_way_out("zh"),
-                panel.exhibit.script,
+                panel.demo.describe("explanation", "zh"),
+                *panel.demo.recovery_steps("zh"),
+                panel.demo.script,
             ):
                 assert part in said
             assert "<circle" in panel._shown_text.value
@@ -70,10 +70,10 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
             with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:
-                require_at_moment(panel.exhibit, scene, timeline, plot)
+                require_at_moment(panel.demo, scene, timeline, plot)
                 timeline.slider.value = 0
                 panel.moment.click()
-                require_at_moment(panel.exhibit, scene, timeline, plot)
+                require_at_moment(panel.demo, scene, timeline, plot)
                 timeline.live.click()
                 assert timeline.moment is None
                 assert plot.html.count("<svg") == 0
@@ -98,7 +98,7 @@ def test_who_cancels_or_closes_sees_nothing_and_leaves_nothing_behind() -> None:
         panel.provoke.click()
         panel.cancel.click()
         wait_for(lambda: not panel.provoke.disabled, 10.0, "the button again")
-        assert panel.exhibit is None
+        assert panel.demo is None
         panel.provoke.click()
     wait_for(lambda: threading.active_count() == threads, 10.0, "the end of the threads")
     assert processes() == own

@@ -103,7 +103,7 @@ class Kernel:
         control.send(self.client.session.msg("create_subshell_request", {}))
         return control.get_msg(timeout=20)["content"]["subshell_id"]
 
-    def tell(self, comm: str, subshell: str | None, **data: Any) -> None:
+    def notify(self, comm: str, subshell: str | None, **data: Any) -> None:
         """Says what a widget in the page would, the way JupyterLab sends it; without a subshell that of VS Code."""
         message = self.client.session.msg("comm_msg", {"comm_id": comm, "data": data})
         message["header"]["subshell_id"] = subshell
@@ -118,7 +118,7 @@ class Kernel:
                 content = message["content"]
                 assert message["msg_type"] != "execute_result", f"the cell has ended: {content}"
                 if message["msg_type"] == "comm_msg" and content["comm_id"] == question:
-                    self.tell(answer, subshell, method="update", state=content["data"]["state"], buffer_paths=[])
+                    self.notify(answer, subshell, method="update", state=content["data"]["state"], buffer_paths=[])
 
     def value_of(self, message: str) -> Any:
         value: Any = None
@@ -210,7 +210,7 @@ def test_an_interrupt_stops_the_arm_while_a_cell_awaits_or_a_widget_is_served(ke
         f"from ipywidgets import Button; slow = Button(); "
         f"slow.on_click(lambda _: (open({str(begun)!r}, 'w').close(), time.sleep(60))); slow.comm.comm_id"
     )
-    kernel.tell(slow, None, **CLICK)
+    kernel.notify(slow, None, **CLICK)
     wait_for(begun.exists, what="the button to be served")
     kernel.manager.interrupt_kernel()
     assert kernel.run(STANDS) == ("idle", True)
@@ -229,7 +229,7 @@ def test_stop_is_heard_while_the_cell_that_moves_the_arm_runs(kernel: Kernel, na
     stop = kernel.run(MAKE + SESSION)
     moving = kernel.client.execute("robot.execute(motion).stopped")
     time.sleep(0.5)  # Soon or late, a press counts from the start of the call on.
-    kernel.tell(stop, subshell, **CLICK)
+    kernel.notify(stop, subshell, **CLICK)
     assert kernel.value_of(moving) == "on request"
     kernel.run("beside.close(); robot.close()")
 
@@ -245,7 +245,7 @@ def test_a_page_that_falls_silent_stops_what_a_cell_moves_and_one_that_nobody_he
     moving = kernel.client.execute("robot.execute(motion).stopped")
     time.sleep(1.2)  # Nobody has ever answered, so nobody is missed.
     kernel.answer(question, answer, subshell, 1.0)
-    kernel.tell(slow, subshell, **CLICK)  # Now who hears answers is busy, for twice as long as silence may last.
+    kernel.notify(slow, subshell, **CLICK)  # Now who hears answers is busy, for twice as long as silence may last.
     time.sleep(1.6)
     kernel.answer(question, answer, subshell, 1.0)
     assert kernel.value_of(moving) == "the notebook's page is gone"

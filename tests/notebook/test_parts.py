@@ -46,8 +46,8 @@ def fresh(lab: Lab) -> Lab:
     with lab.state.lock:
         lab.state._rest = PRO7.home
         lab.state.store.update(plan=None, no_plan=None, recording=None)
-        lab.state.moment, lab.state.exhibition = None, None
-        lab.state.tell("plan", "moment", "goal")
+        lab.state.moment, lab.state.displayed = None, None
+        lab.state.notify("plan", "moment", "goal")
     lab.jog.q = PRO7.home
     return lab
 

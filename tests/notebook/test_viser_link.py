@@ -58,7 +58,7 @@ def test_a_page_is_sent_what_hides_visers_notice_of_software_rendering(monkeypat
     sent: list[str] = []
     monkeypatch.setattr("rcilab.notebook.viser_link.run_javascript", lambda client, source: sent.append(source))
     with serve_preview(MOTION, PRO7) as page:
-        for act in page._door.viser._client_connect_cb:  # viser calls them once a page has drawn.
+        for act in page._guarded_server.viser._client_connect_cb:  # viser calls them once a page has drawn.
             act(MagicMock())
     assert any("#webgl-software-rendering { display: none }" in source for source in sent)
 

@@ -50,6 +50,9 @@ def test_an_arm_that_yields_says_how_far_from_its_goal_it_ended():
     assert run.goal_error is not None
     assert np.allclose(run.goal_error, OFFSET * np.eye(7)[1], atol=1e-6)
     assert "ended 0.001 rad (0.057 deg) from its goal at joint 2" in repr(run)
+    said = "Ran to its end, 0.06° from its goal at joint 2."
+    assert said in run_html(run)
+    run = replace(run, setup=replace(SETUP, mode="joint_impedance"))
     said = "Ran to its end, 0.06° from its goal at joint 2: the arm yields in a compliant mode."
     status = SupervisorStatus(phase="closed", code="closed")
     assert said in run_html(run)

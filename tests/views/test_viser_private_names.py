@@ -81,7 +81,7 @@ def test_only_benchmarks_and_the_script_for_labels_use_the_hooks_of_the_page() -
     assert {user for user in users if not user.startswith("diagnostics/bench/")} == {"workbench/assets/labels.js"}
 
 
-@pytest.mark.parametrize("script", ["folds", "labels", "marks", "names", "retell"])
+@pytest.mark.parametrize("script", ["folds", "labels", "marks", "names", "resend"])
 def test_a_script_that_works_around_viser_says_what_would_make_it_unnecessary(script: str) -> None:
     head = (PACKAGE / "workbench" / "assets" / f"{script}.js").read_text(encoding="utf-8").partition("(() => {")[0]
     assert "// Unnecessary once viser " in head

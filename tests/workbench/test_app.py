@@ -218,7 +218,7 @@ def test_the_arm_angle_turns_the_elbow_and_keeps_the_tool(bench, ask):
 
 def is_refused(bench) -> bool:
     """Whether a page is still told that it has not got the controls."""
-    return any(notice.trouble == "lease" for notice in bench.store.state.notices)
+    return any(notice.trouble == "control_lock" for notice in bench.store.state.notices)
 
 
 def test_a_watching_page_may_look_but_not_touch(bench, ask):
@@ -237,7 +237,7 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     ask(PageClosed(page=1))
     wait(lambda: not is_refused(bench), "what is no longer so to be withdrawn")
     ask(MoveJoint(page=2, joint=0, angle=0.2))
-    assert told(bench) == "lease.free"
+    assert told(bench) == "control_lock.free"
     ask(PageClosed(page=2))
     ask(PageOpened(page=1))
     wait(lambda: not is_refused(bench), "that to be withdrawn, too: now a page has the controls")
@@ -245,14 +245,14 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     ask(MoveJoint(page=1, joint=0, angle=0.1))
     assert bench.store.state.goal.q[0] == pytest.approx(0.1)
     ask(TakeControls(page=2))
-    assert (bench.store.state.lease.holder, bench.store.state.lease.asking) == (1, 2)
+    assert (bench.store.state.control_lock.holder, bench.store.state.control_lock.asking) == (1, 2)
     ask(AnswerControls(page=2, yes=True))
-    assert bench.store.state.lease.holder == 1
+    assert bench.store.state.control_lock.holder == 1
     ask(AnswerControls(page=1, yes=True))
-    assert bench.store.state.lease.holder == 2
+    assert bench.store.state.control_lock.holder == 2
     for page in (1, 2):
         ask(PageClosed(page=page))
-    assert bench.store.state.lease.holder is None
+    assert bench.store.state.control_lock.holder is None
 
 
 def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask):

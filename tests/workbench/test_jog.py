@@ -80,7 +80,7 @@ class FakeSession:
 @pytest.fixture
 def store() -> Store:
     store = Store(UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home)))
-    store.update(lease=ControlLock((1, 2), 1))
+    store.update(control_lock=ControlLock((1, 2), 1))
     return store
 
 
@@ -218,10 +218,10 @@ def test_silence_ends_it(jog, robot, monkeypatch):
     assert robot.held is None
 
 
-@pytest.mark.parametrize("lease", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
-def test_who_loses_the_controls_or_goes_away_lets_go_and_the_switch_is_off_again(jog, store, robot, lease):
+@pytest.mark.parametrize("lock", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
+def test_who_loses_the_controls_or_goes_away_lets_go_and_the_switch_is_off_again(jog, store, robot, lock):
     hold(jog)
-    store.update(lease=lease)
+    store.update(control_lock=lock)
     jog.tick(0.03)
     assert robot.held is None
     assert not store.state.jog.robot

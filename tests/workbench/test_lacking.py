@@ -11,7 +11,7 @@ from unittest.mock import MagicMock
 import ipywidgets
 import pytest
 
-from rcilab.app.arm_features import tell_lack, tell_lack_of_part
+from rcilab.app.arm_features import explain_lack, explain_lack_of_part
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.request import TypeField
 from rcilab.app.setup.configuration_state import pending_parts
@@ -74,7 +74,7 @@ def test_the_parts_that_are_lacking_are_off_on_the_setup_tab_and_the_others_are_
     for part, is_off in {"box": True, "force": True, "tool": False, "load": False}.items():
         assert {disabled(field._handle) for field in panel._fields[part]} == {is_off}
         assert disabled(panel._seen[part].handle) is is_off
-        lack = tell_lack_of_part(MODEL, part)
+        lack = explain_lack_of_part(MODEL, part)
         assert panel._lacks[part]._shown == (
             "" if lack is None else f'<p class="rl-note rl-why">{text.render(lack)}</p>'
         )
@@ -104,7 +104,7 @@ def test_soft_limits_mode_parameters_and_signals_are_off_one_by_one(lacking, sto
     assert all(disabled(control) for control in (*signals._buttons, signals._output, signals._reboot))
     shown = [limits._lack, mode._lack, signals._lack, signals._reboot_lack]
     for html, feature in zip(shown, ("joints", "control", "signals", "reboot"), strict=True):
-        lack = tell_lack(MODEL, feature)  # type: ignore[arg-type]
+        lack = explain_lack(MODEL, feature)  # type: ignore[arg-type]
         assert lack is not None
         assert text.render(lack) in html._shown
 
@@ -133,7 +133,7 @@ def test_a_part_that_is_lacking_cannot_be_edited_restored_or_sent(lacking, store
     actions.restore(RobotConfiguration(box=before.box, tool=MODEL.T_flange_tool))
     setup = store.state.setup
     assert setup.touched == {"tool"}
-    assert setup.seen == frozenset()
+    assert setup.seen == {"tool"}
     assert (setup.wanted.box, setup.wanted.force) == (before.box, before.force)
     assert pending_parts(store.state, READY) == ("tool",)
     with pytest.raises(ModelError, match="xMate3 has no soft joint limits"):
@@ -143,7 +143,7 @@ def test_a_part_that_is_lacking_cannot_be_edited_restored_or_sent(lacking, store
 def test_an_arm_that_is_only_planned_for_keeps_its_setup(store) -> None:
     panda = load_model("Panda")
     for part in ("box", "tool", "load", "joints"):
-        assert tell_lack_of_part(panda, part) is None
+        assert explain_lack_of_part(panda, part) is None
 
 
 def test_in_the_notebook_signals_restart_and_soft_limits_are_off(lacking) -> None:

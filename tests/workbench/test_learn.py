@@ -13,7 +13,7 @@ from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import ChooseBranch, GoalActions, SetArmAngle
 from rcilab.app.learn.learn_actions import LearnActions, PressLearn
-from rcilab.app.learn.learn_state import exhibited
+from rcilab.app.learn.learn_state import displayed_state
 from rcilab.app.learn.lessons import LESSONS, lessons_of
 from rcilab.app.run.recording import Recording
 from rcilab.app.store import Store, UiState
@@ -77,47 +77,47 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
     show = bench.state.learn.show
     assert show is not None
-    assert show.exhibit.fault is Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
+    assert show.demo.fault is Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
     assert bench.state.plan is own
-    seen = exhibited(bench.state, scene=True)
-    assert seen.plan is show.exhibition.scene
-    assert [row.id for row in show.exhibition.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
+    seen = displayed_state(bench.state, scene=True)
+    assert seen.plan is show.displayed.scene
+    assert [row.id for row in show.displayed.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
     assert (
         np.abs(
-            seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.exhibit.moved.q[show.exhibit.sample]
+            seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.demo.moved.q[show.demo.sample]
         ).max()
         < 1e-3
     )
     for language in LANGUAGES:
         for units, bound in ((Units(angle="rad", length="m"), "5000 rad/s³"), (Units(), "286479°/s³")):
             text = Text(language, units)
-            said = head_html(show.exhibit, text) + body_html(show.exhibit, text)
+            said = head_html(show.demo, text) + body_html(show.demo, text)
             assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
             assert bound in said
             assert not re.search(r"\d ?(?:rad|m/)" if units.angle == "deg" else r"\d ?(?:°|mm)", said), said
     bench.goal.pose(HOME - 0.1)
     bench.learn.tick()
     assert bench.state.learn.show is None, "another plan is to be seen"
-    assert exhibited(bench.state) is bench.state
+    assert displayed_state(bench.state) is bench.state
 
 
 def test_the_controlled_stop_after_the_fault_is_shown_too_and_its_moment_marked(bench: Bench) -> None:
     bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
     show = bench.state.learn.show
     assert show is not None
-    exhibit, recording = show.exhibit, show.recording
-    assert recording.moment == exhibit.time == exhibit.cycles["t"][-1]
-    assert 0.1 < recording.t[-1] - exhibit.time <= 0.3
+    demo, recording = show.demo, show.recording
+    assert recording.moment == demo.time == demo.cycles["t"][-1]
+    assert 0.1 < recording.t[-1] - demo.time <= 0.3
     assert np.abs(recording.dq[-1]).max() < 1e-3, "it stands still"
     assert 0.0 < bench.state.place == show.place < 1.0
     assert (
-        show.exhibition.scene.motion.duration
-        == show.exhibition.plan.motion.duration
+        show.displayed.scene.motion.duration
+        == show.displayed.plan.motion.duration
         == pytest.approx(recording.t[-1], abs=2e-3)
     )
-    frame = build_frame(plan_curves(show.exhibition.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
-    marked = mark_moment(frame, exhibit.time)
-    assert np.abs(marked.t[marked.violated & ~frame.violated] - exhibit.time).min() < 0.02
+    frame = build_frame(plan_curves(show.displayed.plan.motion, "q"), None, MODEL.limits.joint, "q", 0)
+    marked = mark_moment(frame, demo.time)
+    assert np.abs(marked.t[marked.violated & ~frame.violated] - demo.time).min() < 0.02
 
 
 def test_who_cancels_sees_nothing(bench: Bench) -> None:

@@ -18,7 +18,7 @@ from rcilab.app.goal.goal_actions import GoalActions, MoveJoint, MoveTarget, Pos
 from rcilab.app.program import program_actions, program_planning
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, LoadProgram, PlanProgram, ProgramActions
-from rcilab.app.program.program_draft import draft_of, number_at, tell_place, time_at
+from rcilab.app.program.program_draft import describe_place, draft_of, number_at, time_at
 from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
@@ -199,7 +199,7 @@ def test_the_plan_of_a_program_is_the_pages_plan_with_a_certificate_and_names_it
     plan.report.certificate.verify(plan.motion, MODEL, HOME)
     assert square.program.answer is None
     assert [number_at(plan, t) for t in (0.0, time_at(plan, 1) + 1e-6, plan.motion.duration)] == [1, 2, 3]
-    said = Text("en").render(tell_place(plan, plan.motion.duration))
+    said = Text("en").render(describe_place(plan, plan.motion.duration))
     assert said == "to waypoint 3 of 3, MoveL"
     second = square.program.draft.steps[1].key
     square.edit("select", key=second)
@@ -217,7 +217,7 @@ def test_an_arm_that_is_elsewhere_is_led_to_the_start_first_and_told_so(square):
     plan = square.state.plan
     assert np.array_equal(plan.motion.start, HOME + 0.2)
     assert square.program.answer.code == "program.approach"
-    assert tell_place(plan, 0.0).code == "program.at_start"
+    assert describe_place(plan, 0.0).code == "program.at_start"
     first = round(plan.motion.segment_starts[1] * 1000)
     assert np.allclose(plan.motion.q[first : first + len(alone)], alone.q, atol=1e-9)
     starts = plan.motion.segment_starts

@@ -67,7 +67,7 @@ class FakeSession:
 @pytest.fixture
 def store():
     store = Store(UiState(model=MODEL, plant="mujoco", goal=goal_at(MODEL, MODEL.home)))
-    store.update(lease=ControlLock((1, 2), 1))
+    store.update(control_lock=ControlLock((1, 2), 1))
     return store
 
 
@@ -143,13 +143,13 @@ def test_a_spring_pulls_no_harder_than_a_hand():
     assert np.linalg.norm(spring_force(np.zeros(3), np.array([3.0, 4.0, 0.0]))) == pytest.approx(STRONGEST)
 
 
-@pytest.mark.parametrize("lease", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
-def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lease):
+@pytest.mark.parametrize("lock", [ControlLock((1, 2), 2), ControlLock((2,), 2), ControlLock()])
+def test_who_loses_the_controls_or_goes_away_lets_go(actions, store, lock):
     grab(actions, 3)
     actions.hold(HoldPush(page=1))
     tick(actions)
     assert held(actions) is not None
-    store.update(lease=lease)
+    store.update(control_lock=lock)
     tick(actions)
     assert held(actions) is None
 

@@ -32,7 +32,7 @@ from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html
 from rcilab.workbench.panels.timeline import TimelinePanel
-from tests.recording.runs import PLAN, export_run, some_run
+from tests.recording.runs import PLAN, export_run, some_ideal_run, some_run
 from tests.workbench.opened import told, wait
 
 
@@ -103,7 +103,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
         execute(bench, 0.1)
     run = finished(bench).run
     bench.dispatcher.ask(PageOpened(page=7))
-    wait(lambda: bench.store.state.lease.holder == 7, "the controls")
+    wait(lambda: bench.store.state.control_lock.holder == 7, "the controls")
     sent = []
     actions = bench.dispatcher._export
 
@@ -149,7 +149,7 @@ def test_exports_reach_the_page_that_asked_and_problems_are_told(bench, monkeypa
 
 
 def test_what_became_of_a_run_is_said_of_the_robot_that_made_it():
-    run = replace(some_run(), setup=Setup(target="virtual", plant="ideal"))
+    run = replace(some_ideal_run(), setup=Setup(target="virtual", plant="ideal"))
     made = UiState(model=run.model, goal=goal_at(run.model, run.model.home), last_run=whole_recording(run))
     idle, text = SimpleNamespace(phase="idle"), Text("en")
     assert "Last run: <b>Ran to its end" in outcome_html(made, idle, text)
@@ -188,7 +188,7 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
         assert (status.phase, status.worker_pid) == ("closed", None)
         banner = replay_html(bench.store.state, status, Text("en"))
         assert "Recorded run:</b> xMatePro7" in banner
-        assert "Ran to its end." in banner
+        assert "Ran to its end, 0.06° from its goal at joint 2." in banner
         assert replay_html(bench.store.state, SimpleNamespace(phase="idle"), Text("en")) == ""
         assert obstacle(bench.store.state, status).code == "ready.closed"
         opened = []

@@ -12,7 +12,14 @@ from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import RunActions
-from rcilab.app.status_text import StartingError, phase_code, tell_error, tell_incident, tell_status, tell_success
+from rcilab.app.status_text import (
+    StartingError,
+    describe_incident,
+    describe_status,
+    describe_success,
+    explain_error,
+    phase_code,
+)
 from rcilab.app.store import Store
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
@@ -54,7 +61,7 @@ def address_error() -> RcilabError:
 def test_errors_say_what_to_press_and_name_no_call(error):
     for target in ("virtual", "rci://192.168.0.160:1337"):
         where = status(phase="lost", code="lost.silent", target=target)
-        english, chinese = (Text(language).render(tell_error(error, where)) for language in ("en", "zh"))
+        english, chinese = (Text(language).render(explain_error(error, where)) for language in ("en", "zh"))
         assert not any(call in english for call in CALLS)
         assert str(error) not in chinese
         assert ("cable" in english) == (target != "virtual" and isinstance(error, ConnectionLostError))
@@ -62,7 +69,7 @@ def test_errors_say_what_to_press_and_name_no_call(error):
 
 def test_an_emergency_stop_in_mid_motion_is_named_and_no_error_bit():
     error = ControlError("power_on()", [Fault.INSTABILITY_DETECTION]).coded("safety_stop", status="estop")
-    said = Text("en").render(tell_error(error, status()))
+    said = Text("en").render(explain_error(error, status()))
     assert "an emergency stop is pressed: release it first" in said
     assert "Instability" not in said
 
@@ -70,7 +77,7 @@ def test_an_emergency_stop_in_mid_motion_is_named_and_no_error_bit():
 @pytest.mark.parametrize("code", [code for code in MESSAGES if code.startswith(("crashed", "lost", "fault"))])
 def test_states_and_incidents_are_told_from_the_catalogues(code):
     where = status(phase=code.partition(".")[0], code=code, message=MESSAGES[code], target="rci://192.168.0.160:1337")
-    for said in (tell_status(where), tell_incident(code, MESSAGES[code], where)):
+    for said in (describe_status(where), describe_incident(code, MESSAGES[code], where)):
         for language in ("en", "zh"):
             sentence = Text(language).render(said)
             assert MESSAGES[code] not in sentence
@@ -101,7 +108,7 @@ def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
     gone = status(
         incident=Incident(number=1, code="crashed.controller", message=""), phase="connecting", code="connecting"
     )
-    said = tell_error(ConnectionLostError("look whether the cable is in"), gone)
+    said = explain_error(ConnectionLostError("look whether the cable is in"), gone)
     assert said.code == "incident.crashed.controller"
 
 
@@ -115,7 +122,7 @@ def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
 )
 def test_what_to_do_about_a_process_that_died_can_be_done(phase, is_restarted, english):
     incident = Incident(number=1, code="crashed.controller", message="", is_restarted=is_restarted)
-    said = tell_incident(incident.code, incident.message, status(phase=phase, code=phase, incident=incident))
+    said = describe_incident(incident.code, incident.message, status(phase=phase, code=phase, incident=incident))
     assert english in Text("en").render(said)
 
 
@@ -202,7 +209,7 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
         assert chips["success"] == bar
         assert f"<td>{table}" in health_html(state, now, Text("en"))
     rested = status(success_rate=1.0)
-    assert Text("en").render(tell_success(rested)) == "—", "no motion yet"
+    assert Text("en").render(describe_success(rested)) == "—", "no motion yet"
 
 
 def initial_state():

@@ -11,7 +11,7 @@ from rcilab.app.goal.goal import goal_at
 from rcilab.app.run.plan_readiness import arm_obstacle
 from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.run.run_recorder import whole_recording
-from rcilab.app.status_text import tell_status
+from rcilab.app.status_text import describe_status
 from rcilab.app.store import UiState
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
@@ -58,7 +58,7 @@ def test_a_pressed_stop_does_not_promise_that_its_release_clears_the_bit(languag
 def test_after_the_release_the_way_out_is_the_power(language, way_out) -> None:
     released = SupervisorStatus(phase="fault", code="fault.released", faults=FAULTS, robot_mode=RobotMode.OTHER)
     text = Text(language)
-    assert way_out in text.render(tell_status(released))
+    assert way_out in text.render(describe_status(released))
     refused = arm_obstacle("fault", False, is_released=True)
     assert refused is not None
     assert way_out in text.render(refused)

@@ -19,7 +19,7 @@ from rcilab.app.goal.goal_actions import MoveJoint, PlanGoal, PoseGoal, SetSpeed
 from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import describe_move, obstacle
 from rcilab.app.run.run_actions import ChooseRobot, RobotCommand
-from rcilab.app.status_text import tell_status
+from rcilab.app.status_text import describe_status
 from rcilab.app.text import Text
 from rcilab.control_process.launch import start_controller
 from rcilab.workbench.app import Workbench, WorkbenchConfig
@@ -114,7 +114,7 @@ def test_a_page_that_goes_away_in_mid_motion_means_one_controlled_stop(bench):
         going = threading.Event()
         page.send(json.dumps({"kind": "hello", "page": 1, "key": bench.live.introduce(1)}))
         bench.dispatcher.ask(PageOpened(page=1))
-        wait(lambda: bench.store.state.lease.holder == 1, "the page to hold the controls")
+        wait(lambda: bench.store.state.control_lock.holder == 1, "the page to hold the controls")
 
         def answer() -> None:
             for message in page:
@@ -146,7 +146,7 @@ def test_an_unreachable_robot_is_told_and_the_page_stays_usable(bench):
     assert status.robot_mode is None, "nobody says so any more"
     assert (bench.store.state.goal, bench.store.state.plan) == (goal, plan), "goal and plan are kept"
     assert obstacle(bench.store.state, status).code == "ready.lost"
-    assert "无法连接" in Text("zh").render(tell_status(status))
+    assert "无法连接" in Text("zh").render(describe_status(status))
     wait(lambda: told(bench) == "incident.lost.unreachable", "to be told")
     bench.dispatcher.ask(RobotCommand(what="power_on"))
     wait(lambda: told(bench) == "ready.lost", "to be told what to press")

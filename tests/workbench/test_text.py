@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import rcilab
-from rcilab.app.status_text import tell_remedy
+from rcilab.app.status_text import describe_remedy
 from rcilab.app.text import Text
 from rcilab.app.view_actions import QUALITIES
 from rcilab.control_process.status import PHASES
@@ -65,7 +65,7 @@ def test_the_texts_of_a_makers_faults_are_those_of_its_fault_table(maker):
     text = Text("en")
     for fault in maker.faults():
         assert text(f"fault.{fault.key}") == fault.cause
-        assert tell_remedy(fault, text).removeprefix(text("run.remedy")).strip() == fault.remedy
+        assert describe_remedy(fault, text).removeprefix(text("run.remedy")).strip() == fault.remedy
     for scenario in maker.scenarios():
         for what in ("label", "sent", "explanation", "prevention"):
             assert text.has(f"{what}.{scenario.fault.key}")

@@ -40,7 +40,7 @@ class Script:
         )  # fmt: skip
         wait(lambda: set(bench.server.get_clients()) != before, "the page to be there")
         (self.page,) = set(bench.server.get_clients()) - before
-        wait(lambda: self.page in bench.store.state.lease.pages, "the page to be listed")
+        wait(lambda: self.page in bench.store.state.control_lock.pages, "the page to be listed")
         self.say("hello", page=self.page, key=bench.live.introduce(self.page))
 
     def set(self, handle: Any, value: object) -> None:
@@ -99,7 +99,7 @@ def knows_simulation(bench: Workbench) -> bool:
 
 def test_no_control_of_a_watching_page_leads_anywhere(bench):
     with script(bench) as operator, script(bench) as watcher:
-        assert bench.store.state.lease.holder == operator.page
+        assert bench.store.state.control_lock.holder == operator.page
         wait(lambda: knows_simulation(bench), "the state of the simulation")
         before = bench.store.state
         shown = {name: handle.value for name, handle in controls(bench).items() if not handle._impl.is_button}
@@ -111,7 +111,9 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
         watcher.settle()
         wait(lambda: told(bench) == "notice.watching", "the watching page to be told")
         after = bench.store.state
-        ours = [name for name in before.__dataclass_fields__ if name not in ("notices", "entered", "lease", "world")]
+        ours = [
+            name for name in before.__dataclass_fields__ if name not in ("notices", "entered", "control_lock", "world")
+        ]
         assert [name for name in ours if getattr(after, name) is not getattr(before, name)] == []
         assert {**vars(after.world), "status": None} == {
             **vars(before.world),
@@ -160,6 +162,6 @@ def test_what_a_page_typed_goes_with_its_controls(bench):
         wait(lambda: (address.value, name.value) == ("rci://192.0.2.7:1337", "mine"), "what was typed")
         second.say("take")
         first.say("answer", yes=True)
-        wait(lambda: bench.store.state.lease.holder == second.page, "the controls to pass")
+        wait(lambda: bench.store.state.control_lock.holder == second.page, "the controls to pass")
         wait(lambda: (address.value, name.value) == ("", ""), "the words of the other page to go")
         wait(lambda: bench.store.state.typed_address == "", "the question to go")

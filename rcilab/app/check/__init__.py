@@ -1,1 +1,1 @@
-"""The Check tab: rows that lead to their moment, the slow-down, the report in words."""
+"""The Check tab: rows that lead to their worst moment, the slow-down, the report in sentences."""

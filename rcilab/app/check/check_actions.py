@@ -14,7 +14,7 @@ from rcilab.app.program.program_actions import CancelProgram, PlanProgram, Progr
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressCheck(Request):
-    """Something for the Check tab."""
+    """A button or a row of the Check tab."""
 
     what: Literal["row", "slow", "undo", "explain", "again", "cancel"]
     row: str = ""
@@ -36,7 +36,7 @@ class PressCheck(Request):
 
 
 class CheckActions:
-    """Leads to a row's moment, slows the plan down, explains the report, checks anew."""
+    """Shows a row's worst moment, slows the plan down, explains the report, repeats the check."""
 
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, program: ProgramActions) -> None:
         self._store, self._session, self._goal, self._program = store, session, goal, program
@@ -44,13 +44,13 @@ class CheckActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             PressCheck: self.press,
         }
 
     def press(self, request: PressCheck) -> None:
-        """Does what a button or a row of the tab says."""
+        """Handles a button or a row of the tab."""
         plan = self._store.state.plan
         if request.what == "cancel":
             self._work.cancel()
@@ -70,12 +70,12 @@ class CheckActions:
             self._explain(plan)
 
     def tick(self) -> None:
-        """Shows how far something is, and what came of it; forgets what is about another plan."""
+        """Shows the progress and the result of a job; drops what is about another plan."""
         if self._work.is_done:
             self._set(doing=None)
             about, result = self._work.pop_result()
             if isinstance(result, RcilabError):
-                self._answer("bad", tell_error(result))
+                self._answer("bad", explain_error(result))
             elif isinstance(result, SlowdownJob):
                 self._finish(about, result)
             else:
@@ -87,7 +87,7 @@ class CheckActions:
             self._set(slowed=None)
 
     def close(self) -> None:
-        """Ends what is being worked out."""
+        """Cancels the job."""
         self._work.cancel()
 
     @property
@@ -102,7 +102,7 @@ class CheckActions:
         self._set(tone=tone, answer=answer, found=None, about=None if plan is None else plan.report)
 
     def _seek(self, plan: Plan, name: str) -> None:
-        """Goes to the worst moment of a row, and has its joint in the plots."""
+        """Moves the timeline to the worst moment of a row and selects its joint in the plots."""
         row = next((row for row in plan.report.rows if row.id == name), None)
         if row is None:
             return
@@ -113,7 +113,7 @@ class CheckActions:
         self._set(sought=self._check.sought + 1, row=name)
 
     def _plan_again(self, plan: Plan | None) -> None:
-        """Plans what the plan was of: the program, or the way to the goal."""
+        """Plans again what the plan was made of: the program, or the path to the goal."""
         if plan is None or plan.program is None:
             self._goal.plan(PlanGoal())
         else:
@@ -163,7 +163,7 @@ class CheckActions:
         self._answer("good", said)
 
     def _undo(self) -> None:
-        """Brings the fast plan back."""
+        """Restores the plan before the slow-down."""
         slowed = self._check.slowed
         if slowed is None:
             return

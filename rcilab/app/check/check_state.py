@@ -1,4 +1,4 @@
-"""The Check tab as a value: what is being worked out, what came of it."""
+"""The state of the Check tab: the job in progress and its result."""
 
 from __future__ import annotations
 
@@ -14,39 +14,39 @@ if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
 
 Explained: TypeAlias = "tuple[Report, SlowDown | None]"
-"""A report shown as text, and the slow-down that belongs to it; a report that is ok has none."""
+"""A report shown as text, with the slow-down that belongs to it; a report that is ok has none."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Slowed:
-    """A plan that was slowed down, and what brings the fast one back."""
+    """A plan that was slowed down, and what restores the fast one."""
 
     before: Plan
     after: Plan
     speed: float
-    """Speed of the page before."""
+    """Speed setting of the page before."""
     draft: Draft | None = None
-    """The slowed program; None where no speed of a program was changed."""
+    """The slowed program; None if no speed of a program was changed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CheckState:
-    """Everything of the Check tab but the report itself, which is the plan's."""
+    """The state of the Check tab without the report itself, which belongs to the plan."""
 
     doing: Literal["slow", "explain"] | None = None
-    """What is being worked out."""
+    """The job in progress."""
     progress: float = 0.0
-    """How much of it is done, 0 to 1."""
+    """Share of the job that is done, 0 to 1."""
     answer: Message | None = None
-    """What came of the last slow-down."""
+    """Result of the last slow-down."""
     tone: Literal["good", "warn", "bad"] = "good"
     about: Report | None = None
-    """The report that `answer` is about."""
+    """The report that `answer` refers to."""
     found: SlowDown | None = None
-    """What was found where the plan stays as it is: it says why in its own words."""
+    """The result if the plan stays as it is: it contains the reason."""
     slowed: Slowed | None = None
     explained: Explained | None = None
     sought: int = 0
-    """How often the moment of a row was shown."""
+    """Number of times that the moment of a row was shown."""
     row: str = ""
     """Id of the condition that was shown last."""

@@ -1,4 +1,4 @@
-"""Whether the plan is still what it would be if it were made now, and if not, what has changed."""
+"""Whether a new plan would equal the current one, and if not, what has changed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def beside_program(state: UiState) -> Message | None:
-    """Returns the notice that this plan is not the program's, which could not be planned; None where that is clear."""
+    """Returns the notice that the plan is not that of the program, which could not be planned; None if it is."""
     plan, program = state.plan, state.program
     fails = program.planned is None and program.tone == "bad" and program.answer is not None
     if plan is None or plan.program is not None or not fails:
@@ -21,7 +21,7 @@ def beside_program(state: UiState) -> Message | None:
 
 
 def outdated(state: UiState) -> Message | None:
-    """Returns why the plan no longer holds, or None: its program, tool, load, joint limits or safety box changed."""
+    """Returns why the plan is out of date, or None: its program, tool, load, joint limits or safety box changed."""
     plan, program = state.plan, state.program
     if plan is None:
         return None

@@ -1,4 +1,4 @@
-"""Slows a plan down until it passes; it is checked several times, so this takes a while."""
+"""Slows a plan down until it conforms; each try is checked, so this takes some time."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ if TYPE_CHECKING:
 
 _TRIES = 2
 _FURTHER = 0.9
-"""By how much slower the next try is, where the speed that the factor asks for is not slow enough. Choices."""
-_FOUND = 0.5  # Part of the work when the factor is known; about what was seen.
+"""Steps by which the next try is slower if the speed for the factor is not slow enough. Tuning values."""
+_FOUND = 0.5  # Share of the progress at which the factor is known; about as measured.
 SLOWEST = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SlowdownJob:
-    """What a slow-down came to."""
+    """Result of a slow-down."""
 
     found: SlowDown
     plan: Plan | None = None
-    """The slowed plan; None when none passes."""
+    """The slowed plan; None if none conforms."""
     scale: float = 1.0
-    """Of the speed, or of every speed of the program."""
+    """Factor of the speed, or of every speed of the program."""
     draft: Draft | None = None
     """The slowed program."""
     is_stretched: bool = False
-    """Whether the same curve runs slower as a whole, because no speed is slow enough: speed does not bound the jerk."""
+    """Whether the whole curve is slowed down, because no speed is slow enough: the speed does not bound the jerk."""
 
 
-def slow_to_goal(plan: Plan, speed: float, law: JointLaw, tell: ProgressCallback) -> SlowdownJob:
-    """Returns the plan to the same goal at the largest speed that passes, planned anew."""
+def slow_to_goal(plan: Plan, speed: float, law: JointLaw, progress: ProgressCallback) -> SlowdownJob:
+    """Returns a new plan to the same goal at the highest speed that conforms."""
 
     def make(scale: float) -> Plan | None:
         made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
         return replace(made, short=plan.short).completed() if isinstance(made, Plan) else None
 
-    return _slower(plan, make, SLOWEST / speed, tell)
+    return _slower(plan, make, SLOWEST / speed, progress)
 
 
-def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) -> SlowdownJob:
-    """Returns the plan of the same program with every speed scaled by the largest factor that passes."""
+def slow_program(plan: Plan, draft: Draft, rounds: int, progress: ProgressCallback) -> SlowdownJob:
+    """Returns the plan of the same program with every speed scaled by the largest factor that conforms."""
     drafts: dict[float, Draft] = {}
 
     def make(scale: float) -> Plan | None:
@@ -62,7 +62,7 @@ def slow_program(plan: Plan, draft: Draft, rounds: int, tell: ProgressCallback) 
         return replace(build_plan_view(plan.model, motion, report, plan.box), program=program).completed()
 
     slowest = min((step.waypoint.speed for step in draft.steps), default=1.0)
-    result = _slower(plan, make, SLOWEST / slowest, tell)
+    result = _slower(plan, make, SLOWEST / slowest, progress)
     return result if result.is_stretched else replace(result, draft=drafts.get(result.scale))
 
 
@@ -74,17 +74,17 @@ def scaled(draft: Draft, scale: float) -> Draft:
     return replace(draft, steps=steps)
 
 
-def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, tell: ProgressCallback) -> SlowdownJob:
+def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, progress: ProgressCallback) -> SlowdownJob:
     recommended = plan.report.ok
-    found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: tell(_FOUND * part))
-    tell(_FOUND)
+    found = plan.completed().report.slow_down(recommended=recommended, progress=lambda part: progress(_FOUND * part))
+    progress(_FOUND)
     if found.factor is None or found.factor <= 1.0:
         return SlowdownJob(found=found)
     wanted = {row.id for row in found.report.rows if row.ok} if found.report is not None else set[str]()
     scale = 1.0 / found.factor
     for attempt in range(_TRIES):
         made = make(scale) if scale >= least else None
-        tell(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
+        progress(_FOUND + (1.0 - _FOUND) * (attempt + 1) / _TRIES)
         if made is not None and made.report.ok and all(row.ok for row in made.report.rows if row.id in wanted):
             return SlowdownJob(found=found, plan=made, scale=scale)
         scale *= _FURTHER

@@ -3,11 +3,11 @@
     from rcilab.app import fault_lab
     print(fault_lab.FaultTable(rcilab.load_model("xMatePro7")))
     demo = fault_lab.provoke("kCommandJointVelocityLimitsViolation", "xMatePro7")
-    print(demo)                                     # what was sent, why it is a fault, what to do, how to leave it
-    with fault_lab.FaultLab("xMatePro7") as lab:       # several on one controller
+    print(demo)                                     # What was sent, why it is a fault, the remedy, the recovery.
+    with fault_lab.FaultLab("xMatePro7") as lab:       # Several faults on one controller.
         demos = [lab.provoke(fault) for fault in lab.faults]
 
-The commands go through the real client to a controller that has no other client.
+The commands are sent by the real client to a controller without any other client.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def provoke(fault: FaultCode | str, model: str) -> FaultDemo:
         model: Name of the arm.
 
     Raises:
-        InvalidValueError: There is no such fault; the message lists those that exist.
+        InvalidValueError: There is no such fault; the message lists the valid ones.
         UsageError: This arm cannot have this fault.
     """
     with FaultLab(model) as lab:

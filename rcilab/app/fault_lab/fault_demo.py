@@ -1,4 +1,4 @@
-"""What the gallery shows of one fault: what was sent, what the controller reported, why, and how to go on."""
+"""One provoked fault: what was sent, what the controller reported, the cause, and the recovery."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ if TYPE_CHECKING:
     from rcilab.motion import Motion
 
 Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
-"""One step of the way out of a fault."""
+"""One step of the recovery from a fault."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FaultDemo:
-    """A fault that a controller has really reported, with the cycles that led to it."""
+    """A fault that a controller has reported, with the cycles that led to it."""
 
     fault: FaultCode
     scenario: FaultScenario
     model: RobotModel
     limits: Limits
-    """What the arm was checked by, narrowed limits included."""
+    """The limits of the check, with their scaling."""
     reported: tuple[FaultCode, ...]
     """Every error bit that was set in that cycle, in wire order."""
     said: str
-    """The controller's own words and numbers."""
+    """The controller's own sentence, with its numbers."""
     cycles: NDArray[np.void]
     """Recorded cycles from the first command on (`core.cycle_log.cycle_dtype`); the last one shows the fault."""
     after: NDArray[np.void]
-    """Recorded cycles after the fault, in which the controller brings the arm to rest; nothing is commanded in them."""
+    """Recorded cycles after the fault, in which the controller stops the arm; they contain no commands."""
     signal: Signal
-    """What broke its condition, cycle by cycle."""
+    """The quantity that violated its condition, cycle by cycle."""
     way_out: tuple[Step, ...]
-    """What was done to get out of it, in this order; afterwards the arm moved again."""
+    """The steps of the recovery, in this order; afterwards the arm moved again."""
 
     @property
     def sample(self) -> int:
@@ -59,12 +59,12 @@ class FaultDemo:
 
     @property
     def time(self) -> float:
-        """When it was reported, since the first command, [s]."""
+        """Time of the report, from the first command, [s]."""
         return float(self.cycles["t"][-1])
 
     @property
     def moment(self) -> float:
-        """The same on the clock of `commanded` and `moved`, in which rows that were dropped are left out, [s]."""
+        """The same time on the clock of `commanded` and `moved`, which omit dropped rows, [s]."""
         return self.sample * self._period * CYCLE_TIME
 
     @property
@@ -79,40 +79,40 @@ class FaultDemo:
 
     @property
     def q(self) -> JointVector:
-        """Where the arm was then, measured, shape (n,), [rad]."""
+        """Measured joint angles at that time, shape (n,), [rad]."""
         return readonly_copy(self.cycles["q"][-1])
 
     @property
     def condition(self) -> Condition:
-        """The condition that was broken: formula, unit, source."""
+        """The violated condition: formula, unit, source."""
         return self.signal.condition
 
     @property
     def value(self) -> float:
-        """What broke it, in the condition's unit."""
+        """The value that violated it, in the condition's unit."""
         return self.signal.value
 
     @property
     def bound(self) -> float:
-        """The bound that it passed."""
+        """The violated bound."""
         return self.signal.bound
 
     @property
     def place(self) -> str:
-        """Whose value it is: "joint 1", "tool", "elbow", "network"."""
+        """Location of the value: "joint 1", "tool", "elbow", "network"."""
         return self.condition.location(self.signal.axis)
 
     @property
     def source(self) -> str:
-        """Where condition and bound come from."""
+        """Source of condition and bound."""
         return self.condition.source
 
     @property
     def commanded(self) -> Motion:
-        """The joint angles that were commanded: those sent, the wrong one too; or what the controller made of poses.
+        """The commanded joint angles: those sent, with the wrong one; or the controller's solution of poses.
 
-        After the fault it is the controller's way to rest. While torques are commanded no angles are: the motion stands
-        at the start.
+        After the fault they are the controller's stop. Torque commands have no joint angles: the motion stays at its
+        start.
         """
         q, sent = self._every_cycle("q_c"), self.cycles["command"][:-1]
         if self.scenario.mode == "torque":
@@ -123,13 +123,13 @@ class FaultDemo:
 
     @property
     def moved(self) -> Motion:
-        """Where to look for the arm: as commanded where a command of a place was wrong, otherwise as measured."""
+        """The motion to draw: commanded, if a position command was wrong, otherwise measured."""
         if self.scenario.is_commanded:
             return self.commanded
         return Motion.from_cycles(self._every_cycle("q"), self._period)
 
     def _every_cycle(self, name: str) -> Array:
-        """Returns joint angles of every cycle, shape (N, n), [rad]; between states that were dropped, interpolated."""
+        """Returns joint angles of every cycle, shape (N, n), [rad]; dropped states are interpolated."""
         stop = np.concatenate((self.cycles[-1:], self.after))
         known: Array = np.array(stop["message_id"], np.float64)
         wanted: Array = np.arange(float(known[0]) + self._period, float(known[-1]) + 1.0, self._period)
@@ -140,34 +140,34 @@ class FaultDemo:
     def describe(
         self, what: Literal["sent", "explanation", "prevention"], language: Language = "en", units: Units = USUAL
     ) -> str:
-        """Returns what was done, why the controller stops for it, or how to avoid it.
+        """Returns what was sent, why the controller stops for it, or how to avoid it.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is not supported.
         """
         text = Text(language, units)
         key = f"{what}.{self.fault.key}"
         return text(key) if text.has(key) else {"explanation": self.fault.cause}.get(what, self.fault.remedy)
 
-    def tell_way_out(self, language: Language = "en") -> tuple[str, ...]:
-        """Returns the steps that led out of it, in words.
+    def recovery_steps(self, language: Language = "en") -> tuple[str, ...]:
+        """Returns the steps of the recovery as texts.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is not supported.
         """
         text = Text(language)
         return tuple(text(f"demo.step.{step}") for step in self.way_out)
 
     @property
     def script(self) -> str:
-        """Python that does the same."""
+        """Python that provokes the same fault."""
         return script(self.fault, self.model.name)
 
     def explain(self, language: Language = "en") -> str:
-        """Returns all of it in a few lines.
+        """Returns a summary in a few lines.
 
         Raises:
-            InvalidValueError: There is no such language.
+            InvalidValueError: The language is not supported.
         """
         row, text = self.condition, Text(language)
         formula, source = explain_formula(row, language), explain_source(row, language)
@@ -181,7 +181,7 @@ class FaultDemo:
                 f"  {text('demo.head.sent')} {self.describe('sent', language)}",
                 f"  {text('demo.head.condition')} {formula}; {self.place}: {number} [{source}]",
                 f"  {text('demo.head.remedy')} {self.describe('prevention', language)}",
-                f"  {text('demo.head.way_out')} {' → '.join(self.tell_way_out(language))}",
+                f"  {text('demo.head.way_out')} {' → '.join(self.recovery_steps(language))}",
             )
         )
 
@@ -193,7 +193,7 @@ class FaultDemo:
 
 
 def script(fault: FaultCode, model: str) -> str:
-    """Returns Python that provokes a fault on a private virtual controller and prints what came of it."""
+    """Returns Python that provokes a fault on a private virtual controller and prints the result."""
     return (
         "from rcilab.app import fault_lab\n\n"
         f'demo = fault_lab.provoke("{fault.manual_name}", model="{model}")\n'

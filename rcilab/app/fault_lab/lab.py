@@ -1,4 +1,4 @@
-"""A private virtual controller in lock-step on which faults are provoked, one after the other."""
+"""A private virtual controller in lock-step on which faults are provoked, one at a time."""
 
 from __future__ import annotations
 
@@ -34,38 +34,38 @@ from rcilab.motion import plan_joint
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
-_CALM = 1.0  # [N, N m] Far below any threshold that a scenario sets.
+_CALM = 1.0  # [N, N m] Far below any threshold of a scenario.
 _CALM_STATES = 500
-_GAP = 5  # [states] So many states may be missing between two that are shown, as on any network.
-_AFTER = 200  # [cycles] How long the controlled stop is watched: the arm stands still by then.
-_NUDGE = 0.02  # [rad] How far the arm moves to show that it does again.
-_THERE = 1e-6  # [rad] What counts as standing where a scenario begins.
+_GAP = 5  # [states] Largest number of missing states between two shown ones, as on any network.
+_AFTER = 200  # [cycles] Recorded part of the controlled stop: the arm stands still by then.
+_NUDGE = 0.02  # [rad] Length of the motion that shows that the arm can move again.
+_THERE = 1e-6  # [rad] Largest distance from the start of a scenario.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
-"""Parts of the work: the controller is up, the arm stands where it begins, the fault has come. About what was seen."""
+"""Progress when the controller runs, when the arm is at the start, when the fault has come. About as measured."""
 
 Tell = Callable[[float], None]
-"""Called with the part done, 0 to 1. What it raises ends the provocation: the arm is stopped, nothing is kept."""
+"""Called with the progress, 0 to 1. An exception from it ends the provocation: the arm is stopped."""
 
 
 class FaultLab(Closeable):
-    """Provokes faults on a private virtual arm. Owned by one thread; opens when first used.
+    """Provokes faults on a private virtual arm. Owned by one thread; opens at its first use.
 
     Args:
-        model: The arm, without tool and load: what is shown is the bare arm's.
+        model: The arm, without tool and load: the faults of the bare arm are shown.
     """
 
     def __init__(self, model: RobotModel | str) -> None:
         self.model = require_simulator(load_model(model if isinstance(model, str) else model.name))
         self.faults = FaultTable(self.model)
-        """What can be provoked."""
+        """The faults that can be provoked."""
         self._robot: RobotSession | None = None
 
     def provoke(self, fault: FaultCode | str, progress: Tell = lambda share: None) -> FaultDemo:
-        """Provokes a fault and returns what the controller reported; afterwards the arm stands ready for the next one.
+        """Provokes a fault and returns the controller's report; afterwards the arm is ready for the next one.
 
         Args:
             fault: A fault, or its name as the manual prints it.
-            progress: Called with the part done.
+            progress: Called with the progress, 0 to 1.
 
         Raises:
             InvalidValueError: There is no such fault.
@@ -82,11 +82,11 @@ class FaultLab(Closeable):
         try:
             return self._provoke(scenario, progress)
         except BaseException:
-            self.close()  # Whatever state it is in: the next one gets a fresh controller.
+            self.close()  # Its state is unknown: the next fault gets a new controller.
             raise
 
     def close(self) -> None:
-        """Ends the private controller. A later `provoke` starts another one."""
+        """Ends the private controller. A later `provoke` starts a new one."""
         robot, self._robot = self._robot, None
         if robot is not None:
             robot.close()
@@ -119,7 +119,7 @@ class FaultLab(Closeable):
         assert fault.record is not None
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
-        after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are coming in already.
+        after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are already arriving.
         status = robot.world.status()
         progress(_SHOWN)
         signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(scenario.fault)
@@ -147,7 +147,7 @@ class FaultLab(Closeable):
         return Scene(robot=robot, commands=commands, start=robot.receive_state(), limits=self.model.limits)
 
     def _leave(self, robot: RobotSession, scenario: FaultScenario) -> list[Step]:
-        """Leads out of a fault and returns what it took."""
+        """Recovers from a fault and returns the steps."""
         done: list[Step] = []
         if scenario.cuts_network:
             robot.world.set_network(None)
@@ -165,7 +165,7 @@ class FaultLab(Closeable):
         return [*done, "move"]
 
     def _go(self, robot: RobotSession, goal: Array) -> None:
-        """Moves the private arm: inside every limit, and unchecked for collisions, as nothing can be hurt."""
+        """Moves the private arm: inside every limit, without a check for collisions, as there is nothing to hit."""
         motion = plan_joint(self.model, robot.receive_state().q_c, goal)
         robot.control(MotionStream(motion.q, "joint_position", self.model))
 
@@ -178,7 +178,7 @@ class FaultLab(Closeable):
         robot.configure(configuration.only(capabilities_of(self.model).setup))
 
     def _wait_for_calm(self, robot: RobotSession) -> None:
-        """Returns once the controller feels nothing any more: its estimate takes a moment to forget a push."""
+        """Returns once the estimated external torques are small again: the estimate needs a moment after a push."""
         for _ in range(_CALM_STATES):
             if np.abs(robot.receive_state().tau_ext_in_base).max() < _CALM:
                 return
@@ -193,17 +193,17 @@ class FaultLab(Closeable):
             return ["refused", "power_off", "widen", "power_on"]
         if robot.is_powered():
             return ["recover"]
-        robot.power_on()  # A joint limit and an emergency stop take the motor power.
+        robot.power_on()  # A joint limit and an emergency stop switch the motor power off.
         return ["recover", "power_on"]
 
 
 def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> NDArray[np.void]:
-    """Returns the cycles after the one with the fault: the controller brings the arm to rest, and it stands there.
+    """Returns the cycles after the one with the fault: the controller stops the arm, and it stands still.
 
     Args:
-        robot: Sends the states behind `stop`.
+        robot: Receives the states after `stop`.
         last: The cycle with the fault.
-        stop: What was seen of the stop already.
+        stop: The states of the stop so far.
     """
     log = CycleLog(Recorder(robot.model.n, _CAPACITY))
     begun, t = int(last["message_id"]), float(last["t"])
@@ -217,7 +217,7 @@ def _watch_stop(robot: RobotSession, last: np.void, stop: NDArray[np.void]) -> N
     steps = np.diff(rows["message_id"].astype(np.int64), prepend=begun)
     missed = np.flatnonzero(
         steps > _GAP * timing_of(robot.model).state_cycles
-    )  # What was missed is not made up: there the record ends.
+    )  # Missed cycles are not interpolated: the record ends there.
     rows = rows[: missed[0]] if missed.size else rows
     return rows[rows["message_id"] <= begun + _AFTER]
 

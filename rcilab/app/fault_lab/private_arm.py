@@ -1,4 +1,4 @@
-"""The arm that faults are provoked on: one of the gallery's own, kept for the next provocation."""
+"""The private arm of the fault lab, kept for the next provocation."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ IDLE_TIME = 60.0  # [s] A tuning value: starting a controller takes two seconds,
 
 
 class PrivateArm:
-    """A controller that stays from one fault to the next and ends when it is idle. Threads that provoke take turns.
+    """A controller that is kept from one fault to the next and ends when it is idle. Threads use it in turn.
 
     Args:
-        idle_time: How long it waits for the next fault, [s]; a later one gets a fresh controller.
+        idle_time: Maximum wait for the next fault, [s]; a later one gets a new controller.
     """
 
     def __init__(self, idle_time: float = IDLE_TIME) -> None:
@@ -25,15 +25,15 @@ class PrivateArm:
         self._lock = threading.Lock()  # Held by the thread that uses the lab.
         self._timer: threading.Timer | None = None
 
-    def provoke(self, fault: FaultCode, model: str, tell: ProgressCallback) -> FaultDemo:
-        """Returns what came of provoking a fault; who gives up meanwhile leaves the arm at rest."""
+    def provoke(self, fault: FaultCode, model: str, progress: ProgressCallback) -> FaultDemo:
+        """Returns the provoked fault; a cancelled provocation leaves the arm at standstill."""
         with self._lock:
-            tell(0.0)
+            progress(0.0)
             if self._lab is None or self._lab.model.name != model:
                 self._drop()
                 self._lab = FaultLab(model)
             try:
-                return self._lab.provoke(fault, tell)
+                return self._lab.provoke(fault, progress)
             finally:
                 self._start_timer()
 

@@ -1,6 +1,6 @@
-"""The signal that broke a condition, cycle by cycle, computed from the recorded cycles as the controller does it.
+"""The signal that violated a condition, cycle by cycle, computed from the recorded cycles as in the controller.
 
-A value stands in the row of the state that shows it: the command that answered one state is checked in the next cycle.
+A value is in the row of the state that shows it: the command that answers one state is checked in the next cycle.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
 
-_BEFORE = 3  # Rows that a third difference looks back to.
-_UNREACHABLE = 2.0  # What a pose counts as that no joint angles give: 1 is the bound. For the plot.
+_BEFORE = 3  # Rows before the first that a third difference uses.
+_UNREACHABLE = 2.0  # Value of a pose without joint angles in the plot, where 1 is the bound.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Signal:
-    """What a condition bounds over the recorded cycles."""
+    """The quantity that a condition bounds, over the recorded cycles."""
 
     condition: Condition
     axis: int
-    """The joint, from 1; 0 for anything else."""
+    """The joint, from 1; 0 for other quantities."""
     values: Array
     """Shape (N,), in the condition's unit."""
     lower: float
-    """Bound below, -inf without one."""
+    """Lower bound, -inf without one."""
     upper: float
 
     @property
     def value(self) -> float:
-        """The last one: that of the cycle with the fault."""
+        """The last value: that of the cycle with the fault."""
         return float(self.values[-1])
 
     @property
@@ -60,7 +60,7 @@ class Signal:
 
     @property
     def excess(self) -> float:
-        """How far the last value is past its bound, as a share of it."""
+        """Distance of the last value beyond its bound, as a share of the bound."""
         width = self.upper - max(self.lower, -self.upper)
         return (abs(self.value - self.bound) if self.is_broken else -math.inf) / max(width, 1e-9)
 
@@ -71,9 +71,9 @@ class Signals:
     Args:
         rows: Recorded cycles, see `cycle_dtype`; the last one carries the fault.
         model: The arm.
-        limits: What it was checked by.
-        box: Where its tool was to stay.
-        lost: Commands in a row that the controller counted as lost.
+        limits: The limits of the check.
+        box: The safety box.
+        lost: Number of consecutive commands that the controller counted as lost.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Signals:
         self._period = CYCLE_TIME * state_cycles(rows)
 
     def find(self, fault: FaultCode) -> Signal | None:
-        """Returns the signal that raised a fault: the one farthest past its bound in the last row."""
+        """Returns the signal that raised a fault: the one farthest beyond its bound in the last row."""
         rows = condition_table(self._model.description).raising(fault)
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
@@ -106,7 +106,7 @@ class Signals:
         ]
 
     def _values(self, condition: Condition) -> Array | None:
-        """Returns one column an axis, shape (N, k); None where nothing of the kind was commanded."""
+        """Returns one column per axis, shape (N, k); None if nothing of the kind was commanded."""
         if condition.is_measured:
             return self._measured(condition)
         match condition.signal:
@@ -165,7 +165,7 @@ class Signals:
                 return np.linalg.norm(rates[:, half], axis=1)[:, None]
 
     def _external(self) -> Array:
-        """Returns outside joint torques, as the controller estimates them."""
+        """Returns external joint torques, as the controller estimates them."""
         observer = MomentumObserver(self._model)
         found: list[Array] = []
         for index, row in enumerate(self._rows):
@@ -176,7 +176,7 @@ class Signals:
         return np.array(found)
 
     def _singularity(self, poses: Array) -> Array:
-        """Returns how near the followed arm is to a singularity; the pose that was not followed is beyond the bound."""
+        """Returns the distance from a singularity; a pose that has no solution is beyond the bound."""
         near = self._closed_form.singularity_path(self._rows["q_c"])
         near[-1] = max(2.0 * near[-2] - near[-3], _UNREACHABLE)
         return near[:, None]
@@ -185,7 +185,7 @@ class Signals:
         return self._closed_form.redundancy_angle_path(q)
 
     def _sent(self, name: str, before: Array | float) -> Array | None:
-        """Returns what was checked in each row, with `_BEFORE` rows of standing still in front; None: none was sent."""
+        """Returns the checked values of each row, with `_BEFORE` rows of standstill in front; None: none were sent."""
         sent = self._rows[name][:-1]
         if not len(sent) or not np.isfinite(sent.reshape(len(sent), -1)).all():
             return None

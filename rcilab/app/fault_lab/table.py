@@ -34,7 +34,7 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
         return len(self._scenarios)
 
     def obstacle(self, fault: FaultCode | None) -> Message | None:
-        """Returns why a fault, if there is one, cannot be provoked on this arm; None: it can."""
+        """Returns why a fault cannot be provoked on this arm; None if it can."""
         if fault is None or fault not in self:
             return message("learn.no_scenarios", model=self._model.name)
         if self[fault].needs_elbow and not self._model.redundancy:
@@ -43,11 +43,11 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
 
     @property
     def groups(self) -> tuple[Group, ...]:
-        """The groups that have scenarios, in the order to show them."""
+        """The groups that have scenarios, in display order."""
         return tuple(group for group in GROUPS if self.group(group))
 
     def group(self, group: Group) -> tuple[FaultScenario, ...]:
-        """Returns the scenarios of a group, in the order to show them."""
+        """Returns the scenarios of a group, in display order."""
         return tuple(scenario for scenario in self.values() if scenario.group == group)
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""The arm angles that a goal leaves open: which are free, which are not and why, and how well the tool moves there."""
+"""The arm angles that a goal leaves open: which are free, which are not and why, and the manipulability at each."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rcilab.model.kinematics.elbow_ranges import Arc, FeasibleArcs
 from rcilab.model.robot_model import RobotModel
 
 ArcKind: TypeAlias = Literal["free", "other", "limits", "singular", "box", "reach"]
-"""free: in this way of standing; other: in another one only; or what forbids it."""
+"""free: in this branch; other: in another branch only; or the reason why it is not."""
 
 LOOKS = 36
-"""Arm angles at which dexterity is looked at: every ten degrees."""
-SAID = math.radians(0.5)  # [rad] An arm angle that was moved by less is not worth a sentence.
+"""Arm angles at which the manipulability is computed: every ten degrees."""
+SAID = math.radians(0.5)  # [rad] A smaller change of the arm angle is not reported.
 
 _KINDS: dict[str, ArcKind] = {
     "joint limits": "limits",
@@ -34,7 +34,7 @@ _KINDS: dict[str, ArcKind] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ElbowArc:
-    """A range of arm angles that looks the same all along."""
+    """A range of arm angles of one kind."""
 
     start: float
     """[rad]."""
@@ -42,32 +42,32 @@ class ElbowArc:
     """[rad], above start."""
     kind: ArcKind
     joints: tuple[int, ...] = ()
-    """Which joints are beyond their limits, from 1."""
+    """The joints beyond their limits, from 1."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Elbow:
-    """The circle of a goal's elbow."""
+    """The elbow circle of a goal."""
 
     circle: ElbowCircle
     psi: float
-    """Where the elbow is, [rad]."""
+    """Arm angle of the goal, [rad]."""
     branch: int
-    """In which way the arm stands, as in `Solutions.all`."""
+    """Branch of the goal, as in `Solutions.all`."""
     arcs: tuple[ElbowArc, ...]
-    """One after the other; together a full turn."""
+    """Consecutive arcs; together a full turn."""
     dexterity: Array
-    """Smallest singular value of the Jacobian in this way of standing, at `LOOKS` arm angles from -pi, shape (LOOKS,);
-    not a number where it has none."""
+    """Smallest singular value of the Jacobian in this branch, at `LOOKS` arm angles from -pi, shape (LOOKS,);
+    NaN where the branch has no solution."""
 
 
 def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow | None:
-    """Returns the circle of the elbow at these joint angles; None for an arm without one.
+    """Returns the elbow circle at these joint angles; None for an arm without one.
 
     Args:
         model: The arm, with its tool.
         q: Joint angles, shape (n,), [rad].
-        box: What the tool shall stay in.
+        box: Safety box for the tool.
     """
     if not model.redundancy:
         return None
@@ -88,14 +88,14 @@ def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow |
 def nearest_free(
     model: RobotModel, target: Pose, psi: float, branch: int | None = None, box: SafetyBox | None = None
 ) -> tuple[float, Message | None]:
-    """Returns the arm angle nearest to one at which the arm can stand, and why it is another one.
+    """Returns the possible arm angle nearest to a wanted one, and why it differs.
 
     Args:
         model: A 7-axis arm.
         target: Pose of the tool in base.
         psi: Wanted arm angle, [rad].
-        branch: The way of standing to keep, as in `Elbow.branch`; None takes any.
-        box: What the tool shall stay in, as for `look_at_elbow`.
+        branch: The branch to keep, as in `Elbow.branch`; None takes any.
+        box: Safety box for the tool, as for `look_at_elbow`.
     """
     try:
         arcs = model.feasible_arcs(target, box)
@@ -113,14 +113,14 @@ def nearest_free(
 
 
 def in_branch(model: RobotModel, target: Pose, psi: float, q: Array, branch: int) -> JointVector | None:
-    """Returns the joint angles of one way of standing, nearest to others; None where it is not possible.
+    """Returns the joint angles of one branch, nearest to others; None where there are none.
 
     Args:
         model: A 7-axis arm.
         target: Pose of the tool in base.
         psi: Arm angle, [rad].
-        q: Joint angles that decide about full turns, shape (n,), [rad].
-        branch: The way of standing, as in `Elbow.branch`.
+        q: Joint angles that decide on full turns, shape (n,), [rad].
+        branch: The branch, as in `Elbow.branch`.
     """
     try:
         stands = model.inverse(target, psi).all[branch]
@@ -144,7 +144,7 @@ def _say_why_not(arc: Arc) -> Message:
 
 
 def _look(found: FeasibleArcs, branch: int) -> tuple[ElbowArc, ...]:
-    """Returns the arcs as one way of standing sees them, neighbours that look alike as one."""
+    """Returns the arcs for one branch; neighbours of one kind are joined."""
     looks: list[ElbowArc] = []
     for arc in found.arcs:
         kind = _kind(arc, branch)

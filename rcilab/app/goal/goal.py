@@ -14,17 +14,17 @@ from rcilab.model.robot_model import RobotModel
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Goal:
-    """Where the operator wants the arm to go."""
+    """The goal of the operator."""
 
     q: JointVector
-    """Joint angles of the candidate arm, shape (n,), [rad]."""
+    """Joint angles of the goal, shape (n,), [rad]."""
     target: Pose
-    """The pose that was asked for, reachable or not."""
+    """The requested pose, reachable or not."""
     reach: TargetStatus
     psi: float | None = None
-    """Arm angle of `q`, [rad]; None where it has none."""
+    """Arm angle of `q`, [rad]; None for an arm without one."""
     snapped: Message | None = None
-    """Why the arm angle differs from the one that was asked for; None where it does not."""
+    """Why the arm angle differs from the requested one; None if it does not."""
 
 
 def goal_at(model: RobotModel, q: JointVector) -> Goal:
@@ -45,8 +45,8 @@ def goal_toward(
         model: The arm.
         target: Pose of the tool in base.
         near: Joint angles that choose the branch, shape (n,), [rad].
-        psi: Arm angle to take, [rad]; None keeps that of `near`.
-        snapped: Why `psi` differs from the arm angle that was asked for.
+        psi: Requested arm angle, [rad]; None keeps that of `near`.
+        snapped: Why `psi` differs from the requested arm angle.
     """
     reach = evaluate_pose(model, target, near, psi)
     return Goal(q=reach.q, target=target, reach=reach, psi=_arm_angle(model, reach.q), snapped=snapped)

@@ -1,4 +1,4 @@
-"""Requests that pose the goal: solve, plan, check. Owned by the dispatcher's thread."""
+"""Requests that set the goal: solve, plan, check. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from rcilab.motion.joint import JOINT_LAWS
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
 """Name of the field that takes all four numbers of the orientation."""
-FURTHEST = 3.0  # [m] No arm of ours reaches half as far, and the gizmo should stay in sight.
+FURTHEST = 3.0  # [m] More than twice the reach of any arm, and the gizmo stays visible.
 SLOWEST = 0.01
-SETTLED = 0.15  # [s] A goal that has not moved for so long stands.
-_ONE_DRAG = 1.0  # [s] What moves again within that time is one drag, or one turn at a slider's keys.
-RESTED = 0.6  # [s] The same of a target that a hand still holds: it has only paused, and looks at the arm.
+SETTLED = 0.15  # [s] A goal that has not changed for this time is taken as final.
+_ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use of a slider's keys.
+RESTED = 0.6  # [s] The same for a gizmo that is still held: the operator may only pause.
 
 
 PoseName: TypeAlias = Literal["zero", "home", "here", "start", "undo"]
@@ -39,7 +39,7 @@ PoseName: TypeAlias = Literal["zero", "home", "here", "start", "undo"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveJoint(Request):
-    """Pose one joint of the goal."""
+    """Set one joint of the goal."""
 
     joint: int
     """From 0."""
@@ -53,10 +53,10 @@ class MoveJoint(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseGoal(Request):
-    """Pose the goal in a named way."""
+    """Set the goal to a named pose."""
 
     name: PoseName
-    """"start" is where the plan begins, or its program."""
+    """"start" is the start of the plan, or of its program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ class SetArmAngle(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChooseBranch(Request):
-    """Take another analytic solution for the same pose."""
+    """Choose another analytic solution for the same pose."""
 
     index: int
     """From 0, in the order of the list."""
@@ -96,22 +96,22 @@ class ChooseBranch(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPathType(Request):
-    """How the tool is to go to the goal; what is None stays."""
+    """Path type to the goal; None leaves a value unchanged."""
 
     kind: str | None = None
     """"joint", "line" or "arc"."""
     via: bool = False
-    """Whether the arc shall lead over where the target is now."""
+    """Whether the current target becomes the via point of the arc."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanGoal(Request):
-    """Plan from where the arm is to the goal, and check it."""
+    """Plan from the arm's position to the goal, and check it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanRecovery(Request):
-    """Plan from where the arm is, outside a joint's range, back inside."""
+    """Plan from the arm's position, outside a joint's range, back inside."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,13 +128,13 @@ class SetSpeed(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetLaw(Request):
-    """Which planner."""
+    """Choose the time law."""
 
     law: str
 
 
 class StatusSource(Protocol):
-    """Where the arm is."""
+    """Provides the arm's position."""
 
     def status(self) -> ArmStatus:
         """Returns the status; a plan begins at its `q_c`."""
@@ -142,25 +142,25 @@ class StatusSource(Protocol):
 
 
 class GoalActions:
-    """Poses, targets, typed numbers, speed.
+    """The goal: joint angles, target pose, typed numbers, speed.
 
     Args:
         store: The state.
-        robot: Where the arm is.
-        plans_at_once: Whether every change is planned at once; otherwise only a request plans.
+        robot: Provides the arm's position.
+        plans_at_once: Whether every change is planned at once; otherwise only on request.
     """
 
     def __init__(self, store: StateStore[AppState], robot: StatusSource, *, plans_at_once: bool = True) -> None:
         self._store, self._robot, self._plans_at_once = store, robot, plans_at_once
-        self._stale = False  # The goal has changed while the arm was moving.
-        self._planned = 0.0  # [s] When the last plan was made.
-        self._due: float | None = None  # [s] When a path of the tool is to be planned.
-        self._is_held = False  # A hand has the target and has not let go of it.
-        self._hand, self._moved = "", 0.0  # What a hand moved last, and when, [s].
+        self._stale = False  # The goal has changed during a motion.
+        self._planned = 0.0  # [s] Time of the last plan.
+        self._due: float | None = None  # [s] Time at which a tool path is to be planned.
+        self._is_held = False  # The gizmo is being dragged.
+        self._hand, self._moved = "", 0.0  # What was dragged last, and when, [s].
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             MoveJoint: self.move_joint,
             PoseGoal: self.pose_goal,
@@ -175,7 +175,7 @@ class GoalActions:
         }
 
     def move_joint(self, request: MoveJoint) -> None:
-        """Poses one joint of the candidate arm."""
+        """Sets one joint of the goal."""
         model = self._store.state.model
         if not (0 <= request.joint < model.n and math.isfinite(request.angle)):
             return
@@ -183,10 +183,10 @@ class GoalActions:
         limits = model.limits.joint
         self._remember_hand(f"joint {request.joint}")
         q[request.joint] = request.angle
-        self.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))  # The others too: soft limits may be new.
+        self.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))  # All joints: soft limits may be new.
 
     def pose_goal(self, request: PoseGoal) -> None:
-        """Poses the candidate arm by name."""
+        """Sets the goal to a named pose."""
         state, self._hand = self._store.state, ""
         if request.name == "undo":
             goal = self._store.undo()
@@ -220,14 +220,14 @@ class GoalActions:
         self.aim(Pose(position, request.wxyz))
 
     def _remember_hand(self, what: str) -> None:
-        """Keeps the goal from before a hand moved something: once for all that one drag asks for."""
+        """Stores the goal for undo, once per drag."""
         now = time.monotonic()
         if what != self._hand or now - self._moved > _ONE_DRAG:
             self._store.remember()
         self._hand, self._moved = what, now
 
     def set_arm_angle(self, request: SetArmAngle, branch: int | None = None) -> None:
-        """Turns the elbow about the shoulder-wrist line while the tool stays, as near as limits allow."""
+        """Turns the elbow about the shoulder-wrist line while the tool is held, as far as the limits allow."""
         if math.isfinite(request.psi) and self._store.state.model.redundancy:
             state = self._store.state
             goal, wanted = state.goal, math.remainder(request.psi, math.tau)
@@ -236,7 +236,7 @@ class GoalActions:
             self.aim(goal.target, psi, near, snapped)
 
     def choose_branch(self, request: ChooseBranch) -> None:
-        """Takes another analytic solution of the same pose."""
+        """Chooses another analytic solution of the same pose."""
         goal = self._store.state.goal
         solutions = goal.reach.solutions
         if solutions is None or not 0 <= request.index < len(solutions):
@@ -245,7 +245,7 @@ class GoalActions:
         self.aim(goal.target, None, near=solutions[request.index])
 
     def lead_to(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
-        """Poses the goal where a waypoint leads: at joint angles, or at a pose with an arm angle."""
+        """Sets the goal to that of a waypoint: joint angles, or a pose with an arm angle."""
         self._store.remember()
         if q is None:
             self.aim(target, psi)
@@ -254,7 +254,7 @@ class GoalActions:
         self._store.clear_problems("pose.")
 
     def type_field(self, request: TypeField) -> None:
-        """Takes a typed number, or says beside the field what is wrong with it."""
+        """Takes a typed number, or shows the problem next to its field."""
         state = self._store.state
         kind, _, name = request.field.partition(".")
         if kind == "joint" and name in map(str, range(state.model.n)):
@@ -301,29 +301,29 @@ class GoalActions:
         act()
 
     def set_speed(self, request: SetSpeed) -> None:
-        """Plans faster or slower."""
+        """Changes the speed of plans."""
         if math.isfinite(request.speed):
             self._store.update(speed=min(max(request.speed, SLOWEST), 1.0))
             self._store.clear_problems("speed")
             self.plan()
 
     def set_law(self, request: SetLaw) -> None:
-        """Plans with another law."""
+        """Changes the time law."""
         if request.law in JOINT_LAWS:
             self._store.update(law=request.law)
             self.plan()
 
     def set_way(self, request: SetPathType) -> None:
-        """Plans along another kind of path, or over another place."""
+        """Changes the path type, or the via point of an arc."""
         kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
         via = self._store.state.goal.target if request.via else self._store.state.via
         self._store.update(way=kind, via=via)
         self.plan()
 
     def plan(self, request: PlanGoal | None = None) -> None:
-        """Plans from where the arm stands to the goal, unless it is moving: then once it stands.
+        """Plans from the arm's position to the goal; during a motion, once the arm stands still.
 
-        A path of the tool takes longer than a drag can wait for: it is planned once the goal stands still.
+        A tool path takes too long for a drag: it is planned once the goal does not change any more.
         """
         if request is None and not self._plans_at_once:
             return
@@ -335,9 +335,9 @@ class GoalActions:
         self._stale = False
         start = start_of_plans(state.model, status)
         if start is None:
-            if request is not None:  # Nothing has changed: what was planned is not lost.
+            if request is not None:  # Nothing has changed: the plan is kept.
                 self._store.say("warn", message("plan.no_arm"))
-            elif state.recording is None:  # A run that is looked at stays, whatever is posed.
+            elif state.recording is None:  # A displayed run stays, whatever the goal is.
                 self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
             return
         if state.way != "joint" and request is None:
@@ -355,7 +355,7 @@ class GoalActions:
         self.show(made)
 
     def prepare_plan(self, start: JointVector) -> Callable[[], Plan | Message]:
-        """Returns the work of planning from joint angles, [rad], to the goal of this moment; any thread may do it."""
+        """Returns a function that plans from joint angles, [rad], to the current goal; any thread may call it."""
         state = self._store.state
         box, short = state.box, state.goal.reach.short
 
@@ -366,7 +366,7 @@ class GoalActions:
         return make
 
     def plan_recovery(self, request: PlanRecovery) -> None:
-        """Plans from where the arm stands, outside a joint's range, back inside; the goal stays for the next plan."""
+        """Plans from the arm's position, outside a joint's range, back inside; the goal is kept for the next plan."""
         state, status = self._store.state, self._robot.status()
         if status.q_c is None or is_moving(status):
             return
@@ -375,14 +375,14 @@ class GoalActions:
         self.show(make_recovery(state.model, readonly_copy(status.q_c), state.box))
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan from its start, or why none was found."""
+        """Shows a plan from its start, or why there is none."""
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:
             self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)
 
     def settle(self) -> None:
-        """Looks for collisions, too, once the goal has stood still for a moment."""
+        """Checks for collisions, too, once the goal has not changed for a moment."""
         state = self._store.state
         if self._due is not None and time.monotonic() >= self._due:
             self.plan(PlanGoal())
@@ -394,19 +394,19 @@ class GoalActions:
             self._store.update(plan=checked)
 
     def catch_up(self) -> None:
-        """Plans what was put off while the arm was moving."""
+        """Plans what was postponed during a motion."""
         if self._stale:
             self.plan()
 
     def follow(self, q: JointVector) -> Goal:
-        """Puts the goal where the moving arm is and returns it; it is planned once the arm stands."""
+        """Sets the goal to the position of the moving arm and returns it; it is planned once the arm stands still."""
         goal = goal_at(self._store.state.model, q)
         self._store.update(goal=goal)
         self._stale = True
         return goal
 
     def pose(self, q: JointVector) -> None:
-        """Poses the candidate arm at these joint angles."""
+        """Sets the goal to joint angles."""
         self._store.update(goal=goal_at(self._store.state.model, q))
         self.plan()
 
@@ -417,7 +417,7 @@ class GoalActions:
         near: JointVector | None = None,
         snapped: Message | None = None,
     ) -> None:
-        """Poses the candidate arm at a target pose, see `goal_toward`; `near` is the present goal when absent."""
+        """Sets the goal to a target pose, see `goal_toward`; `near` defaults to the current goal."""
         state = self._store.state
         around = state.goal.q if near is None else near
         self._store.update(goal=goal_toward(state.model, target, around, psi, snapped))
@@ -425,7 +425,7 @@ class GoalActions:
 
 
 def _beginning(plan: Plan) -> JointVector:
-    """Returns where a plan begins; of a program it is the program's start, not the way there, shape (n,), [rad]."""
+    """Returns where a plan begins; for a program its start, not that of the approach, shape (n,), [rad]."""
     return plan.motion.start if plan.program is None else np.array(plan.program.start)
 
 

@@ -18,19 +18,19 @@ from rcilab.motion.named_poses import LONGEST_NAME, NamedPoseStore
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NamedPose(Request):
-    """Something with a stored pose."""
+    """A button or field of the stored poses."""
 
     what: Literal["store", "recall", "delete", "choose"]
     name: str
 
 
 class NamedPoseActions:
-    """The stored poses of the arm of now.
+    """The stored poses of the chosen arm.
 
     Args:
         store: The state.
-        goal: Poses the goal.
-        file: Where the poses are; None: in the user's folder.
+        goal: Sets the goal.
+        file: File of the poses; None: the one in the user's folder.
     """
 
     def __init__(self, store: Store, goal: GoalActions, file: Path | None = None) -> None:
@@ -39,19 +39,19 @@ class NamedPoseActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             NamedPose: self.act,
         }
 
     def act(self, request: NamedPose) -> None:
-        """Stores the goal under a name, or recalls, deletes or chooses the pose of this name."""
+        """Stores the goal under a name, or recalls, deletes or selects the pose of this name."""
         {"store": self._keep, "recall": self._recall, "delete": self._delete, "choose": self._choose}[request.what](
             request.name
         )
 
     def tick(self) -> None:
-        """Looks up the poses of another arm."""
+        """Loads the poses of another arm."""
         if self._store.state.model.name != self._shown:
             self._shown = self._store.state.model.name
             self._try(self._show)
@@ -106,6 +106,6 @@ class NamedPoseActions:
             reason = describe_error(error) if error.code else LiteralText(plain)
             self._store.say("bad", message("poses.file", file=self._book.file, reason=reason))
             if isinstance(error, InvalidValueError) and error.name == "pose":
-                self._try(self._show)  # Another program has deleted it.
+                self._try(self._show)  # Another process has deleted it.
             return False
         return True

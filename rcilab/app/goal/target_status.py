@@ -1,4 +1,4 @@
-"""Whether the arm can bring its tool to a pose, in words, and what it can do instead."""
+"""Whether the arm can bring its tool to a pose, as a message, and what it can do instead."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from rcilab.model.robot_model import RobotModel
 
 Tone = Literal["good", "warn", "bad"]
 
-NEAR_LIMIT = math.radians(5.0)  # [rad] Closer than this to a limit is worth saying.
-NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm is as good as singular.
+NEAR_LIMIT = math.radians(5.0)  # [rad] A smaller distance to a limit is reported.
+NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm counts as singular.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TargetStatus:
-    """What the inverse says about a target."""
+    """Result of the inverse kinematics for a target."""
 
     tone: Tone
-    """good: reachable; warn: reachable, with a limit or a singularity near; bad: not reachable."""
+    """good: reachable; warn: reachable, near a limit or a singularity; bad: not reachable."""
     reason: Message
-    """Why, in words."""
+    """The reason."""
     q: JointVector
-    """The configuration at the nearest reachable pose, shape (n,), [rad]."""
+    """The joint angles at the nearest reachable pose, shape (n,), [rad]."""
     solutions: Solutions | None
-    """All branches at that pose; None where it cannot be reached."""
+    """All branches at that pose; None if it cannot be reached."""
     short: Message | None = None
-    """How far that pose is from the target, in words; None when the target is reached."""
+    """Distance of that pose from the target, as a message; None if the target is reached."""
 
 
 @dataclass(frozen=True, slots=True)
 class JointLimitMargin:
-    """How far a configuration is from the nearest joint limit."""
+    """Distance of joint angles to the nearest joint limit."""
 
     angle: float
     """[rad]."""
     joint: int
-    """From 1."""
+    """Joint, from 1."""
 
 
 def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
@@ -54,8 +54,8 @@ def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
     return JointLimitMargin(float(distances[worst]), worst + 1)
 
 
-def telling_joints(solutions: np.ndarray) -> tuple[int, ...]:
-    """Returns the joints, from 0, whose angles in whole degrees tell the solutions apart; none where there is one.
+def distinguishing_joints(solutions: np.ndarray) -> tuple[int, ...]:
+    """Returns the joints, from 0, whose angles in whole degrees distinguish the solutions; none if there is only one.
 
     Args:
         solutions: Joint angles, shape (N, n), [rad].
@@ -75,8 +75,8 @@ def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float
     Args:
         model: The arm.
         target: Pose of the tool in base.
-        near: Where the arm (or the last answer) is, shape (n,), [rad]; decides the branch.
-        psi: Arm angle to hold, [rad]; None keeps that of `near`.
+        near: Current joint angles, or the last solution, shape (n,), [rad]; they decide the branch.
+        psi: Arm angle to keep, [rad]; None keeps that of `near`.
     """
     found = model.closest(target, near, psi)
     if found.refusal is not None:
@@ -92,7 +92,7 @@ def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float
 
 
 def evaluate_joints(model: RobotModel, q: JointVector) -> TargetStatus:
-    """Returns what is to be said about a configuration that was posed joint by joint."""
+    """Returns the message on joint angles that were set joint by joint."""
     try:
         solutions = model.inverse(model.forward(q), near=q)
     except KinematicsError:
@@ -104,8 +104,8 @@ def why_not(refusal: UnreachableError, missed: float) -> Message:
     """Returns why a pose is not reachable.
 
     Args:
-        refusal: What the inverse says.
-        missed: How far the pose that the arm takes instead is from it, [m]: no other distance is shown beside it.
+        refusal: Error of the inverse kinematics.
+        missed: Distance of the pose that the arm takes instead, [m]: the only distance that is shown.
     """
     if refusal.distance > 0.0:
         return message("reach.far", distance=missed)
@@ -138,7 +138,7 @@ def _judge_configuration(model: RobotModel, q: JointVector, solutions: Solutions
 
 
 def _miss(target: Pose, reached: Pose) -> tuple[float, float]:
-    """Returns how far a pose is from its target, [m], and how far it is turned from it, [rad]."""
+    """Returns the distance of a pose from its target, [m], and the angle between them, [rad]."""
     turned = 2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz)))))
     return float(np.linalg.norm(target.position - reached.position)), turned
 

@@ -1,1 +1,1 @@
-"""Moving by hand: sliders, held buttons, steps and named poses, in the preview and on the robot."""
+"""Jogging: sliders, held buttons, steps and named poses, in the preview and on the robot."""

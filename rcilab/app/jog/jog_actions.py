@@ -1,4 +1,4 @@
-"""Requests that jog: the goal or the robot moves while a button is held, or by one step a press.
+"""Requests that jog: the goal or the robot moves while a button is held, or by one step per press.
 
 Owned by the dispatcher's thread; it never waits for the robot.
 """
@@ -34,21 +34,21 @@ from rcilab.control_process.jog_record import HOLD_TIMEOUT
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion import Jog
 
-_LONGEST_LOOK = 100  # Cycles a preview goes on at most in one tick: a page that stood still does not jump.
+_LONGEST_LOOK = 100  # Maximum number of preview cycles in one tick: after a stall of the page nothing jumps.
 _SAME = 1e-9  # [rad]
-_FORGOTTEN = 2.0  # [s] So long a button that moves nothing any more is silent before it may move again.
+_FORGOTTEN = 2.0  # [s] A button that moves nothing any more must be silent for this time before it moves again.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetJog(Request):
-    """How to jog; what is None stays."""
+    """Settings of the jog; None leaves a value unchanged."""
 
     robot: bool | None = None
     """Whether the buttons move the robot, not the goal."""
     agreed: bool = False
-    """Whether this is the second yes for a foreign robot."""
+    """Whether this is the second confirmation for a foreign robot."""
     step: float | None = None
-    """[mm, deg]; 0: as long as a button is held."""
+    """Step, [mm, deg]; 0: as long as a button is held."""
     frame: str | None = None
     speed: float | None = None
     """Share of the fastest jog, 0 to 1."""
@@ -60,15 +60,15 @@ class _Press:
 
     page: int | None
     axis: Axis
-    heard: float
-    """When it was last said to be held, [s]."""
+    last_seen: float
+    """Time of the last message that it is held, [s]."""
     is_robot: bool
     is_spent: bool = False
-    """Whether it moves nothing any more, though it is still held: it was refused, or something ended the motion."""
+    """Whether it moves nothing any more, though it is still held: it was refused, or its motion has ended."""
 
     def is_over(self, now: float) -> bool:
-        """Returns whether it was silent for so long that it is not held any more."""
-        return now - self.heard > (_FORGOTTEN if self.is_spent else HOLD_TIMEOUT)
+        """Returns whether it was silent for so long that it counts as released."""
+        return now - self.last_seen > (_FORGOTTEN if self.is_spent else HOLD_TIMEOUT)
 
 
 class JogActions:
@@ -76,20 +76,20 @@ class JogActions:
 
     Args:
         store: The state.
-        session: The robot side.
-        goal: Poses the goal.
+        session: The robot.
+        goal: Sets the goal.
     """
 
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
         self._store, self._goal = store, goal
         self._robot = RobotJog(store, session, goal)
         self._press: _Press | None = None
-        self._preview: Jog | None = None  # The goal on its way, until it stands.
+        self._preview: Jog | None = None  # The moving goal, until it stops.
         self._who: tuple[object, ...] = ()
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             SetJog: self.set_jog,
             HoldJog: self.hold,
@@ -97,7 +97,7 @@ class JogActions:
         }
 
     def set_jog(self, request: SetJog) -> None:
-        """Changes how to jog; what does not exist is ignored. A foreign robot is jogged after a second yes only."""
+        """Changes the settings; invalid values are ignored. A foreign robot needs a second confirmation."""
         state, changes = self._store.state, dict[str, object]()
         if request.step in STEPS:
             changes["step"] = request.step
@@ -112,7 +112,7 @@ class JogActions:
         change_jog(self._store, **changes)
 
     def hold(self, request: HoldJog) -> None:
-        """Goes on with the jog of a button, for as long as it is said again and again."""
+        """Continues the jog of a button as long as messages that it is held arrive."""
         axis, state, now = Axis(request.axis, request.sign), self._store.state, time.monotonic()
         if state.jog.step or not axis.exists(state.model):
             return
@@ -121,12 +121,12 @@ class JogActions:
             self.release()
             self._press = press = _Press(request.page, axis, now, state.jog.robot)
             press.is_spent = not (self._robot.begin() if press.is_robot else self._begin_preview(axis))
-        press.heard = now
+        press.last_seen = now
         if press.is_robot and not press.is_spent:
             press.is_spent = not self._robot.renew(axis, request.stops)
 
     def press(self, request: PressJog) -> None:
-        """Makes a step, or ends what was held: a button says so when it is released."""
+        """Makes a step, or ends the jog of a button that was released."""
         axis, state = Axis(request.axis, request.sign), self._store.state
         if not axis.exists(state.model):
             return
@@ -146,15 +146,15 @@ class JogActions:
             self._preview.stop()
 
     def tick(self, elapsed: float) -> None:
-        """Lets go for a page that has gone silent or has the controls no more; goal and robot go on."""
+        """Releases the button of a page that has fallen silent or has lost the controls."""
         state = self._store.state
-        who = (state.target, state.model.name, state.plant, state.lease.holder)
+        who = (state.target, state.model.name, state.plant, state.control_lock.holder)
         if who != self._who:
             self._who = who
             self._begin_anew()
         press = self._press
         is_held = press is not None and press.is_robot and not press.is_spent
-        # First: a jog that has ended stays ended, however long nothing was heard or done meanwhile.
+        # First: a jog that has ended stays ended, also after a long pause.
         if not self._robot.watch(press.axis if press is not None and is_held else None) and press is not None:
             press.is_spent = True
         if press is not None and press.is_over(time.monotonic()):
@@ -176,7 +176,7 @@ class JogActions:
         return True
 
     def _advance(self, preview: Jog, elapsed: float) -> None:
-        """Moves the goal on as the robot would go."""
+        """Advances the goal as the robot would move."""
         for _ in range(min(round(elapsed / CYCLE_TIME), _LONGEST_LOOK)):
             preview.step()
         state, press = self._store.state, self._press
@@ -196,7 +196,7 @@ class JogActions:
             self._goal.pose(led.q)
 
     def _begin_anew(self) -> None:
-        """Another arm, destination or person: the buttons pose the goal again until changed."""
+        """Another arm, destination or operator: the buttons move the goal again until changed."""
         self.release()
         self._preview = None
         self._robot.forget()

@@ -1,4 +1,4 @@
-"""What jogging is made of: its settings, how fast and how far one button goes, what stands in the way."""
+"""Jogging: its settings, how fast and how far one button moves, what prevents it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rcilab.app.arm_features import tell_lack_to_run
+from rcilab.app.arm_features import explain_lack_to_run
 from rcilab.app.request import Moving
 from rcilab.app.setup.configuration_state import setup_obstacle
-from rcilab.app.status_text import tell_status
+from rcilab.app.status_text import describe_status
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clearance import ADVISED_DISTANCE
 from rcilab.core.safety_box import SafetyBox, active_box
@@ -31,20 +31,20 @@ Frame = Literal["base", "tool"]
 FRAMES: tuple[Frame, ...] = ("base", "tool")
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 STEPS = (0.0, 0.1, 1.0, 5.0, 10.0)
-"""Millimetres or degrees that one press goes; 0: as long as the button is held."""
+"""Millimetres or degrees per press; 0: as long as the button is held."""
 
-FASTEST_TOOL = 0.25  # [m/s] What ISO 10218-1 calls reduced speed; no jog moves the tool tip faster.
+FASTEST_TOOL = 0.25  # [m/s] Reduced speed of ISO 10218-1; no jog moves the tool tip faster.
 FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool.
 FASTEST_JOINT = math.radians(30.0)  # [rad/s]
 SLOWEST = 0.01
-STILL = 1e-3  # [rad/s] Below this a jogged joint stands.
+STILL = 1e-3  # [rad/s] Below this a jogged joint counts as standing still.
 
-_AT_LIMIT = math.radians(0.05)  # [rad] Closer than this to its limit a jogged joint has arrived there.
+_AT_LIMIT = math.radians(0.05)  # [rad] At a smaller distance a jogged joint has arrived at its limit.
 _REACTION = 0.5  # [s] A jog that is not renewed ends in 0.3 s; with its stop it is shorter than this.
-_AHEAD = 0.1  # [s] How far ahead distances are looked at.
-_FACE = 1e-3  # [m] The tool stands so far before a face of the safety box.
-_APPROACH = 1e-4  # [m/s] Slower than this nothing comes nearer.
-STANDING = 0.02  # A smaller part of a jog than that does not count.
+_AHEAD = 0.1  # [s] How far ahead distances are evaluated.
+_FACE = 1e-3  # [m] Distance at which the tool stops before a face of the safety box.
+_APPROACH = 1e-4  # [m/s] A slower approach is ignored.
+STANDING = 0.02  # A smaller part of a jog is ignored.
 
 _NO_JOG = {
     "starting": "ready.starting",
@@ -68,7 +68,7 @@ class JogButton(Moving):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HoldJog(JogButton):
-    """It is held; said ten times a second."""
+    """It is held; sent ten times a second."""
 
     @property
     def replaces(self) -> str | None:  # noqa: D102
@@ -82,23 +82,23 @@ class PressJog(JogButton):
 
 @dataclass(frozen=True, kw_only=True)
 class JogState:
-    """How the page jogs."""
+    """Settings and messages of the jog."""
 
     robot: bool = False
-    """Whether the buttons move the robot; otherwise they pose the goal."""
+    """Whether the buttons move the robot; otherwise they move the goal."""
     asked: bool = False
-    """Whether a foreign robot was chosen and that awaits a second yes."""
+    """Whether a foreign robot was chosen and the second confirmation is awaited."""
     step: float = 0.0
     """One of `STEPS`."""
     frame: Frame = "base"
     speed: float = 0.3
     """Share of the fastest jog, 0 to 1."""
     said: Message | None = None
-    """What stopped or refused the last jog."""
+    """Why the last jog stopped or was refused."""
     poses: tuple[str, ...] = ()
     """Names of the stored poses of this arm."""
     pose: str = ""
-    """The one that is chosen."""
+    """The selected one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,7 @@ class Axis:
         return int(self.name[6:]) if self.name.startswith("joint.") else None
 
     def exists(self, model: RobotModel) -> bool:
-        """Returns whether an arm has it."""
+        """Returns whether an arm has this joint or axis."""
         names = (*(f"joint.{joint}" for joint in range(model.n)), *AXES)
         return self.name in names and self.sign in (-1, 1)
 
@@ -126,9 +126,9 @@ def jog_velocity(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -
 
     Args:
         model: The arm.
-        q: Joint angles now, shape (n,), [rad]; they decide how fast a joint may turn for `FASTEST_TOOL`.
+        q: Current joint angles, shape (n,), [rad]; they decide how fast a joint may turn for `FASTEST_TOOL`.
         jog: Speed and frame.
-        axis: What moves.
+        axis: The joint or axis.
     """
     joint = axis.joint
     if joint is None:
@@ -149,7 +149,7 @@ def inside(model: RobotModel, q: JointVector) -> JointVector:
 
 
 def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
-    """Returns why this button leads no further: a joint at its limit, or the edge of the reach; None for neither."""
+    """Returns why a button leads no further: a joint at its limit, or the edge of the workspace; None for neither."""
     limits, joint = model.limits.joint, axis.joint
     for number in range(model.n) if joint is None else (joint,):
         for end, bound, is_soft in (
@@ -166,16 +166,16 @@ def at_limit(model: RobotModel, q: JointVector, axis: Axis) -> Message | None:
 
 
 def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> tuple[float, tuple[int, int]]:
-    """Returns the part of a jog, 0 to 1, that keeps links from each other and the floor, and which come nearest.
+    """Returns the part of a jog, 0 to 1, that keeps links from each other and the floor, and the nearest pair.
 
-    No controller looks for that. The arm may come nearer by what is left to `ADVISED_DISTANCE` within `_REACTION`, so
-    that it slows down on its way there, and stands in time even without another update.
+    No controller checks this. Within `_REACTION`, the arm may approach by the rest of `ADVISED_DISTANCE`, so that it
+    slows down on its way there, and stops in time even without another update.
 
     Args:
         model: The arm.
-        q: Joint angles now, shape (n,), [rad].
+        q: Current joint angles, shape (n,), [rad].
         kind: As for `Supervisor.jog`.
-        values: Likewise.
+        values: As for `Supervisor.jog`.
     """
     dq = _rates(model, q, kind, values)
     found = model.clearance(np.stack([q, q + _AHEAD * dq]))
@@ -188,14 +188,14 @@ def safe_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array) 
 
 
 def box_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array, box: SafetyBox | None) -> float:
-    """Returns the part of a jog, 0 to 1, that keeps the tool in the safety box: it slows down on its way to a face.
+    """Returns the part of a jog, 0 to 1, that keeps the tool in the safety box: it slows down towards a face.
 
     Args:
         model: The arm.
-        q: Joint angles now, shape (n,), [rad].
+        q: Current joint angles, shape (n,), [rad].
         kind: As for `Supervisor.jog`.
-        values: Likewise.
-        box: The safety box; one that is off bounds nothing.
+        values: As for `Supervisor.jog`.
+        box: The safety box; one that is off has no effect.
     """
     bound = active_box(box)
     if bound is None:
@@ -207,7 +207,7 @@ def box_share(model: RobotModel, q: JointVector, kind: JogKind, values: Array, b
 
 
 def fastest_tool(plan: Plan) -> float:
-    """Returns the highest speed of the tool in a plan, as far as its path shows it, [m/s]."""
+    """Returns the highest speed of the tool in a plan, from the points of its path, [m/s]."""
     steps = np.sqrt(np.square(np.diff(plan.path, axis=0)).sum(axis=1))
     return float(steps.max()) * (len(plan.path) - 1) / plan.motion.duration
 
@@ -222,13 +222,13 @@ def _rates(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> A
 
 def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns why the buttons cannot move the robot now, or None when they can."""
-    lack = tell_lack_to_run(state.model, is_virtual=state.target == "virtual")
+    lack = explain_lack_to_run(state.model, is_virtual=state.target == "virtual")
     if lack is not None:
         return lack
     if status.code == "moving.guided":
         return message("ready.guided")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
-        return tell_status(status)
+        return describe_status(status)
     if status.phase == "moving" and status.code != "moving.jog":
         return message("ready.moving")
     if status.is_pressed and status.phase in ("idle", "fault"):
@@ -241,7 +241,7 @@ def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
 
 
 def change_jog(store: Store, **changes: Any) -> None:
-    """Exchanges settings and words of the jog."""
+    """Changes settings and messages of the jog."""
     jog = store.state.jog
     changed = replace(jog, **changes)
     if changed != jog:

@@ -1,4 +1,4 @@
-"""One step of a jog: where a press leads, or why it leads nowhere."""
+"""One step of a jog: where a press leads, or why it does not move the arm."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from rcilab.motion.online import POSITION_MARGIN
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_NOWHERE = 1e-9  # [rad] Less than that is no step.
-_FARTHEST = math.radians(20.0)  # A joint that turns more for a step of the tool swings the arm elsewhere.
+_NOWHERE = 1e-9  # [rad] A smaller step counts as none.
+_FARTHEST = math.radians(20.0)  # A joint that turns more for a step of the tool would take the arm far from here.
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,15 +27,15 @@ class Step:
     """Where a step leads."""
 
     q: JointVector | None
-    """Shape (n,), [rad]; None: nowhere."""
+    """Shape (n,), [rad]; None: no step."""
     said: Message | None = None
-    """Which limit is in the way, or why there is no step."""
+    """The limit that prevents it, or why there is no step."""
 
 
 def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> Step:
     """Returns where one press of a button leads from joint angles `q`.
 
-    A joint goes as far as its range lets it; a tool makes a whole step or none.
+    A joint moves as far as its range allows; a tool makes a whole step or none.
     """
     joint = axis.joint
     if joint is None:
@@ -61,8 +61,8 @@ def step_pose(T_base_tool: Pose, axis: Axis, step: float, frame: Frame) -> Pose:
     Args:
         T_base_tool: The pose.
         axis: One of `AXES`; a turn leaves the tip where it is.
-        step: How far, [mm] or [deg].
-        frame: Whose axes.
+        step: Size of the step, [mm] or [deg].
+        frame: Frame of the axis.
     """
     index, amount = AXES.index(axis.name), axis.sign * step
     along, about = np.zeros(3), np.zeros(3)

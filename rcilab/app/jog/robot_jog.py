@@ -1,4 +1,4 @@
-"""The robot under the jog buttons: held through the supervisor, or by one checked motion a step; the goal goes along.
+"""The robot under the jog buttons: held through the supervisor, or one checked motion per step; the goal follows.
 
 Owned by the dispatcher's thread; it never waits for the robot.
 """
@@ -30,7 +30,7 @@ from rcilab.app.jog.jog_step import take_step
 from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.clearance import ADVISED_DISTANCE, link_name
 from rcilab.core.errors import RcilabError
@@ -42,21 +42,21 @@ if TYPE_CHECKING:
 
 
 class RobotJog:
-    """One jog of the robot after the other.
+    """Jogs of the robot, one at a time.
 
     Args:
         store: The state.
-        session: The robot side.
-        goal: Poses the goal.
+        session: The robot.
+        goal: Sets the goal.
     """
 
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
         self._store, self._session, self._goal = store, session, goal
-        self._request: PendingRequest | None = None  # On its way, until the arm stands.
-        self._followed: Goal | None = None  # The goal that was put where the arm was jogged to.
+        self._request: PendingRequest | None = None  # In progress, until the arm stands still.
+        self._followed: Goal | None = None  # The goal that was set to the jogged position.
 
     def begin(self) -> bool:
-        """Returns whether a button that is pressed now may move the robot; says why not."""
+        """Returns whether a button may move the robot now; shows why not."""
         state = self._store.state
         reason = no_jog(state, self._session.status())
         change_jog(self._store, said=reason)
@@ -71,14 +71,14 @@ class RobotJog:
         """Informs the control process that a button is still held; returns False when that moves nothing any more.
 
         Args:
-            axis: Which way.
-            stops: How many stops had been heard of when the button said so.
+            axis: Direction.
+            stops: Number of stops when the message of the button was sent.
         """
         state, status, request = self._store.state, self._session.status(), self._request
         if (request is not None and request.error is not None) or status.q_c is None or status.phase == "stopping":
             return False
         if request is not None and request.done and is_moving(status):
-            return True  # It ended in the moment of the press; the next word begins another one.
+            return True  # It ended just before the press; the next message begins another one.
         kind, values = jog_velocity(state.model, status.q_c, state.jog, axis)
         share, links = safe_share(state.model, status.q_c, kind, values)
         room = box_share(state.model, status.q_c, kind, values, state.setup.wanted.box)
@@ -97,21 +97,21 @@ class RobotJog:
                 kind, min(share, room) * values, continues=continues, stops=stops
             )
         except RcilabError as error:
-            change_jog(self._store, said=tell_error(error, status))
+            change_jog(self._store, said=explain_error(error, status))
             return False
         return True
 
     def let_go(self) -> None:
-        """Brings what is held to rest."""
-        with suppress(RcilabError):  # There is no supervisor, or none any more: nothing of ours moves.
+        """Stops the jog of a held button."""
+        with suppress(RcilabError):  # There is no supervisor, or no longer: nothing of ours moves.
             self._session.supervisor().release_jog()
 
     def step(self, axis: Axis, stops: int | None) -> None:
         """Makes one step: a planned motion, checked like any other, collisions too.
 
         Args:
-            axis: Which way.
-            stops: How many stops had been heard of when the button was pressed.
+            axis: Direction.
+            stops: Number of stops when the button was pressed.
         """
         state, status = self._store.state, self._session.status()
         reason = no_jog(state, status) or (message("ready.moving") if is_moving(status) else None)
@@ -138,16 +138,16 @@ class RobotJog:
         try:
             request = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
         except RcilabError as error:
-            change_jog(self._store, said=tell_error(error, status))
+            change_jog(self._store, said=explain_error(error, status))
             return
         self._store.remember()
         self._followed, self._request = None, request
 
     def watch(self, axis: Axis | None) -> bool:
-        """Has the goal follow the arm; returns False when the button that is held moves nothing any more.
+        """Has the goal follow the arm; returns False if the held button moves nothing any more.
 
         Args:
-            axis: What is held; None: nothing.
+            axis: The held button; None: none.
         """
         request = self._request
         if request is None:
@@ -165,11 +165,11 @@ class RobotJog:
         return request.error is None
 
     def forget(self) -> None:
-        """Drops what was jogged: it was another arm, or somewhere else."""
+        """Drops the jog: the arm or its destination has changed."""
         self._request = self._followed = None
 
     def _follow(self, q: JointVector) -> None:
-        if self._followed in (None, self._store.state.goal):  # Not when the goal was posed meanwhile.
+        if self._followed in (None, self._store.state.goal):  # Not if the goal was changed meanwhile.
             self._followed = self._goal.follow(q)
 
     def _end(self, request: PendingRequest, status: SupervisorStatus) -> None:
@@ -178,4 +178,4 @@ class RobotJog:
         self._request = self._followed = None
         if request.error is not None:
             is_stopped = status.phase == "idle"
-            change_jog(self._store, said=message("jog.stopped") if is_stopped else tell_error(request.error, status))
+            change_jog(self._store, said=message("jog.stopped") if is_stopped else explain_error(request.error, status))

@@ -1,1 +1,1 @@
-"""The Learn tab: the fault gallery, and lessons that watch what is done."""
+"""The Learn tab: the fault lab, and lessons that watch the learner's actions."""

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rcilab.app.exhibition import exhibit_fault
+from rcilab.app.displayed_motion import display_fault
 from rcilab.app.fault_lab import FaultDemo, FaultTable
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.learn.learn_state import LearnState, LessonState, Show
@@ -17,7 +17,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.recording import Recording
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import RcilabError
@@ -27,33 +27,33 @@ from rcilab.i18n.translator import message
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressLearn(Request):
-    """Something for the Learn tab."""
+    """A button of the Learn tab."""
 
     what: Literal["provoke", "cancel", "close", "moment", "script", "lesson", "skip", "leave"]
     fault: int = -1
     """Number of a fault."""
     name: str = ""
-    """Of a lesson."""
+    """Name of a lesson."""
 
 
 class LearnActions:
-    """The gallery never touches the robot of the page; lessons only watch."""
+    """The fault lab never touches the robot of the page; lessons only watch."""
 
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self._arm = PrivateArm()
-        self._work: BackgroundJob[FaultCode, FaultDemo] = BackgroundJob("gallery")
+        self._work: BackgroundJob[FaultCode, FaultDemo] = BackgroundJob("fault lab")
         self._watcher = Watcher()
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             PressLearn: self.press,
         }
 
     def press(self, request: PressLearn) -> None:
-        """Does what a button of the tab says."""
+        """Handles a button of the tab."""
         match request.what:
             case "provoke":
                 self._provoke(request.fault)
@@ -79,7 +79,7 @@ class LearnActions:
                 pass
 
     def tick(self) -> None:
-        """Shows how far a provocation is and what came of it; closes the show; looks what the learner has done."""
+        """Shows progress and result of a provocation; closes the display; checks the lesson's step."""
         learn = self._learn
         if self._work.is_done:
             self._finish(self._work.pop_result()[1])
@@ -115,7 +115,7 @@ class LearnActions:
 
     def _finish(self, result: FaultDemo | RcilabError) -> None:
         if isinstance(result, RcilabError):
-            self._set(provoking=None, problem=message("learn.failed", error=tell_error(result)))
+            self._set(provoking=None, problem=message("learn.failed", error=explain_error(result)))
             return
         state = self._store.state
         beside = None if state.plan is None else state.plan.motion
@@ -129,12 +129,12 @@ class LearnActions:
             self._store.update(place=0.0, playing=False)
 
     def _look_beside(self) -> None:
-        """Closes the show once something else is to be seen: another plan, another arm, a motion."""
+        """Closes the display once there is something else to show: another plan, another arm, a motion."""
         state, show = self._store.state, self._learn.show
         if show is None:
             return
         beside = None if state.plan is None else state.plan.motion
-        other = beside is not show.beside or state.model.name != show.exhibit.model.name
+        other = beside is not show.beside or state.model.name != show.demo.model.name
         if other or is_moving(self._session.status()):
             self._set(show=None)
 
@@ -152,20 +152,20 @@ class LearnActions:
         passed = lesson.skipped | {lesson.step} if skipped else lesson.skipped
         self._watcher = Watcher()
         self._set(lesson=replace(lesson, step=lesson.step + 1, skipped=passed))
-        if not skipped:  # Said on every tab: the person is where the step was done.
+        if not skipped:  # Shown on every tab: the learner is on the tab of the step.
             steps = LESSONS[lesson.name][lesson.step + 1 :]
             last = message("lesson.over") if not steps else message(f"lesson.{lesson.name}.{steps[0].name}")
             self._store.say("good", message("lesson.ticked", next=last))
 
 
-def make_show(exhibit: FaultDemo, beside: object) -> Show:
+def make_show(demo: FaultDemo, beside: object) -> Show:
     """Returns a fault as the page shows it."""
-    rows = exhibit.whole
+    rows = demo.whole
     return Show(
-        exhibit=exhibit,
-        exhibition=exhibit_fault(exhibit),
+        demo=demo,
+        displayed=display_fault(demo),
         recording=Recording(
-            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=exhibit.time
+            t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=demo.time
         ),
         beside=beside,
     )

@@ -1,4 +1,4 @@
-"""The Learn tab as a value: the fault on show, the one being provoked, the lesson and how far it is."""
+"""The state of the Learn tab: the displayed fault, the one in progress, the lesson and its step."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from rcilab.core.fault import FaultCode
 from rcilab.i18n.translator import Message
 
 if TYPE_CHECKING:
-    from rcilab.app.exhibition import Exhibition
+    from rcilab.app.displayed_motion import DisplayedMotion
     from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.app.store import UiState
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Show:
-    """A fault on show, as timeline and scene draw it."""
+    """A displayed fault, for timeline and scene."""
 
-    exhibit: FaultDemo
+    demo: FaultDemo
     """The fault."""
-    exhibition: Exhibition
+    displayed: DisplayedMotion
     recording: Recording
-    """What the arm did."""
+    """The motion of the arm."""
     beside: object
-    """The motion that was planned on the page when it opened; another one closes the show."""
+    """The plan of the page when the display opened; another plan closes the display."""
 
     @property
     def place(self) -> float:
-        """Where the timeline stands at the fault, 0 to 1; behind it comes the controlled stop."""
-        return self.exhibit.moment / max(self.exhibition.plan.motion.duration, CYCLE_TIME)
+        """Place of the fault on the timeline, 0 to 1; the controlled stop follows it."""
+        return self.demo.moment / max(self.displayed.plan.motion.duration, CYCLE_TIME)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -40,28 +40,28 @@ class LessonState:
 
     name: str
     step: int = 0
-    """From 0; the number of steps when it is over."""
+    """From 0; the number of steps if the lesson is finished."""
     skipped: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LearnState:
-    """Everything of the Learn tab."""
+    """The state of the Learn tab."""
 
     provoking: FaultCode | None = None
     progress: float = 0.0
-    """Of what is being provoked, 0 to 1."""
+    """Progress of the provocation, 0 to 1."""
     show: Show | None = None
     is_script_shown: bool = False
     problem: Message | None = None
-    """Why the last one did not come."""
+    """Why the last provocation failed."""
     lesson: LessonState | None = None
 
 
-def exhibited(state: UiState, *, scene: bool = False) -> UiState:
-    """Returns what timeline, or scene, are to draw: the fault on show, if there is one, in place of the plan."""
+def displayed_state(state: UiState, *, scene: bool = False) -> UiState:
+    """Returns the state for timeline, or scene: with the displayed fault, if there is one, in place of the plan."""
     show = state.learn.show
     if show is None:
         return state
-    seen = show.exhibition.scene if scene else show.exhibition.plan
+    seen = show.displayed.scene if scene else show.displayed.plan
     return replace(state, plan=seen, recording=show.recording)

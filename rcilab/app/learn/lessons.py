@@ -1,4 +1,4 @@
-"""The guided lessons: steps that watch the state of the page, and are done when the person has done them."""
+"""The guided lessons: steps that watch the state of the page and end when the learner has done them."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
-"""Whether it is done, from the state when the step began, the state of now, and how the robot is."""
+"""Whether the step is done, from the state at its beginning, the current state, and the robot's status."""
 
-_POSED = 0.15  # [rad] So far from the arm a goal was moved on purpose.
-_TURNED = 0.2  # [rad] of arm angle.
-_FAST = 0.95  # Share of the limits to plan with.
-_FELT = 3.0  # [N] More than an arm at rest feels.
+_POSED = 0.15  # [rad] At a larger distance from the arm, the learner has moved the goal on purpose.
+_TURNED = 0.2  # [rad] Change of the arm angle.
+_FAST = 0.95  # Speed to plan with, as a share of the limits.
+_FELT = 3.0  # [N] More than the external force of an arm at standstill.
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One thing to do."""
+    """One step."""
 
     name: str
-    """Its words are lesson.LESSON.NAME in the catalogues."""
+    """Its texts are lesson.LESSON.NAME in the catalogues."""
     is_done: Look
 
 
@@ -106,7 +106,7 @@ def _let_go(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 def _provoked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
     show = now.learn.show
-    return show is not None and show.exhibit.scenario.cuts_network
+    return show is not None and show.demo.scenario.cuts_network
 
 
 def _script(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
@@ -118,7 +118,7 @@ def _closed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 
 def lessons_of(model: RobotModel) -> tuple[str, ...]:
-    """Returns the names of the lessons that can be done with an arm."""
+    """Returns the names of the lessons for an arm."""
     maker = maker_of(model)
     possible = {
         "elbow": bool(model.redundancy),
@@ -165,13 +165,13 @@ LESSONS: Mapping[str, tuple[Step, ...]] = MappingProxyType(
 
 
 class Watcher:
-    """Looks at one step: remembers how the page was when it began."""
+    """Watches one step: it keeps the state of the page at its beginning."""
 
     def __init__(self) -> None:
         self._then: UiState | None = None
 
     def is_done(self, step: Step, state: UiState, status: SupervisorStatus) -> bool:
-        """Returns whether the person has done it; at the first look nothing is done yet."""
+        """Returns whether the learner has done it; never at the first call."""
         if self._then is None:
             self._then = state
             return step.is_done is _checked and step.is_done(state, state, status)

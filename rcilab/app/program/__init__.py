@@ -1,1 +1,1 @@
-"""The list of waypoints: drafting, checking, planning and storing it."""
+"""The program of waypoints: editing, checking, planning and saving it."""

@@ -23,7 +23,7 @@ LONGEST_NAME = 80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EditProgram(Request):
-    """Change the program of the Program tab, or what of it is selected."""
+    """Change the program of the Program tab, or its selection."""
 
     what: Literal[
         "select", "add", "teach", "via", "type", "delete", "duplicate", "up", "down", "move", "start", "aim", "undo",
@@ -32,10 +32,10 @@ class EditProgram(Request):
     key: int | None = None
     """Key of a step; None is the selected one."""
     source: Literal["here", "target"] = "here"
-    """Where a waypoint, or its via, comes from: the arm, or the goal."""
+    """Source of a waypoint, or its via point: the arm, or the goal."""
     type: str = ""
     place: int = 0
-    """Where to move a step, from 0."""
+    """New place of a step, from 0."""
 
 
 class EditActions:
@@ -43,13 +43,13 @@ class EditActions:
 
     Args:
         store: The state.
-        session: The robot side: where the arm stands.
-        goal: Led to a step's target, or where a step comes from.
-        shelves: The programs.
+        session: The robot; it reports the arm's position.
+        goal: Set to a step's target, or the source of a step.
+        history: The programs.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, shelves: ProgramHistory) -> None:
-        self._store, self._session, self._goal, self._shelves = store, session, goal, shelves
+    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, history: ProgramHistory) -> None:
+        self._store, self._session, self._goal, self._history = store, session, goal, history
         self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
             "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
@@ -59,33 +59,33 @@ class EditActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             EditProgram: self.edit,
         }
 
     def edit(self, request: EditProgram) -> None:
-        """Changes the program, or what of it is selected; what is not possible just now is reported."""
-        self._shelves.open()
+        """Changes the program, or its selection; what is not possible now is reported."""
+        self._history.open()
         whole = {
             "add": lambda: self._add(request), "start": self._start_here,
-            "undo": self._shelves.undo, "redo": self._shelves.redo,
-            "clear": lambda: self._shelves.change(Draft(model=self._draft.model), None),
-            "tool": lambda: self._shelves.change(replace(self._draft, tool=None), self._shelves.state.selected),
-            "script": lambda: self._shelves.set(is_script_shown=not self._shelves.state.is_script_shown),
+            "undo": self._history.undo, "redo": self._history.redo,
+            "clear": lambda: self._history.change(Draft(model=self._draft.model), None),
+            "tool": lambda: self._history.change(replace(self._draft, tool=None), self._history.state.selected),
+            "script": lambda: self._history.set(is_script_shown=not self._history.state.is_script_shown),
         }  # fmt: skip
         if request.what in whole:
             whole[request.what]()
             return
-        key = self._shelves.state.selected if request.key is None else request.key
+        key = self._history.state.selected if request.key is None else request.key
         if key is None or self._draft.place(key) is None:
             self._store.say("warn", message("program.select"))
             return
         self._edits[request.what](request, key)
 
     def type_field(self, request: TypeField) -> None:
-        """Takes what was typed about a step, the rounds or the name, or says beside the field what is wrong with it."""
-        self._shelves.open()
+        """Takes a typed value of a step, the rounds or the name, or shows the problem next to its field."""
+        self._history.open()
         _, key, name = (*request.field.split("."), "", "")[:3]
         waypoint = self._draft.waypoint(int(key)) if key.isdecimal() else None
         if name == "name":
@@ -93,28 +93,28 @@ class EditActions:
         elif name == "rounds":
             parsed = parse_number(request.text, 1, MOST_ROUNDS, "")
             if parsed.value is not None and parsed.value != round(parsed.value):
-                self._shelves.answer(request.field, message("program.whole", typed=request.text[:40]))
-            elif self._shelves.answer(request.field, parsed.problem) and parsed.value is not None:
-                self._shelves.interrupt()
-                self._shelves.set(rounds=int(parsed.value), planned=None, answer=None)
+                self._history.answer(request.field, message("program.whole", typed=request.text[:40]))
+            elif self._history.answer(request.field, parsed.problem) and parsed.value is not None:
+                self._history.interrupt()
+                self._history.set(rounds=int(parsed.value), planned=None, answer=None)
         elif waypoint is not None:
             made = proposed(waypoint, name, request.text, self._draft.arm(self._store.state.model))
-            if made is not None and self._shelves.answer(request.field, made if isinstance(made, Message) else None):
+            if made is not None and self._history.answer(request.field, made if isinstance(made, Message) else None):
                 assert isinstance(made, Waypoint)
-                self._shelves.change(self._draft.changed(int(key), made), int(key), typed=True)
+                self._history.change(self._draft.changed(int(key), made), int(key), typed=True)
 
     @property
     def _draft(self) -> Draft:
-        return self._shelves.draft
+        return self._history.draft
 
     def _rename(self, request: TypeField) -> None:
         name = request.text.strip()
         good = name.isprintable() and len(name) <= LONGEST_NAME
-        if self._shelves.answer(request.field, None if good else message("program.name_bad", most=LONGEST_NAME)):
-            self._shelves.rename(name)
+        if self._history.answer(request.field, None if good else message("program.name_bad", most=LONGEST_NAME)):
+            self._history.rename(name)
 
     def _configuration(self, source: str) -> JointVector | None:
-        """Returns the joint angles of the arm or of the goal; what they lack is said."""
+        """Returns the joint angles of the arm or of the goal; reports why there are none."""
         state, here = self._store.state, self._session.status().q_c
         if source == "target":
             if state.goal.reach.short is not None:
@@ -128,7 +128,7 @@ class EditActions:
         q = self._configuration(request.source)
         if q is None:
             return
-        draft, chosen = self._draft, self._draft.waypoint(self._shelves.state.selected)
+        draft, chosen = self._draft, self._draft.waypoint(self._history.state.selected)
         if draft.start is None:
             here = self._session.status().q_c
             draft = replace(draft, start=tuple((q if here is None else here).tolist()))
@@ -136,21 +136,21 @@ class EditActions:
         if chosen is not None:
             waypoint = replace(waypoint, speed=chosen.speed, blend=chosen.blend)
             waypoint = replace(waypoint, type="line" if chosen.type != "joint" else "joint")
-        self._shelves.change(*draft.inserted(waypoint, self._shelves.state.selected))
+        self._history.change(*draft.inserted(waypoint, self._history.state.selected))
 
     def _start_here(self) -> None:
         q = self._configuration("here")
         if q is not None and self._draft.steps:
-            self._shelves.change(replace(self._draft, start=tuple(q.tolist())), self._shelves.state.selected)
+            self._history.change(replace(self._draft, start=tuple(q.tolist())), self._history.state.selected)
 
     def _select(self, request: EditProgram, key: int) -> None:
-        """Chooses a step; while the plan is of this program, the preview goes there."""
-        if key != self._shelves.state.selected:
+        """Selects a step; if the plan is that of the program, the preview moves there."""
+        if key != self._history.state.selected:
             self._store.clear_problems("program.")
-        self._shelves.set(selected=key)
+        self._history.set(selected=key)
         state, place = self._store.state, self._draft.place(key)
         plan = state.plan
-        if plan is None or plan.program is None or place is None or self._shelves.state.planned is not self._draft:
+        if plan is None or plan.program is None or place is None or self._history.state.planned is not self._draft:
             return
         if place < len(plan.program.waypoints):
             self._store.update(place=time_at(plan, place + 1) / max(plan.motion.duration, 1e-3), playing=False)
@@ -163,7 +163,7 @@ class EditActions:
             self._store.say("warn", message("program.no_target"))
             return
         taught = replace(waypoint, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
-        self._shelves.change(self._draft.changed(key, taught), key)
+        self._history.change(self._draft.changed(key, taught), key)
 
     def _via(self, request: EditProgram, key: int) -> None:
         q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
@@ -171,7 +171,7 @@ class EditActions:
             return
         pose = self._draft.arm(self._store.state.model).forward(q)
         via = replace(waypoint, via=tuple(pose.position.tolist()), via_wxyz=tuple(pose.wxyz.tolist()))
-        self._shelves.change(self._draft.changed(key, via), key)
+        self._history.change(self._draft.changed(key, via), key)
 
     def _retype(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
@@ -187,27 +187,27 @@ class EditActions:
                 self._store.say("warn", message("program.no_way"))
                 return
             self._store.say("good", message("program.via_made"))
-        self._shelves.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
+        self._history.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
 
     def _delete(self, request: EditProgram, key: int) -> None:
         place = self._draft.place(key) or 0
         draft = self._draft.without(key)
         left = draft.steps[min(place, len(draft.steps) - 1)].key if draft.steps else None
-        self._shelves.change(draft, left)
+        self._history.change(draft, left)
 
     def _duplicate(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)
         assert waypoint is not None
-        self._shelves.change(*self._draft.inserted(waypoint, key))
+        self._history.change(*self._draft.inserted(waypoint, key))
 
     def _move(self, key: int, step: int) -> None:
         place = self._draft.place(key)
         if place is not None and 0 <= place + step < len(self._draft.steps):
-            self._shelves.change(self._draft.moved(key, place + step), key)
+            self._history.change(self._draft.moved(key, place + step), key)
 
     def _move_to(self, request: EditProgram, key: int) -> None:
         if self._draft.place(key) != request.place:
-            self._shelves.change(self._draft.moved(key, request.place), key)
+            self._history.change(self._draft.moved(key, request.place), key)
 
     def _aim(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)

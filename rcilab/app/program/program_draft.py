@@ -1,4 +1,4 @@
-"""The program being edited: values, and the edits that return new ones."""
+"""The program that is edited: values, and edits that return new ones."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from rcilab.motion.program import Program
 from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
-"""What the page makes; circles and elbow moves come from files."""
+"""The types that the page can create; circles and elbow moves come from files."""
 FILE_FIELD = "program.0.file"
-"""Names what is wrong with a file among `UiState.problems`."""
+"""Name of a problem of a file in `UiState.problems`."""
 MOST_ROUNDS = 100
-"""More is not watched, and the motion stays one that can be looked at."""
+"""Largest number of rounds: a longer motion could not be inspected."""
 
 _KEYS = count(1)
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A waypoint that can be distinguished from all others, equal or not."""
+    """A waypoint with a key that distinguishes it from all others, equal or not."""
 
     key: int
     waypoint: Waypoint
@@ -35,19 +35,19 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Draft:
-    """A program that may still be empty."""
+    """A program that may be empty."""
 
     model: str = ""
-    """Name of the arm; a draft for none is empty."""
+    """Name of the arm; "" for an empty draft."""
     start: Floats | None = None
     """Joint angles at the start, [rad]; None until there is a waypoint."""
     steps: tuple[Step, ...] = ()
     name: str = ""
     tool: Floats | None = None
-    """Pose of the tool in the flange frame, as in `Program`; None is the page's."""
+    """Pose of the tool in the flange frame, as in `Program`; None: the tool of the page."""
 
     def place(self, key: int | None) -> int | None:
-        """Returns where a step stands, from 0, or None for an unknown key."""
+        """Returns the place of a step, from 0, or None for an unknown key."""
         return next((place for place, step in enumerate(self.steps) if step.key == key), None)
 
     def waypoint(self, key: int | None) -> Waypoint | None:
@@ -77,9 +77,9 @@ class Draft:
         return replace(self, steps=tuple(Step(key, waypoint) if step.key == key else step for step in self.steps))
 
     def program(self, model: RobotModel, upto: int | None = None) -> Program | None:
-        """Returns the program, or the part of it up to a step; None while there is nothing in it.
+        """Returns the program, or its part up to a step; None if it is empty.
 
-        The tool of the page is written into it, so that file and script mean the same motion anywhere.
+        The tool of the page is written into it, so that file and script describe the same motion anywhere.
         """
         last = self.place(upto)
         steps = self.steps if last is None else self.steps[: last + 1]
@@ -91,7 +91,7 @@ class Draft:
         )
 
     def has_tool_of(self, model: RobotModel) -> bool:
-        """Returns whether the program is for the tool that the page has."""
+        """Returns whether the program is for the tool of the page."""
         return self.tool is None or self.arm(model).T_flange_tool.is_close(model.T_flange_tool)
 
     def arm(self, model: RobotModel) -> RobotModel:
@@ -101,22 +101,22 @@ class Draft:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """What the planner remarks, about one step or about all."""
+    """A remark of the planner, about one step or about all."""
 
     remark: str
-    """A `Remark` where it has words of its own in the catalogues."""
+    """A `Remark` if it has a text in the catalogues."""
     key: int | None
-    """Of the step; None: about the whole program."""
+    """Key of the step; None: about the whole program."""
 
     @property
     def code(self) -> str:
-        """Names what it says; "" where it is a plain sentence."""
+        """Code of the remark; "" for a plain sentence."""
         return self.remark.code if isinstance(self.remark, Remark) else ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ProgramState:
-    """The Program tab."""
+    """The state of the Program tab."""
 
     draft: Draft = field(default_factory=Draft)
     selected: int | None = None
@@ -124,27 +124,27 @@ class ProgramState:
     can_undo: bool = False
     can_redo: bool = False
     rounds: int = 1
-    """How often to go through it."""
+    """Number of rounds."""
     is_script_shown: bool = False
     progress: float | None = None
-    """Of the planning in progress, 0 to 1."""
+    """Progress of the planning, 0 to 1."""
     planned: Draft | None = None
-    """What was planned last."""
+    """The program that was planned last."""
     tone: Tone = "good"
     answer: Message | None = None
-    """What came of it beside the plan: the path to the start, or why it was not found."""
+    """The result next to the plan: the approach to the start, or why there is none."""
     notes: tuple[Note, ...] = ()
-    """What the planner remarks about the plan."""
+    """The planner's remarks about the plan."""
     failed: int | None = None
-    """Key of the step that could not be planned, or that breaks a condition."""
+    """Key of the step that cannot be planned, or that violates a condition."""
 
 
 def notes_of(plan: Plan, steps: tuple[Step, ...]) -> tuple[Note, ...]:
-    """Returns what the planner remarks about a plan, each once, however many rounds it makes.
+    """Returns the planner's remarks about a plan, each once, for any number of rounds.
 
     Args:
-        plan: Of a program.
-        steps: What the program was made of.
+        plan: Plan of a program.
+        steps: The steps of that program.
     """
     notes: dict[tuple[str, int | None], Note] = {}
     for remark in plan.motion.notes:
@@ -155,7 +155,7 @@ def notes_of(plan: Plan, steps: tuple[Step, ...]) -> tuple[Note, ...]:
 
 
 def draft_of(program: Program, model: RobotModel) -> Draft:
-    """Returns a program to edit; where it is for the tool of the page, it goes with that from here on.
+    """Returns a program as a draft; if it is for the tool of the page, it follows changes of that tool.
 
     Args:
         program: The program.
@@ -167,24 +167,24 @@ def draft_of(program: Program, model: RobotModel) -> Draft:
 
 
 def tool_of(model: RobotModel) -> Floats:
-    """Returns the page's tool as programs have it."""
+    """Returns the page's tool in the form of programs."""
     T = model.T_flange_tool
     return (*T.position.tolist(), *T.wxyz.tolist())
 
 
 def target_of(waypoint: Waypoint, arm: RobotModel) -> Pose | None:
-    """Returns where a waypoint leads the tool; None where that depends on where it comes from."""
+    """Returns the pose of the tool at a waypoint; None if it depends on the previous waypoint."""
     return waypoint.pose if waypoint.q is None else arm.forward(waypoint.q)
 
 
 def is_led_in(plan: Plan) -> bool:
-    """Returns whether the plan of a program begins with the way to its start."""
+    """Returns whether the plan of a program begins with the approach to its start."""
     assert plan.program is not None
     return (len(plan.motion.segment_starts) + 1) % (len(plan.program.waypoints) + 1) == 1
 
 
 def number_at(plan: Plan, time: float) -> int | None:
-    """Returns the number of the waypoint that the motion leads to at a time, from 1; 0 on the way to the start."""
+    """Returns the number of the waypoint that the motion leads to at a time, from 1; 0 during the approach."""
     if plan.program is None:
         return None
     segment = int(np.searchsorted(plan.motion.segment_starts, time, side="right")) - 1 - is_led_in(plan)
@@ -193,13 +193,13 @@ def number_at(plan: Plan, time: float) -> int | None:
 
 
 def time_at(plan: Plan, number: int) -> float:
-    """Returns when the motion first reaches the end of a waypoint's segment, dwell included, [s]."""
+    """Returns the time at which the motion first reaches the end of a waypoint's segment, with its dwell, [s]."""
     segment = number - 1 + is_led_in(plan)
     starts = plan.motion.segment_starts
     return float(starts[segment + 1]) if segment + 1 < len(starts) else plan.motion.duration
 
 
-def tell_place(plan: Plan, time: float) -> Message | None:
+def describe_place(plan: Plan, time: float) -> Message | None:
     """Returns the name of the segment at a time of a program's plan."""
     number = number_at(plan, time)
     if number is None or plan.program is None:

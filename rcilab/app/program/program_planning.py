@@ -1,4 +1,4 @@
-"""The planning of a program from beginning to end, as it is done beside the dispatcher's thread."""
+"""The planning of a program from start to end, in another thread than the dispatcher's."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from rcilab.motion.joint import JointLaw
 from rcilab.motion.program import Program
 
 PROGRAM_LAW: JointLaw = "torque_rate_limited"
-"""How programs run: they may take a hundredth of their time longer to keep what the manual recommends."""
-_MOTION, _JUDGED = 0.75, 0.8
-"""Parts of the work when the motion is made, and when all but collisions has been looked at; about what was seen."""
+"""Options of programs: they may take a hundredth of their time longer to keep the manual's recommendations."""
+_MOTION, _CHECKED = 0.75, 0.8
+"""Progress when the motion is planned, and when all but collisions is checked; about as measured."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
-    """What is to be planned."""
+    """A program to plan."""
 
     model: RobotModel
     draft: Draft
     program: Program
-    """The draft, or the first part of it."""
+    """The draft, or its first part."""
     here: JointVector
-    """Where the arm stands, [rad]."""
+    """The arm's position, [rad]."""
     rounds: int
     box: SafetyBox | None
-    """The safety box to check with."""
+    """The safety box of the check."""
 
 
-def plan_job(job: Job, tell: ProgressCallback) -> Plan:
+def plan_job(job: Job, progress: ProgressCallback) -> Plan:
     """Returns the plan of a program."""
     motion = plan_program(
         job.model,
@@ -45,11 +45,11 @@ def plan_job(job: Job, tell: ProgressCallback) -> Plan:
         start=job.here,
         rounds=job.rounds,
         law=PROGRAM_LAW,
-        progress=lambda part: tell(_MOTION * part),
+        progress=lambda part: progress(_MOTION * part),
         max_rows=MOTION_ROWS,
     )
-    tell(_MOTION)
+    progress(_MOTION)
     report = check(motion, job.model, start=job.here, box=job.box, distance=None)
     plan = replace(build_plan_view(job.model, motion, report, job.box), program=job.program)
-    tell(_JUDGED)
+    progress(_CHECKED)
     return plan.completed()

@@ -1,4 +1,4 @@
-"""Typed numbers of a waypoint: what each field may hold, and the waypoint that comes of it."""
+"""Typed numbers of a waypoint: the range of each field, and the waypoint with the number."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.waypoint import LARGEST_BLEND, LONGEST_DWELL, Waypoint
 
 VIA_FIELDS = ("via_x", "via_y", "via_z")
-_BULGE = 0.25  # How far to the side of a new arc's way its via is, as a part of the way.
-_NO_WAY = 1e-3  # [m] From here on an arc is worth the name.
+_BULGE = 0.25  # Distance of a new via point from the straight line, as a part of the line's length.
+_NO_WAY = 1e-3  # [m] A shorter line gets no arc.
 
 _Take = Callable[[Waypoint, float], Waypoint]
 _PLAIN: dict[str, tuple[float, float, str, _Take]] = {
@@ -32,15 +32,15 @@ _PLAIN: dict[str, tuple[float, float, str, _Take]] = {
 
 
 def proposed(waypoint: Waypoint, field: str, typed: str, arm: RobotModel) -> Waypoint | Message | None:
-    """Returns the waypoint with a typed number in it, what is wrong with that, or None for a field it has not.
+    """Returns the waypoint with a typed number, the problem of that number, or None for a field that it lacks.
 
-    Numbers of the pose and the arm angle make a pose of joint angles: they cannot both be kept.
+    Numbers of the pose and the arm angle replace joint angles by a pose: both cannot be kept.
 
     Args:
-        waypoint: As it is.
+        waypoint: The waypoint.
         field: speed, blend, dwell, psi, x ... yaw, via_x, via_y, via_z.
-        typed: As it stands in the field.
-        arm: With the program's tool.
+        typed: The text of the field.
+        arm: The arm with the program's tool.
     """
     if field in _PLAIN:
         low, high, unit, take = _PLAIN[field]
@@ -79,7 +79,7 @@ def proposed(waypoint: Waypoint, field: str, typed: str, arm: RobotModel) -> Way
 
 
 def as_pose(waypoint: Waypoint, arm: RobotModel) -> Waypoint:
-    """Returns a waypoint whose target is a pose, with the arm angle of its joint angles, instead of these."""
+    """Returns a waypoint whose joint angles are replaced by their pose and arm angle."""
     if waypoint.q is None:
         return waypoint
     T = arm.forward(waypoint.q)
@@ -93,7 +93,7 @@ def as_pose(waypoint: Waypoint, arm: RobotModel) -> Waypoint:
 
 
 def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
-    """Returns the arm angle that a waypoint leads to, [rad]; None where it has none, or leaves it open."""
+    """Returns the arm angle of a waypoint, [rad]; None if there is none, or if it is left open."""
     if waypoint.q is None or not arm.redundancy:
         return waypoint.psi
     try:
@@ -103,7 +103,7 @@ def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
 
 
 def default_via(draft: Draft, key: int, arm: RobotModel) -> Array | None:
-    """Returns a point beside the straight way to a step, for an arc over it, [m]; None where there is no way."""
+    """Returns a point next to the straight line to a step, for an arc over it, [m]; None if there is no line."""
     place = draft.place(key)
     if place is None or draft.start is None:
         return None

@@ -1,1 +1,1 @@
-"""What happens on the robot: readiness, execution, pushes, recordings and their exports."""
+"""The robot: readiness, execution, pushes, recordings and their exports."""

@@ -1,4 +1,4 @@
-"""What can press on the arm from the page: the settings, the push of this moment, the spring in the mouse's hand."""
+"""Forces on the arm from the page: the settings, the current push, the spring between arm and mouse."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-STRONGEST = 60.0  # [N] What one hand does without effort.
-SPRING = 200.0  # [N/m] between the grabbed point and the mouse: 0.3 m of pull is all the force there is.
-TOOL = 0  # Where a link's number stands: the tool.
+STRONGEST = 60.0  # [N] About what one hand exerts without effort.
+SPRING = 200.0  # [N/m] between the grabbed point and the mouse: a pull of 0.3 m gives the largest force.
+TOOL = 0  # The tool, in the place of a link's number.
 WAYS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
 DIRECTIONS = MappingProxyType(
     {
@@ -35,44 +35,44 @@ DIRECTIONS = MappingProxyType(
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ActiveForce:
-    """What presses on the arm now."""
+    """The force on the arm now."""
 
     link: int
     """From 1; `TOOL`: the tool."""
     start: Vector3
-    """Where it acts, base axes, shape (3,), [m]."""
+    """Point of application, base axes, shape (3,), [m]."""
     force: Vector3
     """Base axes, shape (3,), [N]."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PushState:
-    """How the page pushes the arm, and how it is to be guided."""
+    """Settings of pushes and hand guiding."""
 
     link: int = TOOL
     direction: str = "+y"
     newtons: float = 20.0
     grab: bool = True
-    """Whether the mouse can take hold of the arm in the scene."""
+    """Whether the mouse can grab the arm in the scene."""
     way: str = WAYS[0]
     """Space and kind of hand guiding, as "space.kind"."""
     acting: ActiveForce | None = None
 
     @property
     def force(self) -> Vector3:
-        """What the button does, base axes, shape (3,), [N]."""
+        """The force of the button, base axes, shape (3,), [N]."""
         return self.newtons * np.array(DIRECTIONS[self.direction])
 
 
 def spring_force(grabbed: Vector3, hand: Vector3) -> Vector3:
-    """Returns the pull of the spring between a point of the arm and the mouse, at most `STRONGEST`, shape (3,), [N]."""
+    """Returns the force of the spring between a point of the arm and the mouse, up to `STRONGEST`, shape (3,), [N]."""
     force = SPRING * (hand - grabbed)
     size = float(np.linalg.norm(force))
     return force if size <= STRONGEST else force * (STRONGEST / size)
 
 
 def place_of(model: RobotModel, q: JointVector, link: int, point: Vector3) -> Vector3:
-    """Returns where a point of a link is in base, shape (3,), [m].
+    """Returns the position of a point of a link in base, shape (3,), [m].
 
     Args:
         model: The arm.
@@ -85,7 +85,7 @@ def place_of(model: RobotModel, q: JointVector, link: int, point: Vector3) -> Ve
 
 
 def no_push(status: SupervisorStatus) -> Message | None:
-    """Returns why nothing on this page can push the arm, or None when it can."""
+    """Returns why this page cannot push the arm, or None if it can."""
     if status.world_address is not None:
         return None
     if status.target == "virtual":
@@ -94,12 +94,12 @@ def no_push(status: SupervisorStatus) -> Message | None:
 
 
 def is_guided(status: SupervisorStatus) -> bool:
-    """Returns whether the arm is free for a hand to guide it."""
+    """Returns whether the arm can be guided by hand."""
     return status.code == "moving.guided"
 
 
 def gives_way(status: SupervisorStatus) -> bool:
-    """Returns whether forces move the arm: it is guided, or a motion runs in torques or under an impedance."""
+    """Returns whether forces move the arm: hand guiding, or a motion with torques or impedance."""
     is_soft = status.mode in ("joint_impedance", "cartesian_impedance", "torque")
     return is_guided(status) or (status.code in ("moving", "moving.held") and is_soft)
 

@@ -25,21 +25,21 @@ DESTINATIONS: tuple[Destination, ...] = ("preview", "ideal", "mujoco", "address"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DriveState:
-    """How motions are executed."""
+    """Settings of the execution of motions."""
 
     mode: Mode = "joint_position"
     control: ControllerParameters | None = None
-    """Parameters as the operator wants them, all of them; None: unchanged."""
+    """All parameters as set by the operator; None: unchanged."""
     refusal: Message | None = None
-    """Why the controller did not take them."""
+    """Why the controller refused them."""
     speed_override: float = 1.0
-    """Part of the planned speed to run at."""
+    """Speed override, as a part of the planned speed."""
     override_refusal: Message | None = None
-    """Why the motion in progress did not take another one."""
+    """Why the motion in progress refused another speed override."""
 
 
 def choose_mode(store: StateStore[AppState], mode: Mode) -> None:
-    """Chooses how motions are commanded; the plan is checked by the conditions of that mode."""
+    """Chooses the command mode; the plan is checked by the conditions of that mode."""
     state = store.state
     plan = None if state.plan is None else state.plan.completed(mode)
     store.update(drive=replace(state.drive, mode=mode), plan=plan)
@@ -55,23 +55,23 @@ def control_field(model: RobotModel, name: str) -> tuple[ParameterGroup, int] | 
 
 
 def is_pending(state: AppState, status: SupervisorStatus) -> bool:
-    """Returns whether the controller has not taken the parameters yet."""
+    """Returns whether the controller has not accepted the parameters yet."""
     return is_control_pending(state.drive.control, status.setup.control)
 
 
 def parameter_obstacle(state: AppState, status: SupervisorStatus) -> Message | None:
-    """Returns why nothing may run with these parameters, or None when the controller has them."""
+    """Returns why no motion may run with these parameters, or None if the controller has them."""
     address = None if state.target == "virtual" else state.target
     return control_obstacle(state.drive.control, status.setup.control, state.drive.refusal, address)
 
 
 def destination(state: AppState, status: SupervisorStatus) -> Destination:
-    """Returns where motions go just now."""
+    """Returns where motions go now."""
     if status.phase == "closed":
         return "preview"
     return state.plant if state.target == "virtual" else "address"
 
 
 def is_ours(status: SupervisorStatus) -> bool:
-    """Returns whether the controller is our own, which lets the world in."""
+    """Returns whether the controller is our own, with a simulation port."""
     return status.world_address is not None

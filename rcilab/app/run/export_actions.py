@@ -1,4 +1,4 @@
-"""Taking the last run away: written in a thread of its own, then sent to the page that asked."""
+"""Exports of the last run: written in a separate thread, then sent to the page that asked."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tempfile import TemporaryFile
 from typing import IO, TYPE_CHECKING, TypeAlias
 
 from rcilab.app.request import Handlers, Request
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import message
 from rcilab.recording.export import write_export
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 ENDINGS = (".csv", ".parquet", ".mcap", ".html", ".rcirun")
-"""What the page offers, in the order of its buttons."""
+"""The formats, in the order of the buttons."""
 
 Deliver: TypeAlias = Callable[["int | None", str, "IO[bytes]", Callable[[], bool]], bool]
-"""Sends a file to a page: client id or None, name, content, whether to give up; returns whether all was sent."""
+"""Sends a file to a page: client id or None, name, content, whether to cancel; returns whether all was sent."""
 
-_STEP = 0.05  # Share between two updates of the progress bar.
+_STEP = 0.05  # Smallest change of the progress that is shown.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportRun(Request):
-    """The last run as a file, through the browser."""
+    """Export the last run as a file, through the browser."""
 
     ending: str
     """.csv, .parquet, .mcap, .html or .rcirun."""
@@ -54,14 +54,14 @@ class Export:
 
     ending: str
     share: float
-    """0 to 1."""
+    """Progress, 0 to 1."""
 
 
 class ExportActions:
-    """Exports are made one after the other; the dispatcher's thread starts them and never waits.
+    """Exports, one at a time; the dispatcher's thread starts them and never waits.
 
     Args:
-        store: Where the run and the progress are.
+        store: Has the run and the progress.
         deliver: Sends a file to a page.
     """
 
@@ -72,14 +72,14 @@ class ExportActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             ExportRun: self.export,
             CancelExport: self.cancel,
         }
 
     def export(self, request: ExportRun) -> None:
-        """Begins an export; refused while another one is in progress."""
+        """Starts an export; refused while another one is in progress."""
         recording = self._store.state.last_run
         run = None if recording is None else recording.run
         if request.ending not in ENDINGS:
@@ -97,18 +97,18 @@ class ExportActions:
             self._worker.start()
 
     def cancel(self, request: CancelExport) -> None:
-        """Cancels the export in progress, at its next report of progress."""
+        """Cancels the export in progress, at its next progress report."""
         self._unwanted.set()
 
     def close(self) -> None:
-        """Ends an export in progress."""
+        """Cancels the export in progress."""
         self._unwanted.set()
         if self._worker is not None:
             self._worker.join(10.0)
 
     def _write(self, run: Run, ending: str, page: int | None) -> None:
         try:
-            with TemporaryFile(prefix="rcilab-") as stream:  # A long run does not fit into memory as text.
+            with TemporaryFile(prefix="rcilab-") as stream:  # As text, a long run does not fit into memory.
                 state = self._store.state
                 write_export(
                     run, ending, stream, progress=self._follow(ending), language=state.language, units=state.units
@@ -124,8 +124,8 @@ class ExportActions:
         except MemoryError:
             self._store.say("bad", message("export.memory"))
         except RcilabError as error:
-            self._store.say("bad", tell_error(error))
-        except Exception as error:  # A bug of ours must not pass for a download.
+            self._store.say("bad", explain_error(error))
+        except Exception as error:  # After a bug of ours, no incomplete file must be sent.
             traceback.print_exc(file=sys.stderr)
             self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
@@ -149,7 +149,7 @@ class ExportActions:
 
 
 def file_name(run: Run, ending: str) -> str:
-    """Returns what the browser saves a run as."""
+    """Returns the file name for the browser."""
     stamp = (
         time.strftime("%Y%m%d-%H%M%S", time.localtime(run.setup.started_ns * 1e-9)) if run.setup.started_ns else "run"
     )

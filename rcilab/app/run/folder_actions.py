@@ -1,4 +1,4 @@
-"""Deletes recorded runs, after a second press. Owned by the dispatcher's thread."""
+"""Deletes recorded runs, after a confirmation. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from rcilab.i18n.translator import message
 from rcilab.recording.folder import keep_newest, stored_runs
 
 KEEPS = (100, 20, 5, 0)
-"""How many runs may be kept."""
+"""Choices for the number of runs to keep."""
 
 _LOOK = 5.0  # [s] Between two reads of the folder.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClearRuns(Request):
-    """Delete recorded runs but for the newest ones."""
+    """Delete recorded runs except for the newest ones."""
 
     what: Literal["choose", "ask", "confirm", "cancel"]
     keep: int
-    """How many stay."""
+    """Number of runs to keep."""
 
 
 class FolderActions:
-    """Looks how large the folder is, and deletes old runs.
+    """Measures the folder, and deletes old runs.
 
     Args:
-        store: Where the folder is named and its size is shown.
+        store: Has the folder's path and size.
     """
 
     def __init__(self, store: Store) -> None:
@@ -39,13 +39,13 @@ class FolderActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             ClearRuns: self.clear,
         }
 
     def clear(self, request: ClearRuns) -> None:
-        """Asks first, then deletes all runs but the newest ones; a run that is being recorded stays."""
+        """Asks first, then deletes all runs except for the newest ones; a run in progress is kept."""
         folder, state = self._store.state.folder, self._store.state
         if request.keep not in KEEPS or state.runs is None:
             return
@@ -63,7 +63,7 @@ class FolderActions:
             self._store.say("good", message("runs.cleared", count=gone.count, size=megabytes(gone.size)))
 
     def tick(self) -> None:
-        """Looks into the folder now and then."""
+        """Reads the folder from time to time."""
         runs, now = self._store.state.runs, time.monotonic()
         if runs is None or now < self._next:
             return
@@ -79,5 +79,5 @@ class FolderActions:
 
 
 def megabytes(size: int) -> str:
-    """Returns a size in words, [bytes]."""
+    """Returns a size, [bytes], as text."""
     return f"{size / 1e9:.2f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

@@ -13,7 +13,7 @@ from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.drive_state import choose_mode, control_field, is_pending
 from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT, ask_to_send, find_group, with_number
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.run.requested_speed import RequestedSpeed, is_running, tell_override_refusal
+from rcilab.app.run.requested_speed import RequestedSpeed, describe_override_refusal, is_running
 from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.state_store import StateStore
 from rcilab.core.errors import RcilabError
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetDrive(Request):
-    """How to drive the arm; what is None stays."""
+    """Settings of the execution; None leaves a value unchanged."""
 
     mode: str | None = None
     """One of `rcilab.core.state.MODES`."""
     speed_override: float | None = None
-    """Part of the planned speed, 0.1 to 1."""
+    """Speed override, as a part of the planned speed, 0.1 to 1."""
 
     @property
     def replaces(self) -> str | None:  # noqa: D102
@@ -57,32 +57,32 @@ class SetControl(Request):
     group: str
     """Name of the group."""
     index: int
-    """In the group, from 0."""
+    """Index in the group."""
     value: float
 
 
 class ModeActions:
-    """Mode, parameters, pause, speed override. A virtual controller gets them at once, another one at a second press.
+    """Mode, parameters, pause, speed override. A virtual controller gets them at once, others after a confirmation.
 
     Args:
         store: The state.
         session: The robot.
-        keeps_rest: Whether parameters that were not changed stay as the controller has them; otherwise it gets the
-            standard ones with the first that is changed.
+        keeps_rest: Whether the controller keeps its other parameters; otherwise it gets the standard values of these
+            with the first change.
     """
 
     def __init__(self, store: StateStore[AppState], session: Connection, *, keeps_rest: bool = False) -> None:
         self._store, self._session, self._keeps_rest = store, session, keeps_rest
         self._was_running = False
-        self._post = ConfigurationSender(session, self._refuse)
+        self._sender = ConfigurationSender(session, self._refuse)
         self._wish = RequestedSpeed()
-        self._changing: tuple[float, PendingRequest] | None = None  # A speed override that the robot has not taken yet.
+        self._changing: tuple[float, PendingRequest] | None = None  # A speed override that awaits its answer.
         self._asked_to_send = -math.inf
         self._arm = store.state.model.name
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             SetDrive: self.set_drive,
             PressControl: self.press,
@@ -90,7 +90,7 @@ class ModeActions:
         }
 
     def set_drive(self, request: SetDrive) -> None:
-        """Chooses a mode, whose conditions the plan is then checked by, or a speed override; ignores unknown ones."""
+        """Chooses a mode, by whose conditions the plan is then checked, or a speed override; ignores invalid ones."""
         state, status = self._store.state, self._session.status()
         if request.mode in MODES and request.mode != state.drive.mode:
             if is_moving(status):
@@ -104,17 +104,17 @@ class ModeActions:
             self._wish.choose(speed_override, status)
 
     def pause(self) -> None:
-        """Holds the motion in progress."""
+        """Pauses the motion in progress."""
         if self._require_motion():
             self._wish.hold()
 
     def resume(self) -> None:
-        """Goes on with a motion that is held."""
+        """Resumes a paused motion."""
         if self._require_motion():
             self._wish.go_on(self._store.state.drive.speed_override)
 
     def type_field(self, request: TypeField) -> None:
-        """Takes a typed parameter, or says beside the field what is wrong with it."""
+        """Takes a typed parameter, or shows the problem next to its field."""
         state = self._store.state
         found = control_field(state.model, request.field)
         if found is None:
@@ -130,7 +130,7 @@ class ModeActions:
         self.set_control(SetControl(group=group.name, index=index, value=parsed.value))
 
     def set_control(self, request: SetControl) -> None:
-        """Changes a parameter; a refusal of the ones before is forgotten."""
+        """Changes a parameter; an earlier refusal is dropped."""
         state = self._store.state
         groups, before = parameters_of(state.model), state.drive.control
         group = find_group(groups, request.group)
@@ -142,7 +142,7 @@ class ModeActions:
         self._store.update(drive=replace(state.drive, control=control, refusal=None))
 
     def press(self, request: PressControl) -> None:
-        """Sends the parameters, or takes those that a controller wakes up with."""
+        """Sends the parameters, or resets them to the controller's defaults."""
         state, now = self._store.state, time.monotonic()
         if request.what == "reset":
             control = default_parameters(parameters_of(state.model))
@@ -159,30 +159,30 @@ class ModeActions:
         self._send(self._session.status())
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Collects answers, sends the virtual controller what is new, changes the speed override."""
+        """Collects answers, sends changes to a virtual controller, changes the speed override."""
         name = self._store.state.model.name
         if name != self._arm:
             self._arm = name
             self.forget()
-        if self._post.is_underway:
-            self._post.collect()
-            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
+        if self._sender.is_underway:
+            self._sender.collect()
+            status = self._session.status()  # Values that were acknowledged meanwhile are not sent again.
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send(status)
         self._change_speed_override(status)
 
     def forget(self) -> None:
-        """Drops what was sent and not answered: another robot was chosen."""
+        """Drops requests without an answer: another robot was chosen."""
         self._wish.forget()
-        self._post.forget()
+        self._sender.forget()
         self._changing, self._was_running = None, False
         self._store.update(drive=replace(self._store.state.drive, override_refusal=None))
 
     def _send(self, status: SupervisorStatus) -> None:
         state = self._store.state
-        if not self._post.is_underway and is_pending(state, status):
-            self._post.send(RobotConfiguration(control=state.drive.control))
+        if not self._sender.is_underway and is_pending(state, status):
+            self._sender.send(RobotConfiguration(control=state.drive.control))
 
     def _refuse(self, why: Message) -> None:
         self._store.update(drive=replace(self._store.state.drive, refusal=why))
@@ -198,7 +198,7 @@ class ModeActions:
         self._was_running = running
         if self._changing is not None and self._changing[1].done:
             (speed_override, request), self._changing = self._changing, None
-            self._tell_override(request.error, speed_override)
+            self._report_override_refusal(request.error, speed_override)
         elif running and not before:
             self._set_override_refusal(None)
         wish = self._wish.due(status, is_under_way=self._changing is not None)
@@ -209,10 +209,10 @@ class ModeActions:
         try:
             self._changing = wish, supervisor.set_speed_override(wish) if wish else supervisor.pause()
         except RcilabError as error:
-            self._tell_override(error, wish)
+            self._report_override_refusal(error, wish)
 
-    def _tell_override(self, error: RcilabError | None, speed_override: float) -> None:
-        refusal = None if error is None else tell_override_refusal(error, speed_override, self._session.status())
+    def _report_override_refusal(self, error: RcilabError | None, speed_override: float) -> None:
+        refusal = None if error is None else describe_override_refusal(error, speed_override, self._session.status())
         if refusal is not None:
             self._set_override_refusal(refusal)
             self._store.say("warn", refusal)

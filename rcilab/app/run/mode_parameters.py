@@ -1,4 +1,4 @@
-"""The parameters that have an effect in a mode: what is wanted, what the controller has, and how both are shown."""
+"""The parameters of a mode: as set, as the controller has them, and as text."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from rcilab.makers.parameters import ParameterGroup
 if TYPE_CHECKING:
     from rcilab.i18n.translator import Text
 
-CONFIRM_TIMEOUT = 10.0  # [s] Tuning value: time to read the question; a second press that comes later asks again.
+CONFIRM_TIMEOUT = 10.0  # [s] Tuning value: time to read the question; a later press asks again.
 
 
 def find_group(groups: tuple[ParameterGroup, ...], name: str) -> ParameterGroup | None:
-    """Returns the group with a name; None: there is no such group."""
+    """Returns the group of a name; None: there is no such group."""
     return next((group for group in groups if group.name == name), None)
 
 
 def shown_numbers(control: ControllerParameters | None, group: ParameterGroup) -> tuple[float, ...]:
-    """Returns the numbers of a group that its fields show: those wanted, or the controller's defaults."""
+    """Returns the numbers of a group for its fields: those set, or the controller's defaults."""
     return group.defaults if control is None else control.get(group.name, group.defaults)
 
 
@@ -35,11 +35,11 @@ def with_number(
 
 
 def is_control_pending(wanted: ControllerParameters | None, held: ControllerParameters | None) -> bool:
-    """Returns whether a controller has not taken the parameters yet.
+    """Returns whether a controller has not accepted the parameters yet.
 
     Args:
-        wanted: What it is to have; groups that are missing are left as they are.
-        held: What it has acknowledged.
+        wanted: The parameters as set; missing groups are left unchanged.
+        held: The acknowledged parameters.
     """
     return any((held or {}).get(name) != values for name, values in (wanted or {}).items())
 
@@ -47,13 +47,13 @@ def is_control_pending(wanted: ControllerParameters | None, held: ControllerPara
 def control_obstacle(
     wanted: ControllerParameters | None, held: ControllerParameters | None, refusal: Message | None, address: str | None
 ) -> Message | None:
-    """Returns why nothing may run with these parameters, or None when the controller has them.
+    """Returns why no motion may run with these parameters, or None if the controller has them.
 
     Args:
-        wanted: What it is to have.
-        held: What it has acknowledged.
-        refusal: Why it refused them; None: it accepted them, or was not sent them yet.
-        address: Of a real controller, which is sent them only after a yes; None: a virtual one.
+        wanted: The parameters as set.
+        held: The acknowledged parameters.
+        refusal: Why it refused them; None: it accepted them, or has not received them yet.
+        address: Address of a real controller, which gets them only after a confirmation; None: a virtual one.
     """
     if not is_control_pending(wanted, held):
         return None
@@ -63,7 +63,7 @@ def control_obstacle(
 
 
 def ask_to_send(address: str) -> Message:
-    """Returns the question before a real controller is sent other parameters."""
+    """Returns the question before other parameters are sent to a real controller."""
     return message("control.sure", address=address, seconds=f"{CONFIRM_TIMEOUT:.0f}")
 
 
@@ -84,14 +84,14 @@ def format_ranges(group: ParameterGroup) -> str:
 def held_rows(
     groups: tuple[ParameterGroup, ...], mode: Mode, held: ControllerParameters | None, text: Text, *, is_known: bool
 ) -> list[tuple[str, str]]:
-    """Returns the parameters of a mode as the controller has acknowledged them, name and numbers.
+    """Returns the acknowledged parameters of a mode, name and numbers.
 
     Args:
-        groups: Of the arm.
-        mode: How the arm follows.
-        held: What the controller has acknowledged.
+        groups: Parameter groups of the arm.
+        mode: The mode.
+        held: The acknowledged parameters.
         text: The catalogue.
-        is_known: Whether the rest is the default: the controller is ours.
+        is_known: Whether the others have their defaults: the controller is ours.
     """
     rows: list[tuple[str, str]] = []
     for group in groups:

@@ -1,4 +1,4 @@
-"""What stands in the way of executing a plan, as far as arm and plan tell; and what a robot is about to do."""
+"""What prevents the execution of a plan, from arm and plan alone; and the description of a robot's next motion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.core.arrays import JointVector
 from rcilab.i18n.translator import Message, message
 from rcilab.motion.extent import MotionExtent, measure_extent
 
-_SAME_PLACE = 1e-9  # [rad] What the checker allows between the arm and the start of a motion.
+_SAME_PLACE = 1e-9  # [rad] Tolerance of the check between the arm and the start of a motion.
 _NOT_IDLE = {
     "starting": "ready.starting",
     "connecting": "ready.starting",
@@ -26,11 +26,11 @@ _NOT_IDLE = {
 
 
 class ArmStatus(Protocol):
-    """Where an arm is and what it does."""
+    """Position and state of an arm."""
 
     @property
     def phase(self) -> str:
-        """Of the control process."""
+        """Phase of the control process."""
         ...
 
     @property
@@ -42,13 +42,13 @@ class ArmStatus(Protocol):
 def arm_obstacle(
     phase: str, powered: bool | None, *, is_pressed: bool = False, is_released: bool = False
 ) -> Message | None:
-    """Returns why an arm cannot set out in this phase of its control process, or None.
+    """Returns why an arm cannot move in this phase of its control process, or None.
 
     Args:
-        phase: Of the control process.
-        powered: Motor power; None while unknown.
-        is_pressed: Whether an emergency stop or the safety gate holds the arm.
-        is_released: Whether one held it, and only its error bit is left.
+        phase: Phase of the control process.
+        powered: Motor power; None if unknown.
+        is_pressed: Whether an emergency stop or the safety gate stops the arm.
+        is_released: Whether one stopped it, and only its error bit is left.
     """
     if is_pressed and phase in ("idle", "fault"):
         return message("ready.pressed")
@@ -60,7 +60,7 @@ def arm_obstacle(
 
 
 def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
-    """Returns why a plan cannot be executed from where the arm was commanded to be, [rad], or None."""
+    """Returns why a plan cannot be executed from the commanded position, [rad], or None."""
     if plan is None:
         return message("ready.no_plan")
     if not plan.report.ok:
@@ -71,12 +71,12 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
 
 
 def is_done(plan: Plan, q_c: JointVector) -> bool:
-    """Returns whether the arm, commanded to be at q_c, [rad], stands where a plan ends."""
+    """Returns whether the arm, commanded to be at q_c, [rad], is at the end of a plan."""
     return _is_at(q_c, plan.motion.goal)
 
 
 def ask_to_move(plan: Plan, address: str) -> Message:
-    """Returns what the robot at an address is about to do, as the question before it does."""
+    """Returns the description of the next motion of the robot at an address, for the question before it."""
     extent = measure_extent(plan.motion, plan.model)
     return message(
         "run.ask",
@@ -102,7 +102,7 @@ def _joint_ranges(extent: MotionExtent) -> Message:
 
 
 def is_moving(status: ArmStatus) -> bool:
-    """Returns whether the arm is being moved by us."""
+    """Returns whether we move the arm."""
     return status.phase in ("moving", "stopping")
 
 

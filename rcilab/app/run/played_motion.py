@@ -1,4 +1,4 @@
-"""When a motion was where in its plan: it may have been run at another speed override than it was planned with."""
+"""The time of each place of the plan: a motion may have run at another speed override than planned."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 
 def paced_of(state: UiState) -> SpeedScaledMotion | None:
-    """Returns how the plan on the page was run, or is being run; None as planned, or not at all."""
+    """Returns how the plan on the page was or is run; None: as planned, or not at all."""
     paced = None if state.recording is None else state.recording.paced
     return paced if paced is not None and state.plan is not None and paced.motion is state.plan.motion else None
 
 
 def streamed_rows(state: UiState) -> JointPath | None:
-    """Returns what was streamed of the plan on the page, shape (N, n), [rad], if its speed was changed; else None."""
+    """Returns the streamed rows of the plan on the page, shape (N, n), [rad], if its speed was changed; else None."""
     paced, run = paced_of(state), None if state.recording is None else state.recording.run
     if paced is not None:
         return paced.q
@@ -30,7 +30,7 @@ def streamed_rows(state: UiState) -> JointPath | None:
 
 
 def played_path(state: UiState) -> tuple[Array, JointPath] | None:
-    """Returns the rows of the plan, shape (N, n), [rad], and when they were run, shape (N,), [s]; None without one."""
+    """Returns the rows of the plan, shape (N, n), [rad], and their times in the run, shape (N,), [s]; or None."""
     paced = paced_of(state)
     if paced is not None:
         return np.linspace(0.0, paced.duration, len(paced.q)), paced.q
@@ -38,12 +38,12 @@ def played_path(state: UiState) -> tuple[Array, JointPath] | None:
 
 
 def played_at(state: UiState, moment: float) -> float:
-    """Returns when a moment of the plan was run, [s] since the first command."""
+    """Returns the time in the run of a time of the plan, [s] since the first command."""
     paced = paced_of(state)
     return moment if paced is None else paced.time_at(moment)
 
 
 def moment_played(state: UiState, t: float) -> float:
-    """Returns which moment of the plan was run at a time, [s]."""
+    """Returns the time of the plan of a time in the run, [s]."""
     paced = paced_of(state)
     return t if paced is None else paced.plan_time_at(round(t / CYCLE_TIME))

@@ -22,7 +22,7 @@ from rcilab.app.run.active_force import (
     place_of,
     spring_force,
 )
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.arrays import JointVector, Vector3
 from rcilab.execution.external_force_hold import HOLD_TIMEOUT, ExternalForceHold
@@ -36,7 +36,7 @@ _NO_MOMENT = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPush(Request):
-    """How to push the arm and how to guide it; what is None stays."""
+    """Settings of pushes and hand guiding; None leaves a value unchanged."""
 
     link: int | None = None
     """From 1; 0: the tool."""
@@ -48,7 +48,7 @@ class SetPush(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HoldPush(Request):
-    """The push button is held; said ten times a second."""
+    """The push button is held; sent ten times a second."""
 
     @property
     def replaces(self) -> str | None:  # noqa: D102
@@ -62,9 +62,9 @@ class DragLink(Request):
     link: int
     """From 1."""
     grabbed: tuple[float, ...]
-    """Where it was taken hold of, base axes, [m]."""
+    """Grabbed point, base axes, [m]."""
     hand: tuple[float, ...]
-    """Where the mouse is, base axes, [m]."""
+    """Position of the mouse, base axes, [m]."""
     phase: Literal["start", "update", "end"]
 
     @property
@@ -74,29 +74,29 @@ class DragLink(Request):
 
 @dataclass(frozen=True, eq=False)
 class _Grip:
-    """Where the mouse holds the arm."""
+    """The grabbed point of the arm."""
 
     page: int | None
     link: int
     point: Vector3
-    """In the link's frame, [m]."""
+    """Point in the link's frame, [m]."""
     hand: Vector3
-    """Where the mouse is, base axes, [m]."""
+    """Position of the mouse, base axes, [m]."""
 
 
 class PushActions:
-    """The push button and the hand in the scene; both press on the arm only while they are held."""
+    """The push button and the mouse in the scene; both press on the arm only while they are held."""
 
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self._grip: _Grip | None = None
-        self._button: tuple[int | None, float] | None = None  # Who holds it, and when that was last heard.
+        self._button: tuple[int | None, float] | None = None  # Page that holds it, and time of its last message, [s].
         self._push: ExternalForceHold | None = None
         self._address: str | None = None
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             SetPush: self.set_push,
             HoldPush: self.hold,
@@ -104,7 +104,7 @@ class PushActions:
         }
 
     def set_push(self, request: SetPush) -> None:
-        """Changes how to push or to guide; what does not exist is ignored, a force is taken at its bound."""
+        """Changes settings of pushes and guiding; invalid values are ignored, a force is clipped to its bounds."""
         state = self._store.state
         changes: dict[str, object] = {}
         if request.link is not None and request.link in range(state.model.n + 1):
@@ -120,7 +120,7 @@ class PushActions:
         self._store.update(push=replace(state.push, **changes))
 
     def hold(self, request: HoldPush) -> None:
-        """Goes on with the push of the button, for as long as it is said again and again."""
+        """Continues the push of the button as long as messages that it is held arrive."""
         reason = no_push(self._session.status())
         if reason is not None:
             self._store.say("warn", reason)
@@ -128,7 +128,7 @@ class PushActions:
         self._button = request.page, time.monotonic()
 
     def pull(self, request: DragLink) -> None:
-        """Takes hold of a link where the mouse is, follows the mouse, lets go."""
+        """Grabs a link at the mouse, follows the mouse, releases the link."""
         state, status = self._store.state, self._session.status()
         numbers = np.array((request.grabbed, request.hand), dtype=float)
         if request.phase == "end" or not can_grab(state, status) or status.q is None:
@@ -143,7 +143,7 @@ class PushActions:
             self._grip = replace(self._grip, hand=numbers[1])
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Presses on the arm where it is now, or lets go of it; says what went wrong."""
+        """Applies the force to the arm at its current position, or removes it; reports errors."""
         state = self._store.state
         self._follow(status.world_address)
         self._drop_stale()
@@ -160,14 +160,14 @@ class PushActions:
         error = None if self._push is None else self._push.pop_error()
         if error is not None:
             self._grip = self._button = None
-            self._store.say("bad", tell_error(error))
+            self._store.say("bad", explain_error(error))
 
     def close(self) -> None:
-        """Lets go of the arm."""
+        """Removes the force."""
         self._follow(None)
 
     def _judge(self, q: JointVector) -> tuple[ActiveForce | None, Vector3]:
-        """Returns what is to press on the arm and at which point of the link's frame; the mouse before the button."""
+        """Returns the force and its point in the link's frame; the mouse comes before the button."""
         state, grip = self._store.state, self._grip
         if grip is not None:
             start = place_of(state.model, q, grip.link, grip.point)
@@ -179,17 +179,17 @@ class PushActions:
         return ActiveForce(link=state.push.link, start=start, force=state.push.force), point
 
     def _drop_stale(self) -> None:
-        """Lets go for a page that has gone silent or has the controls no more."""
-        lease = self._store.state.lease
-        if self._grip is not None and not lease.allows(self._grip.page):
+        """Releases the arm for a page that has fallen silent or has lost the controls."""
+        lock = self._store.state.control_lock
+        if self._grip is not None and not lock.allows(self._grip.page):
             self._grip = None
         if self._button is not None:
-            page, heard = self._button
-            if time.monotonic() - heard > HOLD_TIMEOUT or not lease.allows(page):
+            page, last_seen = self._button
+            if time.monotonic() - last_seen > HOLD_TIMEOUT or not lock.allows(page):
                 self._button = None
 
     def _follow(self, address: str | None) -> None:
-        """Turns to the world port of the controller of now; another controller has another one."""
+        """Connects to the simulation port of the current controller."""
         if address == self._address:
             return
         if self._push is not None:

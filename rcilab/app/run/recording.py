@@ -1,4 +1,4 @@
-"""The last executed motion, as plots, table and export show it."""
+"""The last executed motion, for plots, table and export."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Recording:
-    """The last executed motion as the controller reported it."""
+    """The last executed motion as reported by the controller."""
 
     t: np.ndarray
     """[s], shape (N,)."""
@@ -26,20 +26,20 @@ class Recording:
     dq: np.ndarray
     """Measured, [rad/s], shape (N, n)."""
     tau: np.ndarray | None = None
-    """Measured, [N m], shape (N, n); None where it was not kept."""
+    """Measured, [N m], shape (N, n); None if it was not recorded."""
     delay: int
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
     run: Run | None = None
-    """All of it, once the arm stands still."""
+    """The whole run, once the arm stands still."""
     paced: SpeedScaledMotion | None = None
-    """How the plan was run, where its speed override was changed on the way; None: as planned."""
+    """How the plan was run, if its speed override was changed during the motion; None: as planned."""
     tracking: Tracking | None = None
-    """How far the arm was from its plan, once it stands still."""
+    """The tracking error, once the arm stands still."""
     file: str = ""
-    """Where it is on disk; "" where it is not."""
+    """Its file; "" if there is none."""
     is_left_alone: bool = False
     """Whether it was stopped because no page answered."""
     finding: str = ""
-    """What the last cycles show of the fault, joint, value and bound; "" where it is not known."""
+    """Joint, value and bound of the fault, from the last cycles; "" if they are unknown."""
     moment: float | None = None
-    """When a fault was reported, as in `t`, [s]; None for a motion without one."""
+    """Time of the fault, as in `t`, [s]; None for a motion without one."""

@@ -1,4 +1,4 @@
-"""A recorded run on the page: its plan and its recording, as if it had just been made, with nothing connected."""
+"""A recorded run on the page: plan and recording, as after the run, without a connection."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 def require_replayable(run: Run) -> RobotModel:
-    """Returns the arm of a run that can be shown.
+    """Returns the arm of a run.
 
     Raises:
-        UsageError: It has no cycle, or its arm is unknown.
+        UsageError: The run has no cycle, or its arm is unknown.
     """
     if run.model is None:
         raise UsageError("this run cannot be replayed: its file does not say which arm made it").coded("run_no_arm")
@@ -38,7 +38,7 @@ def require_replayable(run: Run) -> RobotModel:
 def replayed(state: UiState, run: Run) -> UiState:
     """Returns a state that shows a run."""
     model = require_replayable(run)
-    motion = run.plan or run.commanded()  # A callback has no plan: what it commanded is drawn and checked.
+    motion = run.plan or run.commanded()  # A callback has no plan: its commands are drawn and checked.
     report = run.report or check(motion, model)
     plan = replace(build_plan_view(model, motion, report), complete=True)
     goal = goal_at(model, motion.goal)
@@ -51,7 +51,7 @@ def replayed(state: UiState, run: Run) -> UiState:
 
 
 def replayed_pose(state: UiState) -> JointVector | None:
-    """Returns where the recorded arm was at the place that the timeline stands at; None without a finished run."""
+    """Returns the recorded position of the arm at the place of the timeline; None without a finished run."""
     recording = state.recording
     if recording is None or recording.run is None or state.plan is None:
         return None

@@ -14,7 +14,7 @@ _SAME_OVERRIDE = 1e-3
 
 
 class RequestedSpeed:
-    """The speed override that the operator wants for a motion; of a slider's many values only the newest counts.
+    """The speed override that the operator wants for a motion; only the newest of a slider's values is sent.
 
     Used by one thread, or under a lock.
     """
@@ -23,23 +23,23 @@ class RequestedSpeed:
         self._wish: float | None = None
 
     def choose(self, speed_override: float, status: SupervisorStatus | None) -> None:
-        """Requests a speed override for the motion in progress; a motion that is held stays held."""
+        """Requests a speed override for the motion in progress; a paused motion stays paused."""
         if is_running(status) and status is not None and status.code == "moving":
             self._wish = speed_override
 
     def hold(self) -> None:
-        """Requests that the motion is held."""
+        """Requests that the motion is paused."""
         self._wish = 0.0
 
     def go_on(self, speed_override: float) -> None:
-        """Requests that a motion that is held continues with a speed override."""
+        """Requests that a paused motion continues with a speed override."""
         self._wish = speed_override
 
     def due(self, status: SupervisorStatus, *, is_under_way: bool) -> float | None:
         """Returns the speed override to send to the robot now, if any; call it several times a second.
 
         Args:
-            status: Of the robot.
+            status: Status of the robot.
             is_under_way: Whether the last change is not accepted yet; a newer value waits.
         """
         if is_under_way:
@@ -61,13 +61,15 @@ def is_running(status: SupervisorStatus | None) -> bool:
     return status is not None and status.code in ("moving", "moving.held") and status.motion_duration is not None
 
 
-def tell_override_refusal(error: RcilabError, speed_override: float, status: SupervisorStatus | None) -> Message | None:
+def describe_override_refusal(
+    error: RcilabError, speed_override: float, status: SupervisorStatus | None
+) -> Message | None:
     """Returns why a motion continues unchanged; None if it has ended meanwhile.
 
     Args:
         error: Why the change failed.
-        speed_override: The requested speed override; 0 holds the motion.
-        status: Of the robot.
+        speed_override: The requested speed override; 0 pauses the motion.
+        status: Status of the robot.
     """
     if isinstance(error, PlanningError):
         return message("pace.no_pause" if speed_override == 0.0 else "pace.no_change")

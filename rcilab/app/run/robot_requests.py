@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Outcome:
-    """How a request ended."""
+    """The end of a request."""
 
     what: str
     """Name of the request, such as "execute", "power_on" or "reboot"."""
     error: RcilabError | None = None
     run: Run | None = None
-    """Of "execute", where the arm moved."""
+    """The run of "execute", if the arm moved."""
     is_left_alone: bool = False
     """Whether the motion was stopped because no page answered."""
 
     @property
     def record(self) -> NDArray[np.void] | None:
-        """The last cycles, from the flight recorder; None where nothing moved."""
+        """The last cycles, from the flight recorder; None if nothing moved."""
         record = getattr(self.error, "record", None)
         return record if record is not None else None if self.run is None else self.run.cycles
 
@@ -46,7 +46,7 @@ class RobotRequests:
     """Used by one thread, or under a lock; it never waits for the robot.
 
     Args:
-        store: Where the recording is shown.
+        store: Shows the recording.
         connection: The robot.
     """
 
@@ -56,7 +56,7 @@ class RobotRequests:
         self._recorder = RunRecorder(store)
 
     def add(self, what: str, request: PendingRequest) -> None:
-        """Adds a request whose end `collect` reports."""
+        """Adds a request; `collect` reports its end."""
         self._pending.append((what, request))
 
     def is_pending(self, what: str) -> bool:
@@ -67,14 +67,14 @@ class RobotRequests:
         """Executes a checked plan with the speed override of the state, and records it.
 
         Args:
-            plan: What `check` passed.
-            stops: How often the robot had been stopped when the operator wanted this; None: they want it now.
+            plan: A plan that conforms.
+            stops: Number of stops of the robot at the operator's request; None: the current number.
 
         Raises:
-            CertificateError: The plan does not fit where the arm is, or what it carries.
-            ConformanceError: The plan did not pass.
-            PlanningError: With this speed override it would break a condition.
-            UsageError: The arm moves, or was stopped in the meantime.
+            CertificateError: The plan does not fit the arm's position, or its tool and load.
+            ConformanceError: The plan does not conform.
+            PlanningError: With this speed override it would violate a condition.
+            UsageError: The arm moves, or was stopped meanwhile.
         """
         certificate = plan.report.require().certificate
         assert certificate is not None  # A report that is ok has one.
@@ -87,7 +87,7 @@ class RobotRequests:
         self._store.update(recording=None, last_run=None, playing=False, asked=None)
 
     def collect(self) -> list[Outcome]:
-        """Returns how requests ended since the last call, and records the motion; call it several times a second."""
+        """Returns the ends of requests since the last call, and records the motion; call it several times a second."""
         ended: list[tuple[str, PendingRequest]] = []
         waiting: list[tuple[str, PendingRequest]] = []
         for entry in self._pending:
@@ -97,7 +97,7 @@ class RobotRequests:
         return [self._outcome(what, request.error) for what, request in ended]
 
     def forget(self, stopped: str | None = None) -> None:
-        """Ends the recording and drops what awaits an answer: the robot goes.
+        """Ends the recording and drops requests without an answer: the robot is disconnected.
 
         Args:
             stopped: Why the motion did not reach its end.
@@ -106,7 +106,7 @@ class RobotRequests:
         self._recorder.finish(stopped, self._paced())
 
     def close(self, stopped: str) -> None:
-        """Ends the recording with the cycles of this moment; see `forget`."""
+        """Ends the recording with the current cycles; see `forget`."""
         self._record()
         self.forget(stopped)
 
@@ -123,11 +123,11 @@ class RobotRequests:
         return Outcome(what=what, error=error, run=None if last is None else last.run, is_left_alone=is_left_alone)
 
     def _record(self) -> None:
-        with suppress(RcilabError):  # The robot has gone.
+        with suppress(RcilabError):  # The robot is disconnected.
             self._recorder.add(self._connection.supervisor().drain(), self._paced())
 
     def _paced(self) -> SpeedScaledMotion | None:
-        """Returns how the motion in progress, or the last one, is run; None as planned."""
+        """Returns how the motion in progress, or the last one, runs; None: as planned."""
         with suppress(RcilabError):
             paced = self._connection.supervisor().scaled_motion
             return paced if paced is not None and paced.changed else None

@@ -18,7 +18,7 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, drawn_parts, name_parts, setup_obstacle
-from rcilab.app.status_text import StartingError, tell_error, tell_incident
+from rcilab.app.status_text import StartingError, describe_incident, explain_error
 from rcilab.app.store import Store, UiState
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import (
@@ -40,15 +40,15 @@ if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
     from rcilab.makers.configuration import RobotConfiguration, SetupPart
 
-_CONFIRM_TIMEOUT = 10.0  # [s] A second press that comes later asks again.
+_CONFIRM_TIMEOUT = 10.0  # [s] A later second press asks again.
 TROUBLE = "robot"
-"""Names what is said while the robot side cannot move: see `Store.settle`."""
+"""Names of the troubles while the robot cannot move: see `Store.settle`."""
 _POWER_PAUSE = 2.0  # [s] Between two attempts to switch the virtual arm on.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotCommand(Moving):
-    """Something for the robot: what the buttons of the Run tab say."""
+    """A button of the Run tab."""
 
     what: Literal[
         "execute", "confirm", "cancel", "stop", "recover", "power_on", "power_off", "reconnect", "guide", "unguide",
@@ -58,7 +58,7 @@ class RobotCommand(Moving):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChooseRobot(Request):
-    """Another arm, another destination, or another plant for the virtual controller."""
+    """Choose another arm, another destination, or another plant of the virtual controller."""
 
     model: str | None = None
     target: str | None = None
@@ -67,34 +67,34 @@ class ChooseRobot(Request):
 
 
 class RunActions:
-    """Execute, stop, power, recover, connect; and the recording of what came of it."""
+    """Execute, stop, power, recover, connect; and the recording of the run."""
 
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self.requests = RobotRequests(store, session)
-        self._is_stop_said = False  # Which safety stop ended the last motion was said with its error.
-        self._placed = False  # The goal stands where the arm was first seen.
+        self._is_stop_said = False  # The safety stop that ended the last motion was reported with its error.
+        self._placed = False  # The goal was set to the arm's first position.
         self._powered = False  # The virtual arm's motors have been switched on once.
         self._power_asked = float("-inf")
-        self._arrival: Message | None = None  # What to say at the end of the motion in progress.
-        self._untouched: Goal | None = store.state.goal  # The goal as long as it is not posed.
-        self._setups: dict[str, SetupState] = {}  # Of the arms that were chosen before, by name.
+        self._arrival: Message | None = None  # Message for the end of the motion in progress.
+        self._untouched: Goal | None = store.state.goal  # The goal, until the operator changes it.
+        self._setups: dict[str, SetupState] = {}  # Configurations of the arms chosen before, by name.
         self._incident = 0
-        self._trouble = ""  # The code of the incident that has not ended yet.
+        self._trouble = ""  # Code of the incident that has not ended yet.
         self._phase = ""
-        self._reached: float | None = None  # [s] How far along the plan the moving arm is.
+        self._reached: float | None = None  # [s] Time of the plan that the moving arm has reached.
         self._guided = False
         self._asked_to_guide = -math.inf
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             ChooseRobot: self.choose_robot,
         }
 
     def drive(self, request: RobotCommand) -> None:
-        """Passes one button of the Run tab on to the supervisor."""
+        """Passes a button of the Run tab to the supervisor."""
         if request.what in ("execute", "confirm"):
             self._execute(is_agreed=request.what == "confirm", stops=request.stops)
             return
@@ -128,7 +128,7 @@ class RunActions:
             self.requests.add(request.what, sent)
 
     def _guide(self, stops: int | None) -> PendingRequest | None:
-        """Frees the arm for a hand to guide it; a real one only when that is asked for twice."""
+        """Starts hand guiding; for a real arm only after a confirmation."""
         state, now = self._store.state, time.monotonic()
         unset = setup_obstacle(state, self._session.status())
         if unset is not None:
@@ -143,7 +143,7 @@ class RunActions:
         return self._session.supervisor().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of WAYS.
 
     def choose_robot(self, request: ChooseRobot) -> None:
-        """Takes another arm, destination or plant; refused while the arm moves."""
+        """Changes arm, destination or plant; refused while the arm moves."""
         state = self._store.state
         if is_moving(self._session.status()):
             self._store.say("warn", message("notice.moving"))
@@ -163,7 +163,7 @@ class RunActions:
         self.open(model.name, target)
 
     def _choose_plant(self, plant: str) -> None:
-        """Has the virtual controller started again with another plant; goal and plan stay."""
+        """Restarts the virtual controller with another plant; goal and plan are kept."""
         state = self._store.state
         if plant not in PLANT_KINDS or plant == state.plant:
             return
@@ -175,14 +175,14 @@ class RunActions:
         self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def disconnect(self) -> None:
-        """Lets go of the controller, and ends our own; goal and plan stay, for the preview."""
+        """Disconnects, and ends our own controller; goal and plan are kept, for the preview."""
         state = self._store.state
         self._forget_robot()
         self._session.disconnect()
         self._store.update(asked=None, playing=False, **_unasked(state))
 
     def open(self, name: str, target: str) -> None:
-        """Connects to a destination with an arm; goal, plan and undo stay unless it is another arm."""
+        """Connects to a destination with an arm; goal, plan and undo are kept unless it is another arm."""
         state = self._store.state
         model = state.model if state.model.name == name else load_model(name)
         self._forget_robot()
@@ -192,7 +192,7 @@ class RunActions:
             self._placed = False
             changes |= {"plan": None, "no_plan": None}
             changes |= {"plot_joint": 0, "problems": {}}
-            changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may have no such link.
+            changes |= {"push": replace(state.push, link=TOOL)}  # The other arm may lack this link.
             setup = self._exchange_setups(state, name)
             model = setup.wanted.only(setup.touched).applied_to(model)
             self._untouched = goal_at(model, model.home)
@@ -209,14 +209,14 @@ class RunActions:
         self._powered, self._power_asked = False, float("-inf")
 
     def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
-        """Takes note of the configuration of an arm that is replaced by another."""
+        """Keeps the configuration of an arm that is replaced by another."""
         fresh = SetupState()
         touched: frozenset[SetupPart] = frozenset(setup.parts)
         seen = drawn_parts(touched)
         self._setups[name] = replace(fresh, wanted=fresh.wanted.updated(setup), touched=touched, seen=seen)
 
     def _exchange_setups(self, state: UiState, name: str) -> SetupState:
-        """Returns the configuration of an arm that is chosen now, and keeps that of the one before."""
+        """Returns the configuration of the chosen arm, and keeps that of the previous one."""
         self._setups[state.model.name] = replace(state.setup, edited="", asked=None, refusal=None, can_undo=False)
         setup = self._setups.get(name, SetupState())
         if setup.touched:
@@ -224,21 +224,21 @@ class RunActions:
         return setup
 
     def watch(self) -> str | None:
-        """Looks at the supervisor: finished requests, new incidents, recorded cycles, the arm's first pose.
+        """Reads the supervisor: finished requests, new incidents, recorded cycles, the arm's first position.
 
         Returns:
-            "rested" when the arm has just stopped, "placed" when it was seen for the first time, else None.
+            "rested" when the arm has just stopped, "placed" at its first position, else None.
         """
         for outcome in self.requests.collect():
             self._report(outcome)
-        status = self._session.status()  # After them: where a motion has ended, it says so too.
+        status = self._session.status()  # After the requests: it contains the end of a motion, too.
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
-                self._powered = False  # The one that is started in its place comes up without motor power.
+                self._powered = False  # The next virtual controller starts without motor power.
             self._trouble = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
-                said = tell_incident(status.incident.code, status.incident.message, status)
+                said = describe_incident(status.incident.code, status.incident.message, status)
                 self._store.say("bad", said, trouble=TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
@@ -258,7 +258,7 @@ class RunActions:
         return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
 
     def _settle(self) -> None:
-        """Withdraws what was said of a trouble that is over; the end of one that cut the connection is said."""
+        """Withdraws the notices of a trouble that is over; the end of one that cut the connection is reported."""
         self._store.settle(TROUBLE)
         if self._trouble.startswith(("crashed", "lost")):
             code = "lost" if self._trouble.startswith("lost") else self._trouble
@@ -266,7 +266,7 @@ class RunActions:
         self._trouble = ""
 
     def _follow(self, status: SupervisorStatus) -> None:
-        """Leaves the preview where the arm has left the plan, however seldom it was looked at on its way."""
+        """Leaves the preview where the arm has left the plan, however seldom its status was read."""
         plan = self._store.state.plan
         if (is_moving(status) or self._reached is not None) and status.motion_plan_time is not None:
             self._reached = status.motion_plan_time
@@ -278,13 +278,13 @@ class RunActions:
             self._store.update(place=place)
 
     def _switch_on(self, status: SupervisorStatus) -> None:
-        """Has the virtual arm's motors switched on, and tries again until that has succeeded once."""
+        """Switches the virtual arm's motors on, and tries again until that has succeeded once."""
         if status.powered:
             self._powered = True
             return
         if time.monotonic() - self._power_asked < _POWER_PAUSE or self.requests.is_pending("power_on"):
             return
-        with suppress(StartingError):  # The next look will find it there.
+        with suppress(StartingError):  # The next tick finds it started.
             self.requests.add("power_on", self._session.supervisor().power_on())
             self._power_asked = time.monotonic()
 
@@ -305,7 +305,7 @@ class RunActions:
         try:
             self.requests.execute(state.plan, stops=stops)
         except (CertificateError, PlanningError, UsageError) as error:
-            self._store.say("warn", tell_error(error))
+            self._store.say("warn", explain_error(error))
             return
         self._arrival = state.plan.short
         self._is_stop_said = False
@@ -313,43 +313,43 @@ class RunActions:
     def _report(self, outcome: Outcome) -> None:
         if outcome.error is not None:
             if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
-                self._reached = 0.0  # It had begun, and was not seen on its way.
+                self._reached = 0.0  # It had begun, but no status showed it.
             self._is_stop_said = outcome.error.code == SAFETY_STOP
             trouble = TROUBLE if _is_trouble(outcome.error) else ""
-            self._store.say(*self._tell_failure(outcome, outcome.error), trouble=trouble)
+            self._store.say(*self._report_failure(outcome, outcome.error), trouble=trouble)
         elif outcome.what == "power_on":
             self._powered = True
         elif outcome.what == "reboot":
             self._store.say("warn", message("signals.rebooted"))
         elif outcome.what == "execute":
-            self._reached = math.inf  # Even if it was too short to be seen on its way.
-            self._tell_arrival()
+            self._reached = math.inf  # Even if it was too short for a status.
+            self._report_arrival()
 
-    def _tell_arrival(self) -> None:
+    def _report_arrival(self) -> None:
         if self._arrival is not None:
             self._store.say("warn", message("notice.arrived_short", short=self._arrival))
         else:
             self._store.say("good", message("notice.arrived"))
 
-    def _tell_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
+    def _report_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
         if _is_trouble(error):
-            return "bad", tell_error(error, self._session.status())
+            return "bad", explain_error(error, self._session.status())
         if isinstance(error, ControlError) and outcome.what == "execute":
             return "warn", message("notice.operator" if outcome.is_left_alone else _stopped(self._store.state))
-        return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=tell_error(error))
+        return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=explain_error(error))
 
     def close(self) -> None:
-        """Ends a recording, so that its file has an end: the arm is about to be stopped where it still moves."""
+        """Ends a recording, with the end of its file: the arm is about to be stopped."""
         self.requests.close("the workbench was closed")
 
 
 def _is_trouble(error: RcilabError) -> bool:
-    """Returns whether an error is a fault or a lost connection: it lasts until the robot side is ready again."""
+    """Returns whether an error is a fault or a lost connection: it lasts until the robot is ready again."""
     return isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and bool(error.faults))
 
 
 def _unasked(state: UiState) -> dict[str, object]:
-    """Returns the changes by which nothing that was asked, agreed or refused at one robot goes on at the next."""
+    """Returns the changes that drop all questions, confirmations and refusals of the previous robot."""
     return {
         "setup": replace(state.setup, asked=None, refusal=None),
         "jog": replace(state.jog, robot=False, asked=False, said=None),
@@ -360,7 +360,7 @@ def _unasked(state: UiState) -> dict[str, object]:
 
 
 def _own_setup(state: UiState, target: str) -> RobotConfiguration | None:
-    """Returns what a virtual controller is sent at once; a real one is sent nothing before a yes."""
+    """Returns what a virtual controller gets at once; a real one gets nothing before a confirmation."""
     if target != "virtual":
         return None
     setup = replace(state.setup.wanted.only(state.setup.touched), control=state.drive.control)

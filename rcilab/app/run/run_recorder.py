@@ -1,4 +1,4 @@
-"""Records the last motion: for the plots while it runs, as a run once the arm has stopped."""
+"""Records the last motion: for the plots during the motion, as a run once the arm stands still."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class RunRecorder:
     """Owned by the thread that changes the state.
 
     Args:
-        store: Where the recording is shown.
+        store: Shows the recording.
     """
 
     def __init__(self, store: StateStore[AppState]) -> None:
@@ -39,7 +39,7 @@ class RunRecorder:
         self._file = ""
 
     def begin(self, plan: Plan) -> None:
-        """Begins a recording; with "record every cycle" also in a file."""
+        """Starts a recording; with "record every cycle" also in a file."""
         state = self._store.state
         plant = state.plant if state.target == "virtual" else ""
         setup = Setup(target=state.target, plant=plant, mode=state.drive.mode, started_ns=time.time_ns())
@@ -47,7 +47,7 @@ class RunRecorder:
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
     def add(self, rows: NDArray[np.void], paced: SpeedScaledMotion | None = None) -> None:
-        """Adds cycles and shows them; `paced`: how the plan is run, where its speed override was changed."""
+        """Adds cycles and shows them; `paced`: how the plan is run, if its speed override was changed."""
         if self._live is None:
             return
         before = self._live.cycles
@@ -68,14 +68,14 @@ class RunRecorder:
         finding: str = "",
         run: Run | None = None,
     ) -> None:
-        """Ends the recording; from here on it can be exported.
+        """Ends the recording; from then on it can be exported.
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
-            paced: How the plan was run, where its speed override was changed.
-            is_left_alone: Whether that is because no page answered.
-            finding: What its last cycles show of the fault that ended it.
-            run: As the robot has recorded it itself; None: it is made of the cycles that were added.
+            paced: How the plan was run, if its speed override was changed.
+            is_left_alone: Whether the motion was stopped because no page answered.
+            finding: Joint, value and bound of the fault that ended it, from its last cycles.
+            run: The run as recorded by the robot itself; None: it is built from the added cycles.
         """
         if self._live is None:
             return
@@ -85,7 +85,7 @@ class RunRecorder:
             run = run or live.finish(stopped, plan)
         except InvalidValueError as error:
             self._complain(error)
-            run = live.finish(stopped, plan)  # Its file is given up now; the run in memory is whole.
+            run = live.finish(stopped, plan)  # If its file failed, the run in memory is complete.
         if run is not None:
             recording = whole_recording(run, self._file, paced, finding)
             recording = replace(recording, is_left_alone=is_left_alone)
@@ -120,7 +120,7 @@ class RunRecorder:
 
 
 def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion | None = None) -> Recording:
-    """Returns what the plots need of a run that goes on."""
+    """Returns the part of a run in progress that the plots need."""
     return Recording(
         t=cycles["t"],
         q=cycles["q"],

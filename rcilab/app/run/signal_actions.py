@@ -1,4 +1,4 @@
-"""What happens when the operator sets an output, reads the inputs or restarts the controller."""
+"""The operator sets an output, reads the inputs or restarts the controller."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetOutput(Request):
-    """A digital output, by its number, on or off."""
+    """Switch a digital output, by its number."""
 
     signal: int
     level: bool
@@ -27,13 +27,13 @@ class SetOutput(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressSignals(Request):
-    """Reads the digital inputs; or restarts the controller, once that is confirmed."""
+    """Read the digital inputs; or restart the controller, after a confirmation."""
 
     what: Literal["read", "reboot", "confirm", "cancel"]
 
 
 def signal_rows(model: RobotModel, status: SupervisorStatus) -> list[tuple[str, bool | None, str, bool | None]]:
-    """Returns a row for each signal: an output's name and its level as set, an input's and its level as read last."""
+    """Returns a row for each signal: an output's name and its set level, an input's and its last level."""
     has = capabilities_of(model)
     columns = zip_longest(has.outputs, status.outputs, has.inputs, status.inputs or ())
     return [(output or "", is_set, name or "", is_high) for output, is_set, name, is_high in columns]
@@ -47,7 +47,7 @@ class SignalActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             SetOutput: self.set_output,
             PressSignals: self.press,
@@ -58,7 +58,7 @@ class SignalActions:
         self._requests.add("output", self._session.supervisor().set_output(request.signal, request.level))
 
     def press(self, request: PressSignals) -> None:
-        """Reads the inputs; restarts the controller when that was confirmed."""
+        """Reads the inputs; restarts the controller after a confirmation."""
         if request.what == "read":
             self._requests.add("inputs", self._session.supervisor().read_inputs())
             return

@@ -1,4 +1,4 @@
-"""Requests that choose the robot that motions go to. Owned by the dispatcher's thread."""
+"""Requests that choose the destination of motions. Owned by the dispatcher's thread."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import DESTINATIONS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import message
@@ -18,12 +18,12 @@ from rcilab.makers.driver import parse_address
 from rcilab.sim.controller_config import PlantKind
 
 _ADDRESS = "address"
-"""Names the trouble that what stands in the field is no address."""
+"""Name of the trouble of an invalid address."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChooseDestination(Request):
-    """Where motions go; an address is asked for once more."""
+    """Choose the destination of motions; an address is confirmed first."""
 
     where: str
     """One of `DESTINATIONS`."""
@@ -39,13 +39,13 @@ class TargetRobotActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             ChooseDestination: self.choose,
         }
 
     def choose(self, request: ChooseDestination) -> None:
-        """Connects to a destination; an address is named once more before anything is sent there."""
+        """Connects to a destination; an address is shown for confirmation before anything is sent there."""
         state = self._store.state
         if request.where not in DESTINATIONS:
             return
@@ -67,7 +67,7 @@ class TargetRobotActions:
 
     def _choose_address(self, request: ChooseDestination) -> None:
         asked, address = self._store.state.typed_address, request.address.strip()
-        self._ask("")  # It was about what stood in the field before.
+        self._ask("")  # The question was about the previous text of the field.
         if request.answer == "yes" and asked and address == asked:
             self._robot.open(self._store.state.model.name, asked)
             return
@@ -77,7 +77,7 @@ class TargetRobotActions:
         try:
             parse_address(address, self._store.state.model)
         except RcilabError as error:
-            self._store.say("bad", tell_error(error), trouble=_ADDRESS)
+            self._store.say("bad", explain_error(error), trouble=_ADDRESS)
             return
         self._ask(address)
 

@@ -12,7 +12,7 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.run.active_force import no_push
 from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
 from rcilab.app.state_store import StateStore
-from rcilab.app.status_text import tell_error
+from rcilab.app.status_text import explain_error
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
 from rcilab.i18n.translator import message
@@ -27,7 +27,7 @@ _WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetNetwork(Request):
-    """The network of our own controller; what is None stays."""
+    """Change the network of our own controller; None leaves a value unchanged."""
 
     name: str | None = None
     """One of `NETWORK_LAB`."""
@@ -35,7 +35,7 @@ class SetNetwork(Request):
     """[1] or [s]."""
     direction: str | None = None
     pulled: bool | None = None
-    """Whether the cable is out."""
+    """Whether the cable is pulled."""
     clear: bool = False
 
     @property
@@ -45,14 +45,14 @@ class SetNetwork(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressSafety(Request):
-    """A safety button of our own controller."""
+    """Press a safety button of our own controller."""
 
     button: Literal["none", "estop", "gstop"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetWiring(Request):
-    """Wires our own controller's outputs to its inputs, or makes it stop commands inside the soft limits."""
+    """Wire our own controller's outputs to its inputs, or make it stop commands inside the soft limits."""
 
     name: Literal["loop_back", "auto_limit"]
     on: bool
@@ -68,7 +68,7 @@ class WorldActions:
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             SetNetwork: self.set_network,
             PressSafety: self.press_safety,
@@ -76,7 +76,7 @@ class WorldActions:
         }
 
     def set_network(self, request: SetNetwork) -> None:
-        """Changes the network, or pulls the cable and plugs it in again; numbers are taken at their bounds."""
+        """Changes the network, or pulls or plugs the cable; numbers are clipped to their bounds."""
         watch = self._require_watch()
         if watch is None:
             return
@@ -95,7 +95,7 @@ class WorldActions:
         self._tell(watch)
 
     def press_safety(self, request: PressSafety) -> None:
-        """Presses the emergency stop, opens the safety gate, or puts both right."""
+        """Presses or releases the emergency stop, opens or closes the safety gate."""
         watch = self._require_watch()
         if watch is not None and request.button in ("none", "estop", "gstop"):
             watch.ask(Press(request.button))
@@ -110,7 +110,7 @@ class WorldActions:
         self._store.update(world=replace(self._store.state.world, **{request.name: request.on}))
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Follows the controller of now and what it says of itself; another one has a good network."""
+        """Follows the current controller and its reports; a new one has a good network."""
         address = status.world_address
         if address != self._address:
             self.close()
@@ -124,7 +124,7 @@ class WorldActions:
             return
         error = self._watch.pop_error()
         if error is not None:
-            self._store.say("bad", tell_error(error))
+            self._store.say("bad", explain_error(error))
         is_settled, world, said = self._watch.is_settled, self._store.state.world, self._watch.status
         if said is not world.status:
             world = replace(world, status=said)

@@ -1,4 +1,4 @@
-"""What the operator has done to the virtual controller: its network, its wiring, its buttons."""
+"""The operator's changes of the virtual controller: its network, its wiring, its buttons."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from rcilab.sim.api import Direction, NetworkFaults, WorldStatus
 
 CABLE_PULLED = NetworkFaults(loss=1.0, tcp_delay=10.0)
-"""No datagram comes through, and TCP says nothing."""
+"""No datagram arrives, and TCP is silent."""
 NETWORK_LAB: dict[str, tuple[float, str]] = {
     "loss": (0.3, "%"),
     "delay": (0.05, "ms"),
@@ -15,7 +15,7 @@ NETWORK_LAB: dict[str, tuple[float, str]] = {
     "reorder": (0.3, "%"),
     "duplicate": (0.3, "%"),
 }
-"""The sliders: largest value, [1] or [s], and the unit on the page. Choices: what is beyond ends any motion."""
+"""The sliders: largest value, [1] or [s], and the unit on the page. Tuning values: a larger one ends any motion."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -31,4 +31,4 @@ class WorldState:
     auto_limit: bool = False
     """Whether it stops commands inside the soft joint limits."""
     status: WorldStatus | None = None
-    """What it reports of itself; None: it is not a virtual controller of ours, or does not answer."""
+    """The status that it reports; None: it is not a virtual controller of ours, or does not answer."""

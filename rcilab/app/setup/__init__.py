@@ -1,1 +1,1 @@
-"""Safety box, tool, load and force-control frame: what is wanted, and what the controller has."""
+"""Safety box, tool, load and force-control frame: as set on the page, and as the controller has them."""

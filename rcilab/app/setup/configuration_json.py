@@ -1,4 +1,4 @@
-"""A configuration as JSON, for the case that the workbench ends without being closed."""
+"""A configuration as JSON, for the restart of a workbench after a crash."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rcilab.model.dynamics.payload import Payload
 
 
 def setup_facts(setup: RobotConfiguration) -> dict[str, Any]:
-    """Returns the parts of a configuration that are not None, ready for JSON; lengths in m, poses as x y z w x y z."""
+    """Returns the parts of a configuration that are not None, for JSON; lengths in m, poses as x y z w x y z."""
     facts: dict[str, Any] = {}
     if setup.box is not None:
         box = setup.box
@@ -29,10 +29,10 @@ def setup_facts(setup: RobotConfiguration) -> dict[str, Any]:
 
 
 def build_setup(facts: dict[str, Any]) -> RobotConfiguration:
-    """Returns the configuration that `setup_facts` was made of.
+    """Returns the configuration of the result of `setup_facts`.
 
     Raises:
-        LookupError, TypeError, ValueError: They are no such facts; numbers out of range raise an InvalidValueError.
+        LookupError, TypeError, ValueError: The facts are not valid; numbers out of range raise an InvalidValueError.
     """
     box, load, force, joints = (facts.get(part) for part in ("box", "load", "force", "joints"))
     return RobotConfiguration(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rcilab.app.connection import Connection
-from rcilab.app.status_text import StartingError, tell_error
+from rcilab.app.status_text import StartingError, explain_error
 from rcilab.core.errors import RcilabError
 from rcilab.i18n.translator import Message
 
@@ -20,7 +20,7 @@ class ConfigurationSender:
 
     Args:
         session: The robot.
-        refuse: Takes why the controller refused a request.
+        refuse: Called with the reason if the controller refuses a request.
     """
 
     def __init__(self, session: Connection, refuse: Callable[[Message], None]) -> None:
@@ -29,27 +29,27 @@ class ConfigurationSender:
 
     @property
     def is_underway(self) -> bool:
-        """Whether an answer is awaited; nothing else is sent until it was collected."""
+        """Whether an answer is awaited; the next request is sent after it was collected."""
         return self._request is not None
 
     def send(self, setup: RobotConfiguration) -> None:
-        """Sends a request; none while the control process is still starting."""
+        """Sends a request; nothing while the control process is still starting."""
         assert self._request is None
         try:
             self._request = self._session.supervisor().set_up(setup)
         except StartingError:
             return
         except RcilabError as error:
-            self._refuse(tell_error(error))
+            self._refuse(explain_error(error))
 
     def collect(self) -> None:
-        """Looks whether there is an answer."""
+        """Takes the answer, if there is one."""
         request = self._request
         if request is None or not request.done:
             return
         self._request = None
         if request.error is not None:
-            self._refuse(tell_error(request.error))
+            self._refuse(explain_error(request.error))
 
     def forget(self) -> None:
         """Drops the request: another arm was chosen."""

@@ -1,4 +1,4 @@
-"""The configuration on the page: what is edited, what the controller has, and what differs."""
+"""The configuration on the page: what is edited, what the controller has, and the difference."""
 
 from __future__ import annotations
 
@@ -31,40 +31,40 @@ LISTED: tuple[SetupPart, ...] = (*SETUP_PARTS, "joints")
 ON_FLANGE: tuple[SetupPart, ...] = ("tool", "load", "force")
 FORCE_AXES = {"world": ForceFrame.WORLD, "tool": ForceFrame.TOOL, "path": ForceFrame.PATH}
 
-_SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: within these the controller's tool is ours.
-_SEEN = 5e-5  # [m] Closer to a face than this, the tool stands on it: it would be 0.0 mm outside.
+_SAME_PLACE, _SAME_TURN = 1e-4, 1e-3  # [m], elements of a rotation: largest difference of two equal tools.
+_SEEN = 5e-5  # [m] A tool at a smaller distance from a face is on the face: it would be 0.0 mm outside.
 _FIRST_SETUP = RobotConfiguration(
     box=SafetyBox(size=(1.6, 1.6, 1.3), T_base_box=Pose((0.0, 0.0, 0.66)), active=False),
     tool=IDENTITY,
     load=NO_LOAD,
     force=ForceControlFrame(),
 )
-"""That of an arm before any edit; the box is a first proposal, and off."""
+"""The configuration of an arm before any edit; the box is a proposal, and off."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetupState:
-    """Box, tool, load and force-control frame as the operator wants them."""
+    """Box, tool, load and force-control frame as set by the operator."""
 
     wanted: RobotConfiguration = field(default_factory=lambda: _FIRST_SETUP)
     """All four parts."""
     touched: frozenset[SetupPart] = frozenset()
-    """Parts that were edited here: those to be sent to the controller."""
+    """The parts that were edited here: those to be sent to the controller."""
     inertia: tuple[float, ...] | None = None
-    """Six typed moments, xx yy zz xy xz yz, [kg m^2], that no body has yet; None: those of the load."""
+    """Six typed moments, xx yy zz xy xz yz, [kg m^2], that no body can have; None: those of the load."""
     edited: str = ""
     """The part with handles in the scene; "" for none."""
     seen: frozenset[str] = frozenset()
-    """Parts that are drawn."""
+    """The parts that are drawn."""
     asked: RobotConfiguration | None = None
-    """The configuration for a real robot that awaits a second yes."""
+    """The configuration for a real robot that awaits a second confirmation."""
     refusal: Message | None = None
-    """Why the controller did not take it."""
+    """Why the controller refused it."""
     can_undo: bool = False
 
 
 def pending_parts(state: UiState, status: SupervisorStatus) -> tuple[SetupPart, ...]:
-    """Returns the edited parts that the controller has not taken yet."""
+    """Returns the edited parts that the controller has not accepted yet."""
     setup = state.setup
     return tuple(
         part
@@ -85,12 +85,12 @@ def own_limits(state: UiState) -> SoftJointLimits:
 
 
 def soft_limits(state: UiState) -> SoftJointLimits:
-    """Returns the soft limits that are wanted: the whole range as long as none were set."""
+    """Returns the soft limits as set; the whole range if none are."""
     return state.setup.wanted.joints or own_limits(state)
 
 
 def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
-    """Returns why nothing may run with this configuration, or None when the controller has it."""
+    """Returns why no motion may run with this configuration, or None if the controller has it."""
     parts = pending_parts(state, status)
     if not parts:
         return None
@@ -102,11 +102,11 @@ def setup_obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
 
 
 def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
-    """Returns how far outside the safety box a place of the tool is, and past which face; None inside or without one.
+    """Returns how far outside the safety box the tool is, and beyond which face; None inside or without a box.
 
     Args:
-        state: Of the page.
-        position: In base, shape (3,), [m].
+        state: State of the page.
+        position: Position of the tool in base, shape (3,), [m].
     """
     box = active_box(state.setup.wanted.box)
     if box is None:
@@ -144,14 +144,14 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
 
 
 def describe_held(status: SupervisorStatus, part: str) -> Message:
-    """Returns what the controller has: the tool by the poses it reports, the rest by what it has acknowledged."""
+    """Returns the controller's values: the tool by the poses that it reports, the rest as it acknowledged them."""
     if part == "tool" and status.T_flange_tool is not None:
         return _describe_pose(status.T_flange_tool)
     return describe_part(status.setup, part)
 
 
 def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:
-    """Returns the tool that the controller reports, where it is not the one that motions are checked with."""
+    """Returns the tool that the controller reports, if it differs from the one of plans and checks."""
     held = status.T_flange_tool
     if held is None or status.phase != "idle":
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 import numpy as np
 
-from rcilab.app.arm_features import tell_lack_of_part
+from rcilab.app.arm_features import explain_lack_of_part
 from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
 from rcilab.app.planning import Plan, tool_path
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _UNDO_DEPTH = 100
-_HAND_GONE = 1.0  # [s] A drag that was not heard of for so long has ended, whatever became of its page.
+_HAND_GONE = 1.0  # [s] A drag without an event for this time has ended, whether or not its page is open.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +69,11 @@ class OpenTab(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveSetup(Request):
-    """The handles of a part of the configuration were moved."""
+    """The handle of a part of the configuration was moved."""
 
     part: Literal["box", "tool", "load", "force"]
     position: tuple[float, ...]
-    """Of the box in base; of the others in the flange frame, [m]."""
+    """Position of the box in base; of the others in the flange frame, [m]."""
     wxyz: tuple[float, ...]
     ended: bool = False
     """Whether the mouse was released."""
@@ -90,7 +90,7 @@ class ResizeBox(Request):
     face: int
     """0 to 2: the low faces along x, y, z of the box; 3 to 5: the high ones."""
     hand: tuple[float, ...]
-    """Where the mouse is, base axes, [m]."""
+    """Position of the mouse, base axes, [m]."""
     ended: bool = False
 
     @property
@@ -103,7 +103,7 @@ class SetSetup(Request):
     """A switch of the configuration."""
 
     name: Literal["edited", "box", "tool", "load", "force", "active", "axes"]
-    """What has handles; whether a part is drawn; whether the box bounds; what the force-control frame follows."""
+    """The part with handles; whether a part is drawn; whether the box is on; the frame of force control."""
     value: str | bool
 
 
@@ -115,24 +115,24 @@ class PressSetup(Request):
 
 
 class SetupActions:
-    """Handles in the scene, typed numbers, switches; each edit goes to a virtual controller by itself."""
+    """Handles in the scene, typed numbers, switches; each edit is sent to a virtual controller at once."""
 
     def __init__(self, store: Store, session: RobotConnection) -> None:
         self._store, self._session = store, session
         self._past: list[
             tuple[RobotConfiguration, frozenset[SetupPart]]
-        ] = []  # What was wanted, what of it was edited.
+        ] = []  # The configuration, and the edited parts.
         self._arm = store.state.model.name
-        self._drag: tuple[int | None, str] | None = None  # Which page drags which part.
-        self._dragged = -math.inf  # When it was last heard to.
-        self._post = ConfigurationSender(session, self._refuse)
-        self._told_of: object = None  # The program of which it was said what another tool makes of it.
-        self._is_back = False  # What came back with this workbench: it was said already.
-        self._announced = 0  # At how many connections the controller has accepted a configuration, as far as reported.
+        self._drag: tuple[int | None, str] | None = None  # The page that drags, and the part.
+        self._dragged = -math.inf  # Time of the last drag event, [s].
+        self._sender = ConfigurationSender(session, self._refuse)
+        self._reported_for: object = None  # The program of the last notice about another tool.
+        self._is_back = False  # The configuration was restored and reported.
+        self._announced = 0  # Number of connections at which an accepted configuration was reported.
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             OpenTab: self.open_tab,
             MoveSetup: self.move,
@@ -142,11 +142,11 @@ class SetupActions:
         }
 
     def type_field(self, request: TypeField) -> None:
-        """Takes a typed number, or says beside the field what is wrong with it."""
+        """Takes a typed number, or shows the problem next to its field."""
         _, _, place = request.field.partition(".")
         part, _, name = place.partition(".")
         state = self._store.state
-        lack = tell_lack_of_part(state.model, cast("SetupPart", part)) if part in LISTED else None
+        lack = explain_lack_of_part(state.model, cast("SetupPart", part)) if part in LISTED else None
         if lack is not None:
             self._store.complain(request.field, lack)
             return
@@ -164,7 +164,7 @@ class SetupActions:
             return
         changed = with_field(state.setup, part, name, parsed.value, longest)
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
-            self._store.update(setup=changed)  # The moments stand as typed, also while no body has them yet.
+            self._store.update(setup=changed)  # Typed moments stay, even if no body can have them.
             changed = with_inertia(changed)
         untaken = None
         if isinstance(changed, SetupState) and name == "mass":
@@ -203,7 +203,7 @@ class SetupActions:
 
     def _limit_joints(self, joints: SoftJointLimits) -> None:
         setup = self._store.state.setup
-        if setup.wanted.joints is None:  # What an undo leads back to has to be said, too.
+        if setup.wanted.joints is None:  # The state after an undo has to be sent, too.
             setup = replace(
                 setup, wanted=setup.wanted.updated(RobotConfiguration(joints=own_limits(self._store.state)))
             )
@@ -211,10 +211,10 @@ class SetupActions:
         self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(joints=joints))), "joints")
 
     def move(self, request: MoveSetup) -> None:
-        """Follows the handles of a part."""
+        """Moves a part with its handle."""
         numbers = (*request.position, *request.wxyz)
         if request.part != self._store.state.setup.edited or len(numbers) != 7 or not all(map(math.isfinite, numbers)):
-            return  # A drag that ends after its edit, or nothing of ours.
+            return  # A drag that ends after its edit, or of another part.
         if math.hypot(*request.wxyz) < 1e-6:
             return
         state, pose = self._store.state, Pose(request.position, request.wxyz)
@@ -227,7 +227,7 @@ class SetupActions:
         self._hear_drag(request.ended)
 
     def resize(self, request: ResizeBox) -> None:
-        """Follows a handle on a face of the safety box; the other faces stay."""
+        """Moves a face of the safety box with its handle; the other faces stay."""
         setup = self._store.state.setup
         box = setup.wanted.box
         if box is None or setup.edited != "box" or request.face not in range(6) or not np.isfinite(request.hand).all():
@@ -246,18 +246,18 @@ class SetupActions:
         self._hear_drag(request.ended)
 
     def set_setup(self, request: SetSetup) -> None:
-        """Turns a switch; what does not exist is ignored."""
+        """Changes a switch; invalid values are ignored."""
         setup, value = self._store.state.setup, request.value
         box, force = setup.wanted.box, setup.wanted.force
         assert box is not None
         assert force is not None
         model = self._store.state.model
         if request.name == "edited" and value in ("", *SETUP_PARTS):
-            shown = {part for part in SETUP_PARTS if part == value and tell_lack_of_part(model, part) is None}
+            shown = {part for part in SETUP_PARTS if part == value and explain_lack_of_part(model, part) is None}
             self._store.update(setup=replace(setup, edited=value, seen=setup.seen | shown))
         elif request.name in SETUP_PARTS and isinstance(value, bool):
             seen = setup.seen | {request.name} if value else setup.seen - {request.name}
-            if tell_lack_of_part(model, request.name) is None:
+            if explain_lack_of_part(model, request.name) is None:
                 self._store.update(setup=replace(setup, seen=seen))
         elif request.name == "active" and isinstance(value, bool):
             switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
@@ -267,13 +267,13 @@ class SetupActions:
             self._edit(replace(setup, wanted=setup.wanted.updated(RobotConfiguration(force=turned))), "force")
 
     def open_tab(self, request: OpenTab) -> None:
-        """Ends the edit when its tab is left: handles in the scene are those of the tab that is open."""
+        """Ends the edit when its tab is left: only the open tab has handles in the scene."""
         setup = self._store.state.setup
         if request.name != "tab.setup" and setup.edited:
             self._store.update(setup=replace(setup, edited=""))
 
     def press(self, request: PressSetup) -> None:
-        """Does what one of the buttons says."""
+        """Handles one of the buttons."""
         state = self._store.state
         setup = state.setup
         if request.what == "undo":
@@ -292,24 +292,24 @@ class SetupActions:
             self._send(self._session.status())
 
     def restore(self, setup: RobotConfiguration) -> None:
-        """Restores and draws a configuration edited before; it is sent to a real robot only after a question."""
+        """Restores and draws an edited configuration; a real robot gets it only after a question."""
         now = self._store.state.setup
         model = self._store.state.model
-        parts: set[SetupPart] = {part for part in setup.parts if tell_lack_of_part(model, part) is None}
+        parts: set[SetupPart] = {part for part in setup.parts if explain_lack_of_part(model, part) is None}
         if parts:
             self._is_back = True
             wanted, touched = now.wanted.updated(setup.only(parts)), now.touched | parts
             self._take(replace(now, wanted=wanted, touched=touched, seen=now.seen | drawn_parts(parts)), parts)
 
     def tick(self, status: SupervisorStatus) -> None:
-        """Follows a configuration that was sent, and sends what is new to a virtual controller."""
+        """Follows a request, and sends changes to a virtual controller."""
         name = self._store.state.model.name
         if name != self._arm:
             self._arm, self._past, self._announced = name, [], 0
-            self._post.forget()
-        if self._post.is_underway:
-            self._post.collect()
-            status = self._session.status()  # What was acknowledged in the meantime is not sent again.
+            self._sender.forget()
+        if self._sender.is_underway:
+            self._sender.collect()
+            status = self._session.status()  # Values that were acknowledged meanwhile are not sent again.
         state = self._store.state
         announced, self._announced = self._announced, status.setup_times  # Another supervisor counts from 0.
         if self._announced > announced:
@@ -321,12 +321,12 @@ class SetupActions:
             self._send(status)
 
     def _send(self, status: SupervisorStatus) -> None:
-        """Sends the controller every part that it has not accepted yet."""
+        """Sends every part that the controller has not accepted yet."""
         state = self._store.state
         parts = pending_parts(state, status)
-        if parts and not self._post.is_underway:
+        if parts and not self._sender.is_underway:
             self._is_back = False
-            self._post.send(state.setup.wanted.only(parts))
+            self._sender.send(state.setup.wanted.only(parts))
 
     def _refuse(self, why: Message) -> None:
         self._store.update(setup=replace(self._store.state.setup, refusal=why))
@@ -337,8 +337,8 @@ class SetupActions:
             self._drag = None
 
     def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
-        """Takes over an edit, unless the arm lacks the part; a drag is one step to undo."""
-        lack = tell_lack_of_part(self._store.state.model, part)
+        """Applies an edit, unless the arm lacks the part; a drag is one step for undo."""
+        lack = explain_lack_of_part(self._store.state.model, part)
         if lack is not None:
             self._store.say("warn", lack)
             return
@@ -352,30 +352,30 @@ class SetupActions:
         if not self._past:
             return
         setup, (before, touched) = self._store.state.setup, self._past.pop()
-        touched |= frozenset(self._session.status().setup.parts)  # What it was sent has to be reset there.
-        if self._post.is_underway:
+        touched |= frozenset(self._session.status().setup.parts)  # Parts that were sent have to be reset there.
+        if self._sender.is_underway:
             touched |= setup.touched
         parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
         self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)
 
-    def _tell_program(self, state: UiState) -> None:
-        """Says once of a program that goes with the tool of the page what another tool makes of it."""
+    def _report_program(self, state: UiState) -> None:
+        """Reports once, for a program with the tool of the page, the effect of another tool."""
         draft = state.program.draft
         is_here = draft.model == state.model.name and bool(draft.steps) and draft.tool is None
-        if is_here and draft is not self._told_of:
-            self._told_of = draft
+        if is_here and draft is not self._reported_for:
+            self._reported_for = draft
             self._store.say("warn", message("setup.program_moves"))
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
-        """Replaces the configuration and what depends on it: tool and load, goal, path. The plan may go stale."""
+        """Replaces the configuration and what depends on it: tool, load, goal, path. The plan may become outdated."""
         state = self._store.state
         changes: dict[str, object] = {}
         if parts & {"tool", "load", "joints"}:
             changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
             if "tool" in parts:
-                self._tell_program(state)
-                self._store.forget()  # Goals of another tool.
+                self._report_program(state)
+                self._store.forget()  # Its goals are those of another tool.
                 target = model.forward(state.goal.q)
                 reach = evaluate_joints(model, state.goal.q)
                 if state.goal.reach.solutions is not None:
@@ -388,5 +388,5 @@ class SetupActions:
 
 
 def is_setup_field(field: str) -> bool:
-    """Returns whether a typed field belongs to the configuration."""
+    """Returns whether a field belongs to the configuration."""
     return field.startswith("setup.")

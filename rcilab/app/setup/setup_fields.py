@@ -27,17 +27,17 @@ FIELD_NAMES = {
     "force": POSE_NAMES,
 }
 JOINT_ENDS = ("lower", "upper")
-"""Beside FIELD_NAMES: setup.joints.lower.0 and so on."""
-_ROUNDED = 1e-5  # [rad] Closer than what a field shows of an angle.
-THINNEST = 0.02  # [m] A box that the mouse cannot make thinner.
-FARTHEST_FACE = 5.0  # [m] No arm of ours reaches a third of it, so what is farther is a slip of units.
+"""In addition to FIELD_NAMES: setup.joints.lower.0 and so on."""
+_ROUNDED = 1e-5  # [rad] Smaller than the resolution of an angle field.
+THINNEST = 0.02  # [m] Smallest thickness of a box that is dragged.
+FARTHEST_FACE = 5.0  # [m] More than three times the reach of any arm: a larger value is a mistake of units.
 
 _PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True)
 class Range:
-    """What may be typed into a field."""
+    """The range of a field."""
 
     low: float
     high: float
@@ -50,7 +50,7 @@ def field_range(part: str, name: str, rated_payload: float, longest_tool: float)
     Args:
         part: A key of `FIELD_NAMES`.
         name: One of its names.
-        rated_payload: Of the arm, [kg].
+        rated_payload: Payload of the arm, [kg].
         longest_tool: See `Capabilities.longest_tool`, [m].
     """
     if name in POSE_NAMES[3:]:
@@ -84,10 +84,10 @@ def read_field(setup: SetupState, part: str, name: str) -> float:
 
 
 def with_field(setup: SetupState, part: str, name: str, value: float, longest_tool: float) -> SetupState | Message:
-    """Returns the configuration with one number changed, or what is wrong with it.
+    """Returns the configuration with one number changed, or the problem of the number.
 
     Args:
-        setup: The configuration so far.
+        setup: The configuration.
         part: A key of `FIELD_NAMES`.
         name: One of its names.
         value: In the unit of the field.
@@ -117,7 +117,7 @@ def with_field(setup: SetupState, part: str, name: str, value: float, longest_to
 
 
 def with_pose(setup: SetupState, part: str, pose: Pose, longest_tool: float) -> SetupState | Message:
-    """Returns the configuration with a part moved, or why it cannot be there."""
+    """Returns the configuration with a part moved, or why that is not possible."""
     wanted = setup.wanted
     length = math.hypot(*pose.parts[1])
     if part != "box" and length > longest_tool:
@@ -137,14 +137,14 @@ def with_pose(setup: SetupState, part: str, pose: Pose, longest_tool: float) -> 
 
 
 def faces(box: SafetyBox) -> np.ndarray:
-    """Returns where the faces are along the axes of the box, from the base: low x, y, z, high x, y, z, [m]."""
+    """Returns the positions of the faces along the axes of the box: low x, y, z, high x, y, z, [m]."""
     centre = box.T_base_box.rotation.T @ box.T_base_box.position
     half = 0.5 * np.array(box.size)
     return np.concatenate((centre - half, centre + half))
 
 
 def box_between(box: SafetyBox, bounds: np.ndarray) -> SafetyBox:
-    """Returns a box with the same directions and other faces, as `faces` counts them."""
+    """Returns a box of the same orientation with other faces, in the order of `faces`."""
     low, high = bounds[:3], bounds[3:]
     centre = box.T_base_box.rotation @ (0.5 * (low + high))
     pose = Pose.from_parts(box.T_base_box.parts[0], (float(centre[0]), float(centre[1]), float(centre[2])))
@@ -174,7 +174,7 @@ def _with_load_field(setup: SetupState, load: Payload, name: str, value: float) 
 
 
 def with_inertia(setup: SetupState) -> SetupState | Message:
-    """Returns the configuration with the typed moments of inertia in the load, or why no body has them."""
+    """Returns the configuration with the typed moments of inertia in the load, or why no body can have them."""
     load = setup.wanted.load
     assert load is not None
     if setup.inertia is None:
@@ -207,20 +207,20 @@ def _turned(pose: Pose, name: str, value: float) -> Pose:
 
 
 def exact_end(own: JointLimits, end: str, joint: int, angle: float) -> float:
-    """Returns a typed end of a soft joint limit, [rad]: the arm's own one, unrounded, if the field shows that.
+    """Returns a typed end of a soft joint limit, [rad]: the arm's own limit, unrounded, if the field shows that.
 
     Args:
         own: Limits of the arm.
         end: "lower" or "upper".
         joint: Index of the joint.
-        angle: As typed, [rad].
+        angle: The typed angle, [rad].
     """
     exact = float(getattr(own, end)[joint])
     return exact if abs(angle - exact) < _ROUNDED else angle
 
 
 def joint_limits_between(lower: Sequence[float], upper: Sequence[float]) -> SoftJointLimits | Message:
-    """Returns soft joint limits by their ends, [rad], or which ends have no room between them."""
+    """Returns soft joint limits from their ends, [rad], or the joints whose ends leave no range."""
     for low, high in zip(lower, upper, strict=True):
         if not low < high:
             return message("setup.joint_ends", low=low, high=high)

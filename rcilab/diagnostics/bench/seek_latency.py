@@ -54,7 +54,7 @@ def bench_scrub() -> Measurement:
         with connect(f"ws://127.0.0.1:{bench.port}{LIVE_PATH}", additional_headers=origin, compression=None) as link:
             bench.dispatcher.ask(PageOpened(page=_PAGE))
             link.send(json.dumps({"kind": "hello", "page": _PAGE, "key": bench.live.introduce(_PAGE)}))
-            wait_for("the controls", lambda: bench.store.state.lease.holder == _PAGE, 30.0)
+            wait_for("the controls", lambda: bench.store.state.control_lock.holder == _PAGE, 30.0)
             for position in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():
                 start = time.perf_counter()
                 link.send(json.dumps({"kind": "seek", "place": position}))

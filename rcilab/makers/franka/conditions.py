@@ -1,9 +1,9 @@
 """The conditions of Franka's control interface (FCI) for the Panda: the common rows with its sources and errors.
 
-The page "Robot and interface specifications" prints three lists: for joint trajectories, for Cartesian ones with what
-follows from them for the joints, and for torques. Its recommendations for the start and the end of a motion stand in
-the list for Cartesian ones; they are taken to hold for joints too. The page "Errors" names the error of each broken
-condition. Differences are taken backward over 1 ms there as well.
+The page "Robot and interface specifications" has three lists: for joint trajectories, for Cartesian ones with their
+consequences for the joints, and for torques. Its recommendations for the start and the end of a motion are in the list
+for Cartesian ones; they are applied to joints, too. The page "Errors" names the error of each violated condition.
+Differences are backward differences over 1 ms there as well.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _ERRORS = "Franka's page Errors"
 _ELBOW_JOINT = 2  # From 0: Franka's elbow is the angle of joint 3.
 
 START_TOLERANCE = 1e-6  # [rad] or [m]
-"""How far from the arm a motion may start. The page gives no figure: a step below this is a jerk inside every bound."""
+"""Tolerance of the start. The page gives no figure: a smaller step is a jerk inside every bound."""
 
 _JOINT_ERRORS = {
     JOINT_POSITION.id: FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION,
@@ -77,7 +77,7 @@ _MEASURED_ERRORS = {
 
 
 def _motion_row(row: Condition) -> Condition:
-    """Returns a common row on joint motions as Franka has it."""
+    """Returns a common row on joint motions in Franka's form."""
     if row.id in _JOINT_ERRORS:
         return replace(row, fault=_JOINT_ERRORS[row.id], source=f"{_PAGE}, joint trajectory, necessary; {_ERRORS}")
     if row.id == "start.position":
@@ -184,7 +184,7 @@ _TOOL = (
         for row in TOOL_STANDSTILL_CONDITIONS
     ),
 )
-"""On commanded tool poses, and on the joint angles that follow from them."""
+"""On commanded tool poses, and on their joint angles."""
 
 _TORQUES = (
     replace(
@@ -254,7 +254,7 @@ FCI_CONDITIONS = ConditionTable(
     box=_BOX,
     conditions=(*_MOTION, _BOX, *_TOOL, *_TORQUES, *_BEHAVIOUR),
 )
-"""What `check` and the monitors use for the Panda. Errors without a bound on the pages (power, sensor range,
+"""The rows for `check` and the monitors of the Panda. Errors without a bound on the pages (power, sensor range,
 self-collision) have no row."""
 
 

@@ -1,8 +1,8 @@
 """The errors of Franka's control interface, each with the name its client library prints.
 
-An error is one of 41 flags of the robot state; the value is its place there. Franka's page "Errors" explains the
-names; those that the page leaves out are explained from their names. Franka words two things in its own way: a
-velocity "discontinuity" is an acceleration beyond its limit, an acceleration "discontinuity" a jerk.
+An error is one of 41 flags of the robot state; the value is its index there. Franka's page "Errors" explains the names;
+those that the page leaves out are explained from their names. Two of Franka's terms differ from the usual: a velocity
+"discontinuity" is an acceleration beyond its limit, an acceleration "discontinuity" a jerk.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from rcilab.core.fault import FaultCode
 
 
 class FrankaError(FaultCode):
-    """One error flag of the Panda's robot state; the value is its place."""
+    """One error flag of the Panda's robot state; the value is its index."""
 
     JOINT_POSITION_LIMITS_VIOLATION = 0
     CARTESIAN_POSITION_LIMITS_VIOLATION = 1
@@ -67,7 +67,7 @@ class FrankaError(FaultCode):
 
     @property
     def cause(self) -> str:
-        """What the robot saw, in a few words."""
+        """What the robot detected, in a few words."""
         return _CAUSES[self]
 
 

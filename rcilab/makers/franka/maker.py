@@ -1,4 +1,4 @@
-"""Franka: the Panda arm, its errors and conditions. It can be computed with, but not simulated or driven."""
+"""Franka: the Panda arm, its errors and conditions. Motions are planned and checked, but not simulated or driven."""
 
 from __future__ import annotations
 

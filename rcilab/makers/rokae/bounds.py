@@ -1,6 +1,6 @@
-"""What both ends take as arguments, and start with, where neither the manual nor the arm's limits say: one table.
+"""Bounds and defaults of arguments, for client and controller, where neither manual nor arm give them: one table.
 
-More than these lengths is a slip of units: no xMate reaches farther than 1 m from its shoulder.
+A greater length is a mistake of units: no xMate reaches farther than 1 m from its shoulder.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 FILTER_OFF = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (wire notes, section 4).
 REPORT_FREQUENCY = 100.0  # [Hz] Cut-off frequency of the reported torques after the controller's start.
 LOWEST_FREQUENCY = 0.1  # [Hz] Smallest cut-off frequency: a motion arrives some 20 s late. At 0 Hz nothing would pass.
-LIMIT_TOLERANCE = 1e-9  # [rad] By which soft limits may pass the arm's own: they are often converted from degrees.
+LIMIT_TOLERANCE = 1e-9  # [rad] By which soft limits may exceed the arm's own: they are often converted from degrees.
 LONGEST_TOOL = 2.0  # [m] From the flange to the tool, the force-control frame or the load's centre of mass.
 FARTHEST_BOX = 10.0  # [m] From the base to the centre of the safety box, along each axis.
 LARGEST_BOX = 100.0  # [m] Edge of the safety box.

@@ -151,7 +151,7 @@ RCI_CONDITIONS = ConditionTable(
         ),
     ),
 )
-"""What `check` and the monitors use for the xMate arms, and the virtual controller itself."""
+"""The rows for `check` and the monitors of the xMate arms, and for the virtual controller."""
 
 _FAULTS = {row.id: row.fault for row in RCI_CONDITIONS.conditions if isinstance(row.fault, Fault)}
 

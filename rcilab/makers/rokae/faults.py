@@ -1,4 +1,4 @@
-"""The twenty faults of the RCI, each with one name everywhere.
+"""The twenty faults of the RCI.
 
 A fault is a bit on the wire, a member here, a row in a report, a label in a plot and a lesson. Numbers, names,
 causes and remedies: RCI manual V1.3.1, section 4.6.
@@ -45,27 +45,27 @@ class Fault(FaultCode):
 
     @property
     def cause(self) -> str:
-        """What the robot saw, in a few words (manual 4.6, second column)."""
+        """What the robot detected, in a few words (manual 4.6, second column)."""
         return _CAUSES[self]
 
     @property
     def remedy(self) -> str:
-        """What to do about it, in one sentence (manual 4.6, third column)."""
+        """The remedy, in one sentence (manual 4.6, third column)."""
         return _REMEDIES.get(self, _SMOOTHNESS)
 
     @property
     def torque_remedy(self) -> str:
-        """The same for a motion that commands torques, where no planner's advice helps."""
+        """The remedy in torque mode, where a planner cannot help."""
         return _REMEDIES.get(self, _GAINS)
 
     @property
     def impedance_remedy(self) -> str:
-        """The same for a motion under impedance, where forces move the arm, and not its commands alone."""
+        """The remedy under impedance, where forces move the arm, too."""
         return _YIELDED if self in _MEASURED_RATES else self.remedy
 
     @property
     def outside_remedy(self) -> str:
-        """The same for a motion whose commands kept their limits."""
+        """The remedy for a motion whose commands kept their limits."""
         return _PUSHED if self in _MEASURED_RATES else self.remedy
 
 
@@ -142,7 +142,7 @@ _RANGE = (
     "execute(plan_recovery(robot.model, robot.state.q_c)))"
 )
 RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
-"""After which `recover()` may not do: the arm can be farther out than it recovers from by itself."""
+"""Faults after which `recover()` may be refused: the arm can be too far outside."""
 BOX_FAULTS = frozenset(
     {Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION, Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION}
 )

@@ -1,4 +1,4 @@
-"""Whose Cartesian numbers count: the manual's, or those of the vendor SDK's rate limiter."""
+"""The Cartesian limits: those of the manual, or those of the vendor SDK's rate limiter."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def cartesian_limits(limits: Limits, table: str = "manual") -> Limits:
 
     Args:
         limits: The bounds of an arm as its model has them: the manual's.
-        table: "manual" leaves them as they are; "sdk" puts the vendor's constants in their place.
+        table: "manual" leaves them unchanged; "sdk" replaces them by the vendor's constants.
 
     Raises:
-        InvalidValueError: There is no such table; the message lists those that exist.
+        InvalidValueError: There is no such table; the message lists all.
     """
     if require_table(table) == "manual":
         return limits
@@ -45,7 +45,7 @@ def require_table(table: str) -> str:
     """Returns the name of a table.
 
     Raises:
-        InvalidValueError: There is no such table; the message lists those that exist.
+        InvalidValueError: There is no such table; the message lists all.
     """
     if table not in LIMIT_TABLES:
         raise InvalidValueError("limit table", table, f"is unknown; known: {', '.join(LIMIT_TABLES)}")

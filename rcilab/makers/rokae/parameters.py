@@ -1,4 +1,4 @@
-"""How a controller follows and when it stops: stiffness, desired wrench, collision thresholds, filters.
+"""The parameters of the modes: stiffness, desired wrench, collision thresholds, filters.
 
 The settings of the RCI that belong to the five modes: `setJointImpedance`, `setCartesianImpedance`,
 `setCartImpDesiredTau`, `setCollisionBehavior`, `setFilters` and `setTorqueFilterCutOffFrequency`. A controller starts

@@ -2,7 +2,7 @@
 // a click chooses it.
 (() => {
   "use strict";
-  let told = null, had = -1;
+  let sent = null, focused = -1;
 
   const rows = () => [...document.querySelectorAll(".rl-branch")];
   const rowOf = (node) => node instanceof Element ? node.closest(".rl-branch") : null;
@@ -28,13 +28,13 @@
     event.stopPropagation();
   }, true);
 
-  // Looked at, not listened to: the list's HTML is exchanged under the mouse, and then nobody tells that it has left.
-  document.addEventListener("focusin", (event) => { const row = rowOf(event.target); had = row ? Number(row.dataset.branch) : -1; });
-  document.addEventListener("pointerdown", (event) => { if (!rowOf(event.target)) had = -1; }, true);
-  // The focus is given back in the same breath, so that no key gets lost.
+  // The row under the mouse is polled below: the list's HTML is replaced under the mouse, without a mouseleave event.
+  document.addEventListener("focusin", (event) => { const row = rowOf(event.target); focused = row ? Number(row.dataset.branch) : -1; });
+  document.addEventListener("pointerdown", (event) => { if (!rowOf(event.target)) focused = -1; }, true);
+  // Restores the focus in the same task as the replacement, so that no key is lost.
   const keep = () => {
-    if (had < 0 || document.activeElement !== document.body) return;
-    const row = document.querySelector(`.rl-branch[data-branch="${had}"]`);
+    if (focused < 0 || document.activeElement !== document.body) return;
+    const row = document.querySelector(`.rl-branch[data-branch="${focused}"]`);
     if (row && row.getClientRects().length) row.focus({ preventScroll: true });
   };
   new MutationObserver(keep).observe(document.documentElement, { childList: true, subtree: true });
@@ -43,8 +43,8 @@
     keep();
     const seen = document.querySelector(".rl-branch:hover") || rowOf(document.activeElement);
     const branch = seen && seen.getClientRects().length ? Number(seen.dataset.branch) : null;
-    if (branch === told) return;
-    told = branch;
+    if (branch === sent) return;
+    sent = branch;
     window.dispatchEvent(new CustomEvent("rl-say", { detail: { kind: "peek", branch } }));
   }, 70);
 })();

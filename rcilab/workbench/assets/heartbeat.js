@@ -1,10 +1,10 @@
-// Signs of life from a thread of their own: drawing a scene without a graphics card can hold the page up for seconds,
-// and a slow page is not a gone page. A page that is held up for longer than `SLOWEST` is as good as gone.
+// Heartbeats are sent by a separate thread: drawing a scene without a graphics card can block the page for seconds, and
+// a slow page still has its operator. A page that is blocked for longer than `SLOWEST` counts as closed.
 (() => {
   "use strict";
   const SLOWEST = 4000;  // [ms] The longest frame that software rendering was seen to take is 3.3 s.
   const work = (slowest) => {
-    let me = null, live = null, heard = 0;
+    let me = null, live = null, lastAnswer = 0;
     const hello = () => { if (live && live.readyState === WebSocket.OPEN && me) live.send(JSON.stringify({ kind: "hello", ...me })); };
     const connect = (address) => {
       live = new WebSocket(address);
@@ -12,12 +12,12 @@
       live.onmessage = (event) => {
         if (!event.data.startsWith('{"beat"')) return;
         self.postMessage(0);  // The page's own thread answers when it can.
-        if (Date.now() - heard < slowest) live.send('{"kind":"here"}');
+        if (Date.now() - lastAnswer < slowest) live.send('{"kind":"here"}');
       };
       live.onclose = () => setTimeout(() => connect(address), 1000);
     };
     self.onmessage = ({ data }) => {
-      heard = Date.now();
+      lastAnswer = Date.now();
       if (!data) return;
       me = data.me;
       if (live) hello(); else connect(data.address);

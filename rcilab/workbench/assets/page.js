@@ -175,7 +175,7 @@
     });
   };
 
-  const hearNotices = (notices) => {
+  const showNotices = (notices) => {
     const serials = notices.map((said) => said.serial), newest = Math.max(0, ...serials);
     if (notice === null && !greeted) notice = newest;  // What was said before this page came is no news to it.
     if (notice > newest && !greeted) notice = 0;  // A workbench that has begun anew.
@@ -184,7 +184,7 @@
     keep("notice", notice = Math.max(notice, newest));
   };
 
-  const hear = (event) => {
+  const receive = (event) => {
     const news = JSON.parse(event.data);
     if (news.beat) { send({ kind: "here" }); return; }
     // Another workbench answers at this address: viser's panels are those of the one that is gone.
@@ -194,7 +194,7 @@
     if (news.quality && news.quality !== document.documentElement.dataset.rlQuality) { reloadFor(news.quality); return; }
     if ("stop" in news || "stopHint" in news || "homeHint" in news) label();
     if (news.chips) draw(news.chips);
-    if (news.notices) hearNotices(news.notices);
+    if (news.notices) showNotices(news.notices);
     if (!greeted && said.stopHint) welcome();
     greeted = true;
     if ("cursor" in news) followSoon();
@@ -221,7 +221,7 @@
     const scheme = location.protocol === "https:" ? "wss://" : "ws://";
     live = new WebSocket(scheme + location.host + "/rcilab/live");
     live.onopen = () => { greeted = false; bar.classList.remove("rl-lost"); greet(); };
-    live.onmessage = hear;
+    live.onmessage = receive;
     live.onclose = () => {
       bar.classList.add("rl-lost");
       draw([{ id: "lost", label: "rcilab", value: said.lost || "The workbench is not running.", tone: "bad", wide: true }]);
@@ -247,7 +247,7 @@
     const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
     const panel = list.closest(".mantine-ScrollArea-root");
     if (shown === null && open !== before) {
-      // viser's tabs hear keys and fingers, not click().
+      // viser's tabs react to keys and pointers, not to click().
       found[before].dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
       shown = before;
     } else if (open !== shown) {
@@ -301,7 +301,7 @@
   window.addEventListener("pointerdown", heed, true);
   window.addEventListener("pointerover", (event) => { if (field && event.target !== field && !event.buttons) heed(event); }, true);
 
-  // A button that is held must not stay held when nobody would hear its release: when the window loses the focus, the
+  // A button that is held must not stay held when its release would be missed: when the window loses the focus, the
   // button goes out of sight (another tab), or the mouse comes back with no button down.
   const holds = (target) => target instanceof Element ? target.closest("div:has(> div > .rl-held) button") : null;
   let held = null;

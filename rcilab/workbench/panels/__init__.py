@@ -1,4 +1,4 @@
-"""One class a panel: `build(gui)` once, `show(state, status)` at the display's rate. No panel knows another."""
+"""One class per panel: `build(gui)` once, `show(state, status)` at the display's rate. No panel uses another."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
 
 
 class Panel(Protocol):
-    """What the renderer needs of a panel."""
+    """The interface of a panel for the renderer."""
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the panel's controls to the container that is open in `gui`."""
         ...
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Brings the controls up to date."""
+        """Updates the controls."""
         ...

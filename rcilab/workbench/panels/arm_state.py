@@ -1,4 +1,4 @@
-"""Where the arm is: the angles that its controller measures, and the tool, beside the goal that sliders show."""
+"""The arm's position: measured joint angles and the tool, next to the goal of the sliders."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-_PERIOD = 0.2  # [s] Numbers that change faster cannot be read.
+_PERIOD = 0.2  # [s] Numbers that change faster are not readable.
 
 
 class ArmStatePanel:
@@ -43,7 +43,7 @@ def arm_html(model: RobotModel, q: np.ndarray | None, text: Text) -> str:
     Args:
         model: The arm.
         q: Measured, [rad], shape (n,); None, or of another arm, while no states arrive.
-        text: Words and units.
+        text: The catalogue, with its units.
     """
     if q is None or len(q) != model.n:
         return f'<p class="rl-note">{esc(text("arm.unknown"))}</p>'

@@ -1,4 +1,4 @@
-"""The ways to stand at the target, a row each; the one under the mouse, or with the focus, is shown in the scene."""
+"""The solutions for the target, one per row; the one under the mouse, or with the focus, is shown in the scene."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.target_status import NEAR_LIMIT, margin, telling_joints
+from rcilab.app.goal.target_status import NEAR_LIMIT, distinguishing_joints, margin
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class BranchesPanel:
-    """A list for mouse and keyboard; `branches.js` sends which row is chosen."""
+    """A list for mouse and keyboard; `branches.js` sends the chosen row."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text = text
@@ -42,7 +42,7 @@ class BranchesPanel:
             return f'<p class="rl-note">{esc(text(code))}</p>'
         here = state.goal.q if arm is None else arm
         order = nearest_first(np.asarray(list(solutions)), here)
-        joints = telling_joints(np.asarray(list(solutions)))
+        joints = distinguishing_joints(np.asarray(list(solutions)))
         rows = "".join(
             self._row(number, at, solutions[at], here, joints, state) for number, at in enumerate(order, start=1)
         )
@@ -77,11 +77,11 @@ class BranchesPanel:
 
 
 def nearest_first(solutions: np.ndarray, here: np.ndarray) -> list[int]:
-    """Returns which solution stands in which row: by how far the joint that moves most has to go.
+    """Returns the order of the solutions in the list: by the largest angle that a joint has to move.
 
     Args:
         solutions: Joint angles, shape (N, n), [rad].
-        here: Where the arm is, shape (n,), [rad].
+        here: Position of the arm, shape (n,), [rad].
     """
     away = np.abs(solutions - here).max(axis=1)
     return sorted(range(len(solutions)), key=lambda at: (round(float(away[at]), 3), at))

@@ -1,4 +1,4 @@
-"""Check: the pre-flight report in the controller's own terms, before anything moves."""
+"""Check: the report on every condition, before anything moves."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_MOMENT = 0.5  # [s] What takes longer gets a bar and a way to end it.
+_MOMENT = 0.5  # [s] Longer jobs show a progress bar and Cancel.
 
 
 class CheckPanel:
@@ -58,7 +58,7 @@ class CheckPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Draws the report of the current plan."""
         plan, check, now = state.plan, state.check, time.monotonic()
-        planning = state.program.progress  # A program is checked where it is planned, and that takes the longest.
+        planning = state.program.progress  # A program is checked during its planning, which takes longest.
         busy = check.doing is not None or planning is not None
         self._began = self._began if busy else now
         self._bar.visible = busy and now - self._began > _MOMENT
@@ -67,7 +67,7 @@ class CheckPanel:
         self._undo.disabled = check.slowed is None or busy
         changed = outdated(state)
         self._again.visible = changed is not None and not busy
-        is_met = plan is not None and plan.report.ok and not plan.report.warnings  # There is nothing to slow down for.
+        is_met = plan is not None and plan.report.ok and not plan.report.warnings  # A slow-down has no purpose.
         self._slow.disabled = plan is None or is_met or busy or changed is not None or is_moving(status)
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):
@@ -112,7 +112,7 @@ class CheckPanel:
         )
 
     def _answers(self, state: UiState, plan: Plan) -> str:
-        """Returns what came of the slow-down, and the report in words, as far as they are about this plan."""
+        """Returns the result of the slow-down, and the report in sentences, if they are about this plan."""
         check, said = state.check, ""
         if check.answer is not None and check.about is plan.report:
             answer = esc(self._text.render(check.answer))

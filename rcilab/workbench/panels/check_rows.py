@@ -1,4 +1,4 @@
-"""The rows of the pre-flight report as HTML: condition, necessity, worst value, bound, unit, source, joint, time."""
+"""The rows of the report as HTML: condition, necessity, worst value, bound, unit, source, joint, time."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
     from rcilab.model.robot_model import RobotModel
 
-TIGHT = 0.95  # From this share of a bound on, a row is amber.
-_MANY = 10.0  # From here on a share of the bound is shown as a factor.
+TIGHT = 0.95  # Share of a bound from which on a row is amber.
+_MANY = 10.0  # From this share on, it is shown as a factor.
 _ORDER = {"bad": 0, "warn": 1, "good": 2}
 _SIGNS = {"good": "✓", "warn": "▲", "bad": "◆"}
 _AMBER = {True: "check.exceeded", False: "check.tight"}
 
 
 def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str:
-    """Returns every row, what is broken or near first; each leads to its moment when it is clicked."""
+    """Returns all rows, violated and tight ones first; a click on a row shows its moment."""
     rows = sorted(report.rows, key=lambda row: (_ORDER[row_tone(row)], row.ok))
     return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
 
@@ -84,6 +84,6 @@ def row_tone(row: ConditionResult) -> str:
 
 
 def load_words(model: RobotModel, text: Text) -> str:
-    """Returns which load the torques of a row were computed with."""
+    """Returns the load of the torques of a row."""
     mass = model.load.mass
     return text("check.load", mass=f"{mass:g}") if mass > 0.0 else text("check.no_load")

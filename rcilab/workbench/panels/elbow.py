@@ -1,4 +1,4 @@
-"""Arm angle: a slider over the ring of a 7-axis arm's elbow, laid out flat, free and forbidden arcs distinguished."""
+"""Arm angle: a slider over the elbow circle of a 7-axis arm as a bar, with free and forbidden arcs."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_NARROW = math.radians(5.0)  # [rad] A tuning value: in less the elbow hardly moves aside.
-_HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs are as high as hatched.
+_NARROW = math.radians(5.0)  # [rad] A tuning value: a narrower range hardly lets the elbow move.
+_HEIGHT = {"free": 10, "other": 4}  # Of 14; forbidden arcs have the height of their hatching.
 
 
 class ElbowPanel:
-    """Absent from 6-axis arms, which have no arm angle."""
+    """Absent for 6-axis arms, which have no arm angle."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -67,19 +67,19 @@ class ElbowPanel:
 
 
 def no_ring_html(redundancy: Redundancy, text: Text) -> str:
-    """Returns why there is no ring: the pose has none, or no pose of this arm has one."""
+    """Returns why there is no circle: the pose has none, or the arm has none."""
     joint = redundancy.joint
     said = text("elbow.none") if joint is None else text("elbow.no_circle", joint=joint)
     return f'<p class="rl-note">{esc(said)}</p>'
 
 
 def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:
-    """Returns the ring from -180 to 180 degrees as a bar, a legend of what is in it, and what is free in words.
+    """Returns the circle from -180 to 180 degrees as a bar, its legend, and the free ranges as text.
 
     Args:
-        elbow: Where the elbow can go.
-        text: The page's words.
-        is_nearest: Whether that holds at the reachable pose nearest to the target, which itself is out of reach.
+        elbow: The elbow circle.
+        text: The catalogue.
+        is_nearest: Whether it belongs to the reachable pose nearest to the target, which is out of reach.
     """
     parts: list[str] = []
     kinds: list[str] = []
@@ -112,13 +112,13 @@ def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:
 
 
 def _words(elbow: Elbow, text: Text, is_nearest: bool) -> str:
-    """Returns the free ranges; those in which the elbow hardly moves are left out, but for the one that it is in."""
+    """Returns the free ranges; narrow ones are left out, except for the one that contains the arm angle."""
     free = [arc for arc in elbow.arcs if arc.kind == "free"]
     if not any(_is_wide(arc) for arc in free):
         return text("elbow.stretched" if free else "elbow.nowhere")
-    told = [arc for arc in free if _is_wide(arc) or (elbow.psi - arc.start) % math.tau < arc.end - arc.start]
+    listed = [arc for arc in free if _is_wide(arc) or (elbow.psi - arc.start) % math.tau < arc.end - arc.start]
     key = "elbow.free_nearest" if is_nearest else "elbow.free"
-    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in told))
+    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in listed))
 
 
 def _is_wide(arc: ElbowArc) -> bool:
@@ -126,7 +126,7 @@ def _is_wide(arc: ElbowArc) -> bool:
 
 
 def _shaded(start: float, end: float, elbow: Elbow, text: Text) -> tuple[list[str], list[str]]:
-    """Returns a free arc in pieces, from amber next to a singularity to blue-green, and what the legend calls each."""
+    """Returns a free arc in pieces, from amber near a singularity to blue-green, and their names in the legend."""
     pieces = max(1, math.ceil((end - start) / math.tau * LOOKS))
     marks = np.linspace(start, end, pieces + 1)
     middles = 0.5 * (marks[:-1] + marks[1:])

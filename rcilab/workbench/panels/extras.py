@@ -1,4 +1,4 @@
-"""Switches of the scene: what it shows besides arm, target and path."""
+"""Switches of the scene: what it shows in addition to arm, target and path."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class ExtrasPanel:
-    """One switch each; all pages see the same scene."""
+    """One switch each; all pages show the same scene."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -34,7 +34,7 @@ class ExtrasPanel:
                 self._switches[extra] = BoundControl(box, self._ask, _request(extra))
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Follows what is switched on."""
+        """Follows the switches of the state."""
         for extra, switch in self._switches.items():
             switch.show(extra in state.scene.extras)
 

@@ -1,4 +1,4 @@
-"""Lab: what happens to our own controller from outside: its safety buttons, and a network that can be spoiled."""
+"""Lab: external influences on our own controller: its safety buttons, and a network that can be disturbed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
 from rcilab.app.run.world_state import NETWORK_LAB
-from rcilab.app.status_text import tell_success
+from rcilab.app.status_text import describe_success
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
@@ -27,7 +27,7 @@ _BUTTONS: tuple[tuple[Any, str, str], ...] = (
 
 
 class FaultInjectionPanel:
-    """Two groups of the Run tab; for a controller that is not ours they say why they do nothing."""
+    """Two groups of the Run tab; for a controller that is not ours they explain why they have no effect."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -87,13 +87,13 @@ class FaultInjectionPanel:
 
 
 def noticed_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns what the client and the controller each notice of the network."""
+    """Returns what client and controller report of the network."""
     world = state.world.status
     faults = name_faults(status.faults) or text("bar.none")
     rows = [
         ("client_rate", f"{status.rate_hz:.0f} Hz"),
         ("client_lost", f"{status.lost_cycles}"),
-        ("client_success", text.render(tell_success(status))),
+        ("client_success", text.render(describe_success(status))),
         ("controller_lost", "—" if world is None else f"{world.lost}"),
         ("controller_ignored", "—" if world is None else f"{world.ignored}"),
         ("controller_faults", faults),

@@ -1,4 +1,4 @@
-"""Health: what the controller is doing and how well the cycles are kept."""
+"""Health: the controller's status and the timing of the cycles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.status_text import tell_success
+from rcilab.app.status_text import describe_success
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.control_process.status import Lateness
 
-_PERIOD = 0.3  # [s] between two looks: as fast as one reads, and cheap.
+_PERIOD = 0.3  # [s] Between two updates: as fast as one can read.
 _LATE = 1000.0  # [us] From here on a cycle counts as late.
 
 
@@ -43,7 +43,7 @@ class HealthPanel:
 
 
 def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns how well the cycles are kept, as a table."""
+    """Returns the timing of the cycles, as a table."""
     late, world = status.lateness, state.world.status
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
@@ -51,7 +51,7 @@ def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         ("mode", mode),
         ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
         ("power", power),
-        ("success", text.render(tell_success(status))),
+        ("success", text.render(describe_success(status))),
         ("in_row", "—" if world is None else f"{world.lost_in_row}"),
         ("rate", f"{status.rate_hz:.0f} Hz"),
         ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
@@ -64,7 +64,7 @@ def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 
 def _row(name: str, value: str, text: Text) -> str:
-    """Returns a row: what it is shows under the mouse, what is good stands below the number."""
+    """Returns a row: its meaning is shown under the mouse, its good value below the number."""
     good = f"health.{name}_good"
     below = f'<br><span class="rl-dim">{esc(text(good))}</span>' if text.has(good) else ""
     name_cell = f"<th>{esc(text(f'health.{name}'))}</th>"
@@ -72,7 +72,7 @@ def _row(name: str, value: str, text: Text) -> str:
 
 
 def histogram_html(late: Lateness, text: Text) -> str:
-    """Returns how many cycles were how late, as bars of logarithmic length; a word stands beside those too late."""
+    """Returns a histogram of lateness, as bars of logarithmic length, with a text next to late cycles."""
     if not late.cycles:
         return ""
     most = math.log10(1.0 + float(late.histogram.max()))

@@ -1,4 +1,4 @@
-"""Jog: what the buttons move and how fast; joint by joint with sliders, buttons and numbers."""
+"""Jog: what the buttons move and how fast; each joint with slider, buttons and number."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_HOLD_RATE = 10.0  # [1/s] A held button says so this often.
+_HOLD_RATE = 10.0  # [1/s] Rate of messages of a held button.
 
 
 class JogPanel:
-    """The switch between goal and robot, step and speed; a row a joint, the limits at its ends."""
+    """The switch between goal and robot, step and speed; one row per joint, the limits at its ends."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -107,7 +107,7 @@ class JogPanel:
 
 
 def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:
-    """Adds a button that moves an axis while it is held, or by a step when it is pressed."""
+    """Adds a button that moves an axis while it is held, or by a step per press."""
     button = gui.add_button(f"{label} {'+' if sign > 0 else '−'}")
 
     @button.on_hold(callback_hz=_HOLD_RATE)
@@ -128,13 +128,13 @@ def note_html(state: UiState, text: Text) -> str:
 
 
 def pace_html(speed: float, text: Text) -> str:
-    """Returns how fast that is."""
+    """Returns the speed."""
     said = text("jog.pace", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
     return f'<p class="rl-pace">{esc(said)}</p>'
 
 
 def margin_html(angle: float, low: float, high: float, text: Text) -> str:
-    """Returns the limits of a joint and how far it is from the nearer one, [rad], as a bar and in words."""
+    """Returns the limits of a joint and its distance from the nearer one, [rad], as a bar and as text."""
     left = max(min(angle - low, high - angle), 0.0)
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
@@ -147,7 +147,7 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
 
 
 def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns why a jog cannot begin, what ended the last one, or else what is to be said about the goal."""
+    """Returns why a jog cannot begin, what ended the last one, or else the message on the goal."""
     reason = no_jog(state, status) if state.jog.robot else None
     said = reason or state.jog.said
     if said is None:
@@ -156,7 +156,7 @@ def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 
 def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> str:
-    """Returns what is wrong with typed numbers, one line a field."""
+    """Returns the problems of typed numbers, one line per field."""
     return "".join(
         f'<p class="rl-problem" role="alert"><b>{esc(label)}</b> {esc(text.render(state.problems[field]))}</p>'
         for field, label in fields
@@ -165,7 +165,7 @@ def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> 
 
 
 def reach_html(state: UiState, text: Text) -> str:
-    """Returns what the inverse says about the goal, with its tone as a word and as a sign."""
+    """Returns the status of the target, with its tone as a word and as a sign."""
     reach = state.goal.reach
     lead, reason = with_space(text("reach.tone." + reach.tone), text.render(reach.reason))
     return f'<p class="rl-verdict rl-{reach.tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'

@@ -44,7 +44,7 @@ class LearnPanel:
                     self._buttons[scenario.fault] = button
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Follows what is being provoked."""
+        """Follows the provocation in progress."""
         text, learn = self._text, state.learn
         away, busy = learn.show is not None and learn.provoking is None, learn.provoking is not None
         note = text("learn.note") if self._faults else text("learn.no_scenarios", model=state.model.name)

@@ -1,4 +1,4 @@
-"""Learn: short lessons whose steps tick themselves off when the person has done them."""
+"""Learn: short lessons whose steps are ticked when the learner has done them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class LearnLessonPanel:
-    """A button a lesson; while one is in progress, its steps."""
+    """One button per lesson; during a lesson, its steps."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -49,7 +49,7 @@ class LearnLessonPanel:
 
 
 def steps_html(lesson: LessonState, text: Text) -> str:
-    """Returns the steps of a lesson: those done, the one to do, those to come."""
+    """Returns the steps of a lesson: done, current, to come."""
     steps = LESSONS[lesson.name]
     rows = []
     for place, step in enumerate(steps):

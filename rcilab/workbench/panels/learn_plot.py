@@ -1,4 +1,4 @@
-"""The plot of a fault on show: the bounds, the curve, and the sample with the fault."""
+"""The plot of a provoked fault: the bounds, the curve, and the sample with the fault."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 _RED = {"light": "#d1392b", "dark": "#ff7b70"}
 
 
-def exhibit_contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
-    """Returns data, series and bands: bounds, what is beyond them, the curve, the sample with the fault."""
+def demo_contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
+    """Returns data, series and bands: bounds, the area beyond them, the curve, the sample with the fault."""
     red = _RED[theme]
     seen = np.where(np.isfinite(values), values, np.nan)
     floor = seen_lower(values, lower)

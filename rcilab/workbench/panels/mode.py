@@ -1,10 +1,10 @@
-"""Mode: which of the five, and the parameters that have an effect in it, each with its unit and range."""
+"""Mode: the choice of the mode, and the parameters that have an effect in it, each with its unit and range."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import is_only_planned, tell_lack, tell_lack_of_part
+from rcilab.app.arm_features import explain_lack, explain_lack_of_part, is_only_planned
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class ModePanel:
-    """A group of the Run tab; what is typed goes to our own controller at once, to a foreign one when it is sent."""
+    """A group of the Run tab; our own controller gets typed values at once, a foreign one when they are sent."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -74,7 +74,7 @@ class ModePanel:
         text, drive = self._text, state.drive
         self._mode.show(self._names[drive.mode])
         self._mode.handle.disabled = is_moving(status) or is_only_planned(state.model)
-        lack = tell_lack(state.model, drive.mode)
+        lack = explain_lack(state.model, drive.mode)
         said = text(f"mode.{drive.mode}_note") if lack is None else text.render(lack)
         self._note.show(f'<p class="rl-note">{esc(said)}</p>')
         for group in self._groups:
@@ -86,7 +86,7 @@ class ModePanel:
             self._problems[group.name].show(problems_html(state, text, self._labels[group.name]))
         self._send.visible = state.target != "virtual"
         self._send.disabled = not is_pending(state, status) or status.phase != "idle"
-        lack = tell_lack_of_part(state.model, "control")
+        lack = explain_lack_of_part(state.model, "control")
         self._reset.disabled = lack is not None
         self._lack.show(why_html(text, lack))
         self._held.show(held_html(state, status, text))
@@ -97,7 +97,7 @@ class ModePanel:
 
 
 def held_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns what the controller has of the parameters of this mode: as it acknowledged them."""
+    """Returns the controller's parameters of this mode, as it acknowledged them."""
     if state.drive.refusal is not None:
         why = text.render(message("ready.control_refused", error=state.drive.refusal))
         return f'<p class="rl-problem" role="alert">{esc(why)}</p>'

@@ -1,4 +1,4 @@
-"""How a motion goes and what became of the last one: said beside Execute, without scrolling."""
+"""The progress of a motion and the result of the last one: shown next to Execute, without scrolling."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns how far a motion, or the planning of a program, is, as a bar; nothing while neither is in progress."""
+    """Returns the progress of a motion, or of the planning of a program, as a bar; nothing without either."""
     if state.program.progress is not None:
         return _bar(state.program.progress)
     if status.code not in ("moving", "moving.held") or status.motion_plan_time is None or not status.motion_duration:
@@ -39,9 +39,9 @@ def _bar(share: float) -> str:
 
 
 def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns what became of the last motion; nothing before one has ended.
+    """Returns the result of the last motion; nothing before the first one.
 
-    It is a plain note where it says nothing about the robot of now, and names the one that it is about.
+    It is a plain note if it is not about the current robot, and then names the robot that it is about.
     """
     recording = state.recording if state.recording is not None else state.last_run
     if recording is None or recording.run is None:
@@ -56,7 +56,7 @@ def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 
 def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns which recorded run is looked at while nothing is connected: whose, when, and how it ended; else ""."""
+    """Returns the recorded run that is shown without a connection: its arm, its time, and how it ended; else ""."""
     recording = state.recording
     if status.phase != "closed" or recording is None or recording.run is None:
         return ""
@@ -67,17 +67,17 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
     is_said = run.stopped is None or run.faults or run.is_safety_stop
-    reason = "" if is_said else _tell_stop(run, text)
+    reason = "" if is_said else _describe_stop(run, text)
     why = reason and f"<br><small>{esc(reason)}</small>"
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
 
 
-def _tell_stop(run: Run, text: Text) -> str:
+def _describe_stop(run: Run, text: Text) -> str:
     return describe_stop(run.stopped or "", run.faults, text)
 
 
 def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns where a run was made, and with which arm, if that is not where motions go now; else ""."""
+    """Returns where a run was made, and with which arm, if that is not the current destination; else ""."""
     made, arm = run.setup, state.model.name if run.model is None else run.model.name
     here = state.plant if state.target == "virtual" else state.target
     there = made.plant if made.target == "virtual" else made.target
@@ -93,7 +93,7 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
     moment = "" if recording.moment is None else f"{recording.moment:.3f}"
     if run.is_safety_stop:
-        return "bad", text("record.safety_stop", moment=moment, why=_tell_stop(run, text)), facts
+        return "bad", text("record.safety_stop", moment=moment, why=_describe_stop(run, text)), facts
     if run.faults:
         faults = name_faults(run.faults)
         return "bad", text("record.faulted", faults=faults, moment=moment), facts

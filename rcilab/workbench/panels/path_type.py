@@ -1,4 +1,4 @@
-"""Plan there: joint by joint, along a line or an arc; how fast, and by which law."""
+"""Plan there: joint motion, line or arc; speed and time law."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class PathTypePanel:
-    """The motion from where the arm is to the goal."""
+    """The motion from the arm's position to the goal."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -62,7 +62,7 @@ class PathTypePanel:
 
 
 def _note_html(state: UiState, text: Text) -> str:
-    """Returns what an arc leads over."""
+    """Returns the via point of an arc."""
     if state.way != "arc":
         return ""
     if state.via is None:

@@ -1,4 +1,4 @@
-"""What one plot is made of, in uPlot's words: data, looks of the curves, bands of limits and violations, axes."""
+"""The contents of one plot for uPlot: data, styles of the curves, bands of limits and violations, axes."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from rcilab.views.plots import Frame
 
 COLORS = ("#0b6fc2", "#e07b00", "#1a9850", "#c2357a", "#7b52c7", "#8a6d3b", "#008b9a")
-"""One colour a joint, distinct on white for people with common colour blindness; the number stands in the legend."""
+"""One colour per joint, distinct on white with common colour blindness; the number is in the legend."""
 _DARK_COLORS = ("#5aaef2", "#ffab40", "#5fd38d", "#ff7eb6", "#b79bff", "#d9bd82", "#3fd0e0")
-_BROKEN = 4  # Joints from here on, from 0, are drawn with gaps: seven colours are too many for some eyes.
+_BROKEN = 4  # Joints from here on, from 0, are dashed: seven colours are hard to distinguish.
 _GAPS = (9, 3)
-_NUMBERS = 58  # [px] Beside a plot: a jerk has six digits in degrees.
+_NUMBERS = 58  # [px] Width of the labels: a jerk in degrees has six digits.
 _INK = {"light": "#111827", "dark": "#f3f6fa"}
 _AXIS = {"light": ("#51607a", "#e6ebf2"), "dark": ("#a9b6c8", "#3a4452")}
 _EDGE = {"light": "#d1392b", "dark": "#ff7b70"}
@@ -35,15 +35,15 @@ def plot_contents(
 ) -> tuple[tuple[np.ndarray, ...], tuple[Any, ...], tuple[Any, ...]]:
     """Returns data, series and bands of one plot: limits as tinted bands, violations as columns, then curves.
 
-    The number of series never changes, whatever is shown: viser sends data and series one after the other, and uPlot
-    fails when they do not fit each other in between. Unused curves hold NaN.
+    The number of series never changes: viser sends data and series one after the other, and uPlot fails if they do not
+    match in between. Unused curves contain NaN.
 
     Args:
-        frame: What to show.
-        joint: The joint it belongs to, from 1; 0 for all.
+        frame: The quantity.
+        joint: Its joint, from 1; 0 for all.
         n: Number of joints.
-        theme: Of the page.
-        is_tool: Whether the one curve is no joint's.
+        theme: Theme of the page.
+        is_tool: Whether the only curve does not belong to a joint.
     """
     t, nothing = frame.t, np.full(len(frame.t), np.nan)
 
@@ -80,21 +80,21 @@ def plot_axes(theme: Theme, *, last: bool, ticks: tuple[float, ...] | None = Non
     """Returns the axes of a plot.
 
     Args:
-        theme: Of the page.
-        last: Whether it says the time: only the last one of a column does.
-        ticks: Which numbers stand beside it; None leaves that to uPlot.
+        theme: Theme of the page.
+        last: Whether it shows the time: only the last one of a column does.
+        ticks: Its labels; None leaves them to uPlot.
     """
     ink, grid = _AXIS[theme]
     look = {"font": "11px system-ui, sans-serif", "stroke": ink, "grid": {"stroke": grid, "width": 1}}
     marks = {"size": 3, "stroke": grid, "width": 1}
     x: Any = {**look, "size": 22, "gap": 2, "ticks": marks} if last else {"show": False}
-    # uPlot leaves out an axis on which its own steps have less room than `space`, whatever the ticks.
+    # uPlot leaves out an axis whose own steps have less room than `space`, whatever the ticks.
     chosen: Any = {"space": 26} if ticks is None else {"space": 1, "splits": ticks}
     return x, {**look, "size": _NUMBERS, "gap": 3, "ticks": marks, **chosen}
 
 
 def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_paced: bool = False) -> str:
-    """Returns which colour and dash is which joint, what dots, dashes and areas mean, and the speed of the plan."""
+    """Returns the colour and dash of each joint, the meaning of dots, dashes and areas, and the speed of the plan."""
     joints = [joint - 1] if joint else range(n)
     swatches = "".join(
         f'<span><i class="rl-swatch{" rl-broken" if i >= _BROKEN else ""}" style="color:{joint_color(i, theme)}"></i>'

@@ -1,4 +1,4 @@
-"""The plots of the timeline: those that were chosen, one below the other on one time axis, with one cursor."""
+"""The plots of the timeline: the chosen ones, one below the other with a common time axis and cursor."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.core.arrays import JointPath
 
-_REDRAW_TIME = 0.25  # [s] Plots are redrawn at most so often while something is dragged or moves.
-_LEISURE = 8.0  # And take at most an eighth of the time, however long the motion is.
+_REDRAW_TIME = 0.25  # [s] Minimum time between two redraws during a drag or a motion.
+_LEISURE = 8.0  # Redraws take at most an eighth of the time, for any length of the motion.
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
-_HINT = 44  # [px] What to do first takes more room than the clock that stands in its place later.
-_MARGIN = 6  # [px] Above and below: half of a number that stands at the very end of an axis.
-_TITLE, _TIMES = 20, 26  # [px] A plot's title, and the times below the last one.
+_HINT = 44  # [px] By which the first hint is higher than the clock that replaces it.
+_MARGIN = 6  # [px] Above and below: half of a label at the end of an axis.
+_TITLE, _TIMES = 20, 26  # [px] Height of a plot's title, and of the time labels below the last one.
 
 _Reach: TypeAlias = tuple[float, float, tuple[float, ...]]
-"""Where the axis of a plot ends, below and above, and the limits in it."""
+"""The ends of a plot's axis, lower and upper, and the limits in it."""
 
 
 class Plots:
@@ -55,13 +55,13 @@ class Plots:
         self._visible: tuple[str, ...] = ()
         self._planned: dict[str, Curves] = {}
         self._plan: object = None
-        self._streamed: JointPath | None = None  # What became of the plan at another speed override.
+        self._streamed: JointPath | None = None  # The plan as it was run at another speed override.
         self._above = 0
         self.end = 1.0
-        """Where the time axis ends, [s]."""
+        """End of the time axis, [s]."""
 
     def build(self, gui: Any, state: UiState) -> None:
-        """Adds a plot of every kind; those that were not chosen stay hidden."""
+        """Adds a plot of every kind; those that are not chosen are hidden."""
         self._plots: dict[str, Any] = {}
         self._titles: dict[str, Html] = {}
         self._reaches: dict[str, _Reach] = dict.fromkeys(PLOTS, (-112.0, 112.0, (-100.0, 100.0)))
@@ -88,8 +88,8 @@ class Plots:
         """Redraws the plots when plan, recording, choice or colours have changed.
 
         Args:
-            state: Of the page.
-            above: What stands above them beside the controls, [px].
+            state: State of the page.
+            above: Height of what is above them, without the controls, [px].
         """
         self._above = above
         streamed = streamed_rows(state)
@@ -127,7 +127,7 @@ class Plots:
             self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
 
     def _fit(self, state: UiState, visible: tuple[str, ...]) -> None:
-        """Gives every plot as many numbers as it is high enough for."""
+        """Gives every plot as many labels as fit its height."""
         for name in visible:
             axes = self._axes(name, state, visible)
             if self._plots[name].axes != axes:
@@ -144,7 +144,7 @@ class Plots:
                 plot.visible = name in visible
             if name not in visible:
                 self._titles[name].show("")
-        self._visible, self._drawn = visible, ()  # One that goes and comes back before it is redrawn has no title.
+        self._visible, self._drawn = visible, ()  # A plot that is hidden and shown again before a redraw has no title.
 
     def _draw(self, state: UiState, name: str) -> None:
         scale = plot_scale(name, self._text.units)
@@ -195,13 +195,13 @@ class Plots:
         path, recording, actual = played_path(state), state.recording, None
         if path is not None and name not in self._planned:
             self._planned[name] = tool_curves(state.model, *path, name)
-        if recording is not None:  # Measured twice differentiated is noise: the acceleration is that of the commands.
+        if recording is not None:  # The second derivative of measured angles is noise: it is that of the commands.
             q = recording.q_c if name == "acceleration" else recording.q
             actual = tool_curves(state.model, _times(recording), q, name)
         return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
 
     def _error_frame(self, state: UiState, name: str, scale: PlotScale) -> Frame:
-        """Returns measured against planned of a finished motion: of the joints, or of the tool."""
+        """Returns measured minus planned values of a finished motion: of the joints, or of the tool."""
         recording, joint = state.recording, state.plot_joint
         assert recording is not None
         assert recording.tracking is not None
@@ -213,7 +213,7 @@ class Plots:
         return build_error_frame(t, scale.factor * errors, last, scale.least)
 
     def _height(self, state: UiState, rows: int) -> int:
-        """Returns how high each of the plots may be, [px]."""
+        """Returns the height of each plot, [px]."""
         hint = 0 if state.plan is not None else _HINT
         spare = state.height - _OTHER_HEIGHT - self._above - hint - _TIMES - _TITLE * rows
         return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
@@ -229,4 +229,4 @@ def _wanted(state: UiState) -> tuple[str, ...]:
 
 
 def _times(recording: Recording) -> Any:
-    return recording.t - recording.delay * CYCLE_TIME  # So that plan and actual lie on each other.
+    return recording.t - recording.delay * CYCLE_TIME  # So that plan and measurement coincide.

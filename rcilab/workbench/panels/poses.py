@@ -1,4 +1,4 @@
-"""Poses by name: those of the arm, and those stored by the operator."""
+"""Named poses: those of the arm, and those stored by the operator."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class PosesPanel:
             self._pose.exchange(self._options(state), self._chosen(state))
             if set(state.jog.poses) > set(self._shown.jog.poses):
                 self._name.handle.value = ""
-        self._name.show(state.lease, "")
+        self._name.show(state.control_lock, "")
         self._shown = state
         self._pose.show(self._chosen(state))
 

@@ -1,4 +1,4 @@
-"""Program: the waypoints as a list, and what plans them."""
+"""Program: the waypoints as a list, and the controls that plan them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
-from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, number_at, tell_place
+from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, describe_place, number_at
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
@@ -28,12 +28,12 @@ _TOOLS = (
     ("up", "arrow-up"), ("down", "arrow-down"), ("duplicate", "copy"), ("delete", "trash"), ("undo", "arrow-back-up"),
     ("redo", "arrow-forward-up"),
 )  # fmt: skip
-_SAME = math.radians(1e-4)  # [rad] A joint that is nearer to the start of the program stands there.
-_MOMENT = 0.25  # [s] A bar that comes and goes faster only flickers.
+_SAME = math.radians(1e-4)  # [rad] A joint at a smaller distance is at the start of the program.
+_MOMENT = 0.25  # [s] A shorter progress bar would only flicker.
 
 
 class ProgramPanel:
-    """The list with its tools, plan, progress, cancel, loop, rounds."""
+    """The list with its buttons, plan, progress, cancel, loop, rounds."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -86,7 +86,7 @@ class ProgramPanel:
         t = time_shown(state, status)
         running = None if plan is None else number_at(plan, t)
         drawn = (draft, program.selected, program.failed, program.notes, running, state.model)
-        if drawn != self._drawn:  # Where each waypoint is takes a while to compute.
+        if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
             self._list.show(list_html(state, draft, running, text))
         self._refused.show(problems_html(state, text, [(FILE_FIELD, text("program.load"))]))
@@ -109,10 +109,10 @@ class ProgramPanel:
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
         said = problems_html(state, text, [("program.0.rounds", text("program.rounds"))])
-        if FILE_FIELD in state.problems:  # What stands here is about the program that the file did not replace.
+        if FILE_FIELD in state.problems:  # The message below is about the program that the file did not replace.
             said += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
         elif plan is not None:
-            where = tell_place(plan, t)
+            where = describe_place(plan, t)
             said += planned_html(state, status, text)
             said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.render(where))}</p>'
         elif count and not planning and program.answer is None:
@@ -126,7 +126,7 @@ class ProgramPanel:
             self._notes.show(notes_html(program.notes, text))
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
-        """Returns whether the program starts where the arm is, in words."""
+        """Returns whether the program starts at the arm's position, as text."""
         if status.q_c is None or draft.start is None or len(status.q_c) != len(draft.start):
             return self._text("program.not_planned")
         travel = np.abs(status.q_c - np.array(draft.start))

@@ -1,4 +1,4 @@
-"""Files of the Program tab: JSON there and back through the browser, and the program as Python."""
+"""Files of the Program tab: JSON to and from the browser, and the program as Python."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class ProgramFilePanel:
         )
 
     def _send(self, event: Any, kind: str) -> None:
-        """Has the browser of the page that asked save the program, or its script."""
+        """Makes the browser of the page that asked save the program, or its script."""
         program = self._program
         if program is None or event.client is None:
             return

@@ -26,10 +26,10 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
     """Returns the list.
 
     Args:
-        state: Of the page.
+        state: State of the page.
         draft: The program.
-        running: Number of the waypoint that the preview is on the way to, 0 on the way to the start.
-        text: Words.
+        running: Number of the waypoint that the preview moves to, 0 during the approach to the start.
+        text: The catalogue.
     """
     if not draft.steps or draft.start is None:
         return f'<div class="rl-steps-none"><b>{esc(text("program.none"))}</b>{esc(text("program.none_long"))}</div>'
@@ -63,7 +63,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
 
 
 def notes_html(notes: tuple[Note, ...], text: Text) -> str:
-    """Returns the planner's remarks as one line that opens; "" without any."""
+    """Returns the planner's remarks as one line that can be opened; "" without any."""
     if not notes:
         return ""
     if len(notes) == 1:
@@ -79,7 +79,7 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
 
 @lru_cache(maxsize=4)
 def _sentences(notes: tuple[Note, ...], text: Text) -> tuple[str, ...]:
-    """Returns remarks as HTML, once: a program may have a thousand, and its rows are drawn anew at every step."""
+    """Returns remarks as HTML, cached: a program may have a thousand, and its rows are redrawn at every step."""
     return tuple(esc(text.render(describe_note(note.remark))) for note in notes)
 
 

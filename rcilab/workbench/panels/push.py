@@ -1,10 +1,10 @@
-"""Push: a force on a link for as long as a button is held, and hand guiding, which makes the arm follow it."""
+"""Push: a force on a link as long as a button is held, and hand guiding, in which the arm follows it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack
+from rcilab.app.arm_features import explain_lack
 from rcilab.app.run.active_force import (
     DIRECTIONS,
     SPRING,
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_HOLD_RATE = 10.0  # [1/s] A held button says so this often.
+_HOLD_RATE = 10.0  # [1/s] Rate of messages of a held button.
 
 
 class PushPanel:
@@ -89,9 +89,9 @@ class PushPanel:
         self._direction.show(push.direction)
         self._force.show(push.newtons)
         self._grab.show(push.grab)
-        unsimulated = tell_lack(state.model, "simulation") if state.target == "virtual" else None
+        unsimulated = explain_lack(state.model, "simulation") if state.target == "virtual" else None
         guided, reason = is_guided(status), unsimulated or no_push(status)
-        lack = tell_lack(state.model, "guiding")
+        lack = explain_lack(state.model, "guiding")
         self._lack.show(why_html(text, lack))
         self._way.handle.disabled = lack is not None
         is_ready = status.phase == "idle" and bool(status.powered)
@@ -112,7 +112,7 @@ class PushPanel:
 
 
 def felt_html(status: SupervisorStatus, text: Text) -> str:
-    """Returns what the controller believes presses on the arm."""
+    """Returns the external force that the controller estimates."""
     if status.tau_ext is None:
         return ""
     force = " / ".join(format_fixed(float(number), 0) for number in status.tau_ext[:3])

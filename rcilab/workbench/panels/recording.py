@@ -1,4 +1,4 @@
-"""Recording: how far the arm was from its plan, and the run to take away."""
+"""Recording: the tracking error of the last run, and its exports."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class RecordingPanel:
 
 
 def summary_html(recording: Recording | None, text: Text) -> str:
-    """Returns how far joints and tool were from the plan: RMS and largest, as a table, and what it compares."""
+    """Returns the tracking errors of joints and tool: RMS and largest, as a table, and what they compare."""
     if recording is None:
         return f'<p class="rl-note">{esc(text("record.nothing"))}</p>'
     run, tracking = recording.run, recording.tracking
@@ -90,7 +90,7 @@ def summary_html(recording: Recording | None, text: Text) -> str:
 
 
 def progress_html(ending: str, share: float, text: Text) -> str:
-    """Returns a bar, and the same in words."""
+    """Returns a progress bar, with the progress as text."""
     percent = f"{100.0 * share:.0f}"
     said = esc(text("export.progress", kind=text(f"export.{ending[1:]}"), percent=percent))
     return f'<p class="rl-note" role="status">{said}</p><div class="rl-meter"><i style="width:{percent}%"></i></div>'

@@ -1,4 +1,4 @@
-"""Run: Execute, pause, speed override, power, Recover, and what the controller says."""
+"""Run: Execute, pause, speed override, power, Recover, and the controller's faults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rcilab.app.run.readiness import (
     obstacle,
 )
 from rcilab.app.run.run_actions import RobotCommand
-from rcilab.app.status_text import tell_remedy
+from rcilab.app.status_text import describe_remedy
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Remark
@@ -43,7 +43,7 @@ _BUTTONS: tuple[tuple[Any, Any, Any], ...] = (
 
 
 class RunPanel:
-    """Execute can be pressed only when a fresh certificate says so; otherwise the reason stands beside it."""
+    """Execute needs a valid certificate; otherwise the reason is shown next to it."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -117,7 +117,7 @@ class RunPanel:
         self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
-        is_said = moving or reason in (outdated(state), connection_note(state, status))  # That it moves: in the bar.
+        is_said = moving or reason in (outdated(state), connection_note(state, status))  # The bar shows that it moves.
         unsaid = None if is_said else reason
         self._reason.show(why_html(text, unsaid))
         is_program = state.plan is not None and state.plan.program is not None
@@ -125,7 +125,7 @@ class RunPanel:
         self._back.visible = may_go_back(state, reason)
         self._inside.visible = may_lead_inside(state, status)
         is_held = status.code == "moving.held"
-        self._pause.visible, self._resume.visible = not is_held, is_held  # There before they are needed: nothing moves.
+        self._pause.visible, self._resume.visible = not is_held, is_held  # Visible beforehand: the layout is fixed.
         self._pause.disabled = status.code != "moving" or status.motion_plan_time is None
         self._speed_override.show(round(100.0 * state.drive.speed_override, 1))
         self._way.show(way_html(state, status, text))
@@ -143,17 +143,17 @@ def _drive(what: Any):  # type: ignore[no-untyped-def]
 
 
 def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None) -> str:
-    """Returns every fault that is set, with its cause and what to do about it; nothing while none is."""
+    """Returns every fault that is set, with its cause and remedy; nothing without a fault."""
     was_stop = world is not None and isinstance(world.reason, Remark) and world.reason.code in ("estop", "gstop")
     if (
         status.is_pressed or was_stop or status.code == "fault.released"
-    ):  # Whatever bit shows it: it stands for the stop, not for what it means otherwise.
+    ):  # A safety stop sets one of several bits, whose usual texts would mislead.
         names = esc(name_faults(status.faults))
         said = f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
         return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
         f'<div class="rl-facts">{esc(text(f"fault.{fault.key}"))}</div>'
-        f'<div class="rl-source">{esc(tell_remedy(fault, text))}</div></div>'
+        f'<div class="rl-source">{esc(describe_remedy(fault, text))}</div></div>'
         for fault in status.faults
     )

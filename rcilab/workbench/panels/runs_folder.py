@@ -1,4 +1,4 @@
-"""Recorded runs: how much they take on the disk, and a kind way to clear old ones away."""
+"""Recorded runs: their size on disk, and how to delete old ones."""
 
 from __future__ import annotations
 

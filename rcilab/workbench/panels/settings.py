@@ -1,4 +1,4 @@
-"""Settings: which arm, which language and units, how the page looks, who holds the controls."""
+"""Settings: arm, language and units, look of the page, controls."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _CHOICES: tuple[tuple[Any, tuple[str, ...], str, Callable[[UiState], str]], ...]
     ("theme", THEMES, "theme", lambda state: state.theme),
     ("quality", QUALITIES, "quality", lambda state: state.quality),
 )
-"""What `SetView` calls it, what there is to choose, how the catalogue begins, what is chosen."""
+"""Name in `SetView`, the options, prefix of the text keys, the current value."""
 
 
 class SettingsPanel:
-    """Choices that last as long as the workbench does; nothing is stored in display units."""
+    """Settings of the workbench; nothing is stored in display units."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -55,7 +55,7 @@ class SettingsPanel:
             self._who = Html(gui)
             gui.add_html('<i class="rl-anyone"></i>')
             self._take = gui.add_button(
-                text("lease.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
+                text("control_lock.ask"), icon="hand-grab", color="gray", hint=text("settings.take_hint")
             )
             on_press(self._take, ask, lambda page: TakeControls(page=page))
             allow_spectators(self._take)
@@ -64,16 +64,16 @@ class SettingsPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the state."""
-        text, lease = self._text, state.lease
+        text, lock = self._text, state.control_lock
         self._model.show(state.model.name)
         self._language.show(LANGUAGES[state.language])
         for choice, chosen in self._choices:
             choice.show(chosen(state))
-        self._take.label = text("lease.take" if lease.holder is None else "lease.ask")
-        self._take.disabled = lease.holder is not None and len(lease.pages) < 2  # No other page to ask.
-        who = text("settings.free" if lease.holder is None else "settings.alone")
-        if lease.holder is not None and len(lease.pages) > 1:
-            who = text("settings.who", holder=lease.number(lease.holder), pages=len(lease.pages))
+        self._take.label = text("control_lock.take" if lock.holder is None else "control_lock.ask")
+        self._take.disabled = lock.holder is not None and len(lock.pages) < 2  # There is no other page to ask.
+        who = text("settings.free" if lock.holder is None else "settings.alone")
+        if lock.holder is not None and len(lock.pages) > 1:
+            who = text("settings.who", holder=lock.number(lock.holder), pages=len(lock.pages))
         self._who.show(f'<p class="rl-note">{esc(who)}</p>')
 
     def _choice(self, gui: Any, name: Any, labels: dict[str, str]) -> BoundControl:

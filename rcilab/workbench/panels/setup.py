@@ -1,10 +1,10 @@
-"""Setup: what is fixed to the arm and where its tool may be; what is wanted beside what the controller has."""
+"""Setup: what is mounted on the arm and where its tool may be; the set values next to the controller's."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack_of_part
+from rcilab.app.arm_features import explain_lack_of_part
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.setup.configuration_state import (
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class SetupPanel:
-    """The head of the Setup tab: whether the controller has it, undo, a second yes, which part is edited."""
+    """The head of the Setup tab: whether the controller has the configuration, undo, confirmation, the edited part."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -45,7 +45,7 @@ class SetupPanel:
         on_press(self._cancel, ask, _press("cancel"))
         self._table = Html(gui)
         self._planned = Html(gui)
-        with gui.add_folder(text("setup.edit_title"), order=0.0):  # First: what is said about it must not move it.
+        with gui.add_folder(text("setup.edit_title"), order=0.0):  # First, so that messages do not move it.
             gui.add_html('<i class="rl-buttons rl-setup-head"></i>')
             self._undo = gui.add_button(
                 text("setup.undo"), icon="arrow-back-up", color="gray", hint=text("setup.undo_hint")
@@ -97,7 +97,7 @@ class SetupPanel:
         return _verdict("good", text("setup.given"), text("setup.given_long"))
 
     def _outside_html(self, state: UiState, status: SupervisorStatus) -> str:
-        """Returns that the arm itself stands outside the safety box, if it does."""
+        """Returns that the arm itself is outside the safety box, if it is."""
         box = state.setup.wanted.box
         if status.q_c is None or box is None or not box.active:
             return ""
@@ -108,7 +108,7 @@ class SetupPanel:
         text, pending = self._text, pending_parts(state, status)
         rows = []
         for part in LISTED:
-            lack = tell_lack_of_part(state.model, part)
+            lack = explain_lack_of_part(state.model, part)
             here = self._said(state.setup.wanted, part) if lack is None else "—"
             held = (
                 text("setup.held", held=text.render(describe_held(status, part))) if lack is None else text.render(lack)

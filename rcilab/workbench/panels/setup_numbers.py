@@ -1,10 +1,10 @@
-"""The numbers of the part of the configuration that is edited; the other parts' are folded away."""
+"""The numbers of the edited part of the configuration; those of other parts are hidden."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack_of_part
+from rcilab.app.arm_features import explain_lack_of_part
 from rcilab.app.setup.configuration_state import FORCE_AXES
 from rcilab.app.setup.setup_actions import SetSetup
 from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
@@ -31,7 +31,7 @@ _ROWS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 
 
 class SetupNumbersPanel:
-    """A group of the Setup tab for each part; only that of the edited one is shown."""
+    """A group of the Setup tab for each part; only that of the edited one is visible."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -43,7 +43,7 @@ class SetupNumbersPanel:
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
         self._lacks: dict[str, Html] = {}
-        self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and what it is called beside a problem.
+        self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and its name in problems.
         self._seen: dict[str, BoundControl] = {}
         self._switches: dict[str, tuple[BoundControl, ...]] = {}
         for part in SETUP_PARTS:
@@ -77,7 +77,7 @@ class SetupNumbersPanel:
         self._active.show(box.active)
         self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
         for part in SETUP_PARTS:
-            lack = tell_lack_of_part(state.model, part)
+            lack = explain_lack_of_part(state.model, part)
             self._lacks[part].show(why_html(self._text, lack))
             self._seen[part].show(part in setup.seen)
             for control in (self._seen[part], *self._switches.get(part, ())):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack
+from rcilab.app.arm_features import explain_lack
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
 from rcilab.app.run.world_actions import SetWiring
@@ -65,7 +65,7 @@ class SignalsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the controller."""
         text, is_ready = self._text, status.phase in ("idle", "fault")
-        lack = tell_lack(state.model, "signals")
+        lack = explain_lack(state.model, "signals")
         self._lack.show(why_html(text, lack))
         self._output.disabled = lack is not None
         for button in self._buttons:
@@ -73,7 +73,7 @@ class SignalsPanel:
         self._levels.show(levels_html(state.model, status, text))
         self._wired.show(state.world.loop_back)
         self._wired.handle.disabled = not is_ours(status) or lack is not None
-        unable = tell_lack(state.model, "reboot")
+        unable = explain_lack(state.model, "reboot")
         self._reboot_lack.show(why_html(text, unable))
         self._reboot.disabled = not is_ready or unable is not None
         self._reboot.visible = not state.reboot_asked
@@ -83,7 +83,7 @@ class SignalsPanel:
 
 
 def levels_html(model: RobotModel, status: SupervisorStatus, text: Text) -> str:
-    """Returns the outputs as set and the inputs as read last."""
+    """Returns the outputs as set and the inputs as last read."""
     rows = "".join(
         f"<tr><th>{esc(output)}</th><td>{esc(_level(is_set, text))}</td>"
         f"<th>{esc(name)}</th><td>{esc(_level(is_high, text))}</td></tr>"

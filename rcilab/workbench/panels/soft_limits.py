@@ -1,11 +1,11 @@
-"""Soft joint limits, and whether the virtual controller leads commands to rest at them."""
+"""Soft joint limits, and whether the virtual controller stops commands at them."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import tell_lack_of_part
+from rcilab.app.arm_features import explain_lack_of_part
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.configuration_state import own_limits, soft_limits
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class SoftLimitsPanel:
-    """Two groups of the Setup tab: two numbers a joint, and what happens at them."""
+    """Two groups of the Setup tab: two numbers per joint, and the behaviour at the limits."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -51,7 +51,7 @@ class SoftLimitsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the configuration."""
         limits = soft_limits(state)
-        lack = tell_lack_of_part(state.model, "joints")
+        lack = explain_lack_of_part(state.model, "joints")
         for end, joint, field in self._fields:
             field.disable(lack is not None)
             number = shown(math.degrees(getattr(limits, end)[joint]))

@@ -1,4 +1,4 @@
-"""The bar's status line: what is always on screen, whichever tab is open."""
+"""The status line of the bar, which is always visible."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rcilab.app.run.drive_state import destination
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import played_at
 from rcilab.app.run.readiness import time_shown
-from rcilab.app.status_text import phase_code, tell_status
+from rcilab.app.status_text import describe_status, phase_code
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 
@@ -30,7 +30,7 @@ _TONES = {
 
 
 def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_end: float) -> dict[str, Any]:
-    """Returns what the page's bar shows, ready for `LiveChannel.publish`."""
+    """Returns the contents of the page's bar, for `LiveChannel.publish`."""
     values: dict[str, Any] = {
         "language": state.language,
         "stop": text("stop.label"),
@@ -44,8 +44,8 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "cursor": _cursor(state, status, cursor_end),
         "theme": state.theme,
         "viser": text("bar.viser"),
-        "holder": state.lease.holder,
-        "take": text("lease.take" if state.lease.holder is None else "lease.ask"),
+        "holder": state.control_lock.holder,
+        "take": text("control_lock.take" if state.control_lock.holder is None else "control_lock.ask"),
         "question": _question(state, text),
     }
     values["notices"] = [
@@ -65,7 +65,7 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
     mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
     faults = text("bar.none") if not status.faults else name_faults(status.faults)
     connected = status.rate_hz > 0.0
-    lease, where = state.lease, destination(state, status)
+    lock, where = state.control_lock, destination(state, status)
     return [
         _chip(text, "model", state.model.name),
         _chip(text, "where", text("destination.preview") if where == "preview" else _target_name(state, text)),
@@ -74,44 +74,44 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
             "phase",
             doing,
             "warn" if status.is_pressed else _TONES.get(status.code, _TONES.get(status.phase, "bad")),
-            hint=text.render(tell_status(status)),
+            hint=text.render(describe_status(status)),
         ),
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
-        {**_chip(text, "controls", _holder(lease, text)), "of": _seen_by_pages(lease, text)},
+        {**_chip(text, "controls", _holder(lock, text)), "of": _seen_by_pages(lock, text)},
         _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
     ]
 
 
-def _holder(lease: ControlLock, text: Text) -> str:
-    if lease.holder is None:
-        return text("bar.free", pages=len(lease.pages))
-    return text("bar.holder", holder=lease.number(lease.holder), pages=len(lease.pages))
+def _holder(lock: ControlLock, text: Text) -> str:
+    if lock.holder is None:
+        return text("bar.free", pages=len(lock.pages))
+    return text("bar.holder", holder=lock.number(lock.holder), pages=len(lock.pages))
 
 
-def _seen_by_pages(lease: ControlLock, text: Text) -> dict[int, str]:
-    """Returns who holds the controls as each page has to read it, by client id."""
-    if lease.holder is None:
+def _seen_by_pages(lock: ControlLock, text: Text) -> dict[int, str]:
+    """Returns the text about the controls for each page, by client id."""
+    if lock.holder is None:
         return {}
-    holder, count = lease.number(lease.holder), len(lease.pages)
+    holder, count = lock.number(lock.holder), len(lock.pages)
     if count == 1:
-        return {lease.holder: text("bar.alone")}
+        return {lock.holder: text("bar.alone")}
     return {
-        page: text("bar.mine", mine=lease.number(page), pages=count)
-        if page == lease.holder
-        else text("bar.theirs", holder=holder, mine=lease.number(page))
-        for page in lease.pages
+        page: text("bar.mine", mine=lock.number(page), pages=count)
+        if page == lock.holder
+        else text("bar.theirs", holder=holder, mine=lock.number(page))
+        for page in lock.pages
     }
 
 
 def _question(state: UiState, text: Text) -> dict[str, Any] | None:
-    """Returns what the page that holds the controls is asked, or None."""
-    lease = state.lease
-    if lease.asking is None or lease.holder is None:
+    """Returns the question to the page with the controls, or None."""
+    lock = state.control_lock
+    if lock.asking is None or lock.holder is None:
         return None
-    asked = text("lease.question", page=lease.number(lease.asking), seconds=f"{PATIENCE:.0f}")
-    return {"page": lease.holder, "text": asked, "yes": text("lease.yes"), "no": text("lease.no")}
+    asked = text("control_lock.question", page=lock.number(lock.asking), seconds=f"{PATIENCE:.0f}")
+    return {"page": lock.holder, "text": asked, "yes": text("control_lock.yes"), "no": text("control_lock.no")}
 
 
 def _chip(text: Text, name: str, value: str, tone: str = "", *, wide: bool = False, hint: str = "") -> dict[str, Any]:

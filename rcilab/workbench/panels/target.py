@@ -1,4 +1,4 @@
-"""Target: the tool pose in numbers, and what the inverse says about it."""
+"""Target: the tool pose as numbers, and its status."""
 
 from __future__ import annotations
 
@@ -53,21 +53,21 @@ class TargetPanel:
         wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field), state.entered)
         labels.append((wxyz.field, self._text("target.wxyz")))
         problems = problems_html(state, self._text, labels)
-        is_broken = state.plan is not None and not state.plan.report.ok  # Said here, too: below it is out of sight.
+        is_broken = state.plan is not None and not state.plan.report.ok  # Shown here, too: the rest is further down.
         said = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_broken else "")
-        self._reach.show(f'<div class="rl-slot">{problems or said}</div>')  # What is below stays where it is.
+        self._reach.show(f'<div class="rl-slot">{problems or said}</div>')  # A fixed height: nothing below moves.
 
 
 def quaternion_text(wxyz: np.ndarray) -> str:
-    """Returns the four numbers of an orientation for a field, w not below 0."""
+    """Returns the four numbers of an orientation for a field, with w not below 0."""
     sign = -1.0 if wxyz[0] < 0.0 else 1.0
     return " ".join(format_fixed(sign * float(number), 4) for number in wxyz)
 
 
 def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns one line about the plan: how long it takes and whether it passed, or why none was found.
+    """Returns one line about the plan: its duration and verdict, or why there is none.
 
-    While nothing is connected a plan gets no verdict: the next arm may stand elsewhere.
+    Without a connection a plan gets no verdict: the next arm may be at another position.
     """
     if state.plan is None:
         return f'<p class="rl-note">{esc(text.render(state.no_plan)) if state.no_plan else ""}</p>'

@@ -1,4 +1,4 @@
-"""Where motions go: nowhere (preview), the virtual controller with an ideal arm or with MuJoCo, or an address."""
+"""The destination of motions: none (preview), the virtual controller (ideal arm or MuJoCo), or an address."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _TONES = {
 
 
 class TargetRobotPanel:
-    """A group of the Run tab. An address is named once more before anything is sent there."""
+    """A group of the Run tab. An address has to be confirmed before anything is sent there."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
-        self._picked: str | None = None  # "an address", before there is one.
-        self._asked = ""  # The address that the question is about.
+        self._picked: str | None = None  # "an address", before it is known.
+        self._asked = ""  # The address in the question.
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
@@ -78,8 +78,8 @@ class TargetRobotPanel:
         is_planned = is_only_planned(state.model)
         self._choice.handle.disabled = self._connect.disabled = moving or is_planned
         is_address = (self._picked or where) == "address"
-        if self._address.show(state.lease, _address_of(state)) and state.typed_address:
-            self._ask(_choose(None, "address", answer="no"))  # Who asked has the controls no more.
+        if self._address.show(state.control_lock, _address_of(state)) and state.typed_address:
+            self._ask(_choose(None, "address", answer="no"))  # The page that asked has lost the controls.
         self._address.handle.visible = self._connect.visible = is_address
         asked = self._asked = state.typed_address
         said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))

@@ -1,11 +1,11 @@
-"""Timeline: the planned motion in time, played and scrubbed, above its plots."""
+"""Timeline: the planned motion over time, with playback and scrubber, above its plots."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.check.freshness import outdated
-from rcilab.app.program.program_draft import tell_place
+from rcilab.app.program.program_draft import describe_place
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.played_motion import paced_of, played_at
 from rcilab.app.run.readiness import time_shown
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_BANNER = 72  # [px] What the line about a recorded run takes.
+_BANNER = 72  # [px] Height of the line about a recorded run.
 
 
 class TimelinePanel:
-    """Play, scrub, loop, and the plots that share one time axis and one cursor."""
+    """Play, scrub, loop, and the plots with their common time axis and cursor."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -32,7 +32,7 @@ class TimelinePanel:
 
     @property
     def end(self) -> float:
-        """Where the time axis ends, [s]."""
+        """End of the time axis, [s]."""
         return self._plots.end
 
     def build(self, gui: Any, state: UiState) -> None:
@@ -59,7 +59,7 @@ class TimelinePanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Moves the scrubber; redraws plots when plan, recording or choice have changed."""
-        text, banner = self._text, replay_html(state, status, self._text) or _exhibit_html(state, self._text)
+        text, banner = self._text, replay_html(state, status, self._text) or _demo_html(state, self._text)
         self._banner.show(banner)
         self._play.label = text("timeline.hold" if state.playing else "timeline.play")
         self._play.disabled = state.plan is None
@@ -86,7 +86,7 @@ class TimelinePanel:
         self._loop = BoundControl(loop, ask, lambda v, p: SetView(page=p, name="loop", value=bool(v)))
 
     def _read(self, state: UiState, status: SupervisorStatus) -> str:
-        """Returns where the preview stands, and what is drawn how."""
+        """Returns the place of the preview, and the labels of the plots."""
         text = self._text
         if state.plan is None:
             why = state.no_plan
@@ -105,7 +105,7 @@ class TimelinePanel:
             kinds = text(f"timeline.kinds{wanted}", delay=state.recording.delay)
             if status.q is None:
                 kinds = text(f"timeline.replayed{wanted}")
-        where = tell_place(state.plan, t)
+        where = describe_place(state.plan, t)
         kinds = kinds if where is None else text.render(where)
         if state.plan.short is not None and state.recording is None:
             kinds = text("timeline.short")
@@ -120,9 +120,9 @@ def _choice(name: str):  # type: ignore[no-untyped-def]
     return lambda value, page: ShowPlot(page=page, name=name, on=bool(value))
 
 
-def _exhibit_html(state: UiState, text: Text) -> str:
-    """Returns whose curves these are while a fault of the gallery is on show; "" otherwise."""
+def _demo_html(state: UiState, text: Text) -> str:
+    """Returns the message that the curves are those of a provoked fault, if one is displayed; else ""."""
     if state.learn.show is None:
         return ""
-    said = f"<b>{esc(text('timeline.exhibit'))}</b> {esc(text('timeline.exhibit_long'))}"
+    said = f"<b>{esc(text('timeline.demo'))}</b> {esc(text('timeline.demo_long'))}"
     return f'<p class="rl-verdict rl-warn">{said}</p>'

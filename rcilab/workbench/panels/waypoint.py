@@ -1,4 +1,4 @@
-"""The editor of the selected waypoint: type, numbers, and where it leads."""
+"""The editor of the selected waypoint: type, numbers, target."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PLAIN = ("speed", "blend", "dwell")
 
 
 class WaypointPanel:
-    """Shown while a waypoint is selected."""
+    """Visible while a waypoint is selected."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -87,7 +87,7 @@ class WaypointPanel:
         self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
 
     def _show_kind(self, waypoint: Waypoint) -> None:
-        """Shows the type; one that only files have is there alone, and cannot be changed."""
+        """Shows the type; a type that only files have is the only option."""
         label = self._text(f"program.type.{waypoint.type}")
         is_free, box = waypoint.type in TYPES, self._kind.handle
         options = tuple(self._kinds.values()) if is_free else (label,)
@@ -116,7 +116,7 @@ class WaypointPanel:
 
 
 def _values(waypoint: Waypoint, arm: RobotModel) -> dict[str, str]:
-    """Returns what stands in each field that this waypoint has."""
+    """Returns the text of each field of this waypoint."""
     psi, target = arm_angle_of(waypoint, arm), target_of(waypoint, arm)
     values = {
         "speed": shown(100.0 * waypoint.speed), "blend": shown(1000.0 * waypoint.blend), "dwell": shown(waypoint.dwell),

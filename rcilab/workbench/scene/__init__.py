@@ -1,1 +1,1 @@
-"""What the 3D scene draws, and what is done with the mouse in it."""
+"""The 3D scene, and the actions of the mouse in it."""

@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 
     from rcilab.app.store import UiState
 
-_OUTSIDE_COLOR = (190, 0, 10)  # Lines are drawn paler than their colour.
+_OUTSIDE_COLOR = (190, 0, 10)  # Lines appear paler than their colour.
 _SCALES = {"box": 0.24, "tool": 0.17, "load": 0.17, "force": 0.17}  # [m]
 _HANDLE = 0.026  # [m]
 _SIGNS = np.array([(-1, 0, 0), (0, -1, 0), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
 
 
 class ConfigurationSceneView:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
-        drawing: Where the arm is drawn.
-        arm: The live arm, which bears tool and load.
+        drawing: Drawing of the arm.
+        arm: The live arm, with its tool and load.
         ask: Takes requests.
     """
 
@@ -52,7 +52,7 @@ class ConfigurationSceneView:
         self._label: Any = server.scene.add_label(
             "/safety_box_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
         )
-        self._name: Any = None  # Whose handles these are.
+        self._name: Any = None  # The part with handles.
         self._crossing: Any = server.scene.add_label(
             "/outside_label", "", anchor="top-left", depth_test=False, font_screen_scale=1.0, visible=False
         )
@@ -60,19 +60,19 @@ class ConfigurationSceneView:
 
     @property
     def handles(self) -> tuple[str, ...]:
-        """The nodes that a hand can move just now."""
+        """The nodes that can be dragged now."""
         if self._gizmo is None:
             return ()
         faces = tuple(f"/safety_box/handle{face}" for face in range(6)) if self._edited == "box" else ()
         return (self._gizmo.name, *faces)
 
     def show(self, state: UiState, text: Text) -> None:
-        """Draws what is chosen to be seen, puts handles on what is edited."""
+        """Draws the chosen parts, and the handles of the edited one."""
         setup = state.setup
         wanted, seen = setup.wanted, setup.seen
         box = wanted.box
         if box is not None and not ("box" in seen and (box.active or setup.edited == "box")):
-            box = None  # One that is off bounds nothing: it is there while it is edited.
+            box = None  # A box that is off is drawn only while it is edited.
         self._view.show_box(box)
         self._view.show_tool(wanted.tool if "tool" in seen else None)
         self._view.show_load(wanted.load if "load" in seen else None)
@@ -87,7 +87,7 @@ class ConfigurationSceneView:
         self._show_outside(state, text)
 
     def remove(self) -> None:
-        """Takes box, labels and handles away; what is on the flange goes with the arm."""
+        """Removes box, labels and handles; parts on the flange are removed with the arm."""
         if self._gizmo is not None:
             self._gizmo.remove()
             self._name.remove()
@@ -137,10 +137,10 @@ class ConfigurationSceneView:
             for face in range(6):
                 handle = f"/safety_box/handle{face}"
                 self._drawing.add_mesh(handle, ball.vertices, ball.faces, color=BOX_COLOR)
-                self._drawing.on_drag(handle, self._hear(face))
+                self._drawing.on_drag(handle, self._drag_handler(face))
 
     def _follow(self, state: UiState) -> None:
-        """Puts the handles where the part is, unless a hand is moving them."""
+        """Moves the handles to the part, unless they are being dragged."""
         box = state.setup.wanted.box
         if self._edited == "box" and box is not None and box is not self._handled:
             self._handled = box
@@ -155,7 +155,7 @@ class ConfigurationSceneView:
             self._gizmo.wxyz = pose.wxyz
 
     def _name_handles(self, state: UiState, text: Text) -> None:
-        """Says beside the handles what they move."""
+        """Shows the name of the part next to its handles."""
         if self._name is None:
             return
         said = text("setup.handles", part=text(f"setup.part.{self._edited}"))
@@ -178,7 +178,7 @@ class ConfigurationSceneView:
         self._label.position = corners[int(corners[:, 2].argmax())]
 
     def _show_outside(self, state: UiState, text: Text) -> None:
-        """Draws the part of the planned path outside the box in red, with words beside it."""
+        """Draws the part of the planned path outside the box in red, with a label."""
         said = text("setup.outside")
         if said != self._crossing.text:
             self._crossing.text = said
@@ -200,7 +200,7 @@ class ConfigurationSceneView:
             self._drawing.add_polyline(f"/outside{number}", run, color=_OUTSIDE_COLOR, thickness=0.02)
         self._lines = len(runs)
 
-    def _hear(self, face: int) -> Any:
+    def _drag_handler(self, face: int) -> Any:
         async def act(event: Any) -> None:
             hand = tuple(map(float, event.end_position))
             self._ask(ResizeBox(page=event.client_id, face=face, hand=hand, ended=event.phase == "end"))
@@ -209,7 +209,7 @@ class ConfigurationSceneView:
 
 
 def hides_target(state: UiState) -> bool:
-    """Returns whether the target's gizmo makes room: it stands where the handles of a part on the flange are."""
+    """Returns whether the target's gizmo is hidden: the handles of a part on the flange have its place."""
     return state.setup.edited in ON_FLANGE and state.setup.edited in state.setup.seen
 
 

@@ -1,4 +1,4 @@
-"""The mouse's hand on the arm: a drag on a link asks for a pull there; an arrow shows what presses on the arm."""
+"""Dragging the arm with the mouse: a drag on a link applies a force there; an arrow shows the force on the arm."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
-_COLOR = (214, 66, 160)  # Magenta: no verdict, no axis and no plan has it.
+_COLOR = (214, 66, 160)  # Magenta: not the colour of a verdict, an axis or a plan.
 
 
 class DragHandle:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
-        drawing: Where the arm is drawn.
+        drawing: Drawing of the arm.
         arm: The live arm.
         ask: Takes requests.
     """
@@ -45,13 +45,13 @@ class DragHandle:
         )
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
-        """Takes hold of the arm's meshes or leaves them to the camera, and draws the push of this moment."""
+        """Makes the arm's meshes draggable or leaves them to the camera, and draws the current push."""
         wanted = can_grab(state, status)
         if wanted != self._is_on:
             self._is_on = wanted
             for mesh, link in self._arm.link_meshes.items():
                 if wanted:
-                    self._drawing.on_drag(mesh, self._hear(link))
+                    self._drawing.on_drag(mesh, self._drag_handler(link))
                 else:
                     self._drawing.ignore_drag(mesh)
         acting = state.push.acting
@@ -69,11 +69,11 @@ class DragHandle:
             self._label.text = said
 
     def remove(self) -> None:
-        """Takes the arrow away; the arm's meshes go with the arm."""
+        """Removes the arrow; the arm's meshes are removed with the arm."""
         self._arrow.remove()
         self._label.remove()
 
-    def _hear(self, link: int) -> Any:
+    def _drag_handler(self, link: int) -> Any:
         async def act(event: Any) -> None:
             self._ask(
                 DragLink(

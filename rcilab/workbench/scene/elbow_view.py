@@ -1,4 +1,4 @@
-"""The elbow's circle in the scene, and the handle that slides on it."""
+"""The elbow circle in the scene, and the handle on it."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _COLOR, _SNAPPED_COLOR = (18, 120, 108), (214, 48, 38)
 
 
 class ElbowSceneView:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
-        drawing: Where the arm is drawn.
+        drawing: Drawing of the arm.
         ask: Takes requests.
     """
 
@@ -45,19 +45,19 @@ class ElbowSceneView:
         profile = [(max(_RADIUS * math.cos(a), 0.0), _RADIUS * math.sin(a)) for a in steps]
         ball = revolve(profile, segments=24)
         drawing.add_mesh(_HANDLE, ball.vertices, ball.faces, color=_COLOR)
-        drawing.on_drag(_HANDLE, self._hear)
+        drawing.on_drag(_HANDLE, self._on_drag)
         self._label: Any = server.scene.add_label(
             "/elbow_label", "", anchor="bottom-center", depth_test=False, font_screen_scale=1.0, visible=False
         )
 
     @property
     def is_held(self) -> bool:
-        """Whether a hand moves the elbow, or has just let go of it."""
+        """Whether the elbow is being dragged, or has just been."""
         return time.monotonic() - self._touched <= HAND_AWAY
 
     @property
     def handles(self) -> tuple[str, ...]:
-        """The nodes that a hand can move just now."""
+        """The nodes that can be dragged now."""
         return (_HANDLE,) if self._drawn is not None else ()
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
@@ -84,11 +84,11 @@ class ElbowSceneView:
                 self._label.text = said
 
     def remove(self) -> None:
-        """Takes circle, handle and label away."""
+        """Removes circle, handle and label."""
         self._view.remove()
         self._label.remove()
 
-    async def _hear(self, event: Any) -> None:
+    async def _on_drag(self, event: Any) -> None:
         self._touched = time.monotonic()
         self._ask(
             DragElbow(

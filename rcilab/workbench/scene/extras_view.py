@@ -1,4 +1,4 @@
-"""What the scene shows behind switches: frames of the joints, dexterity, reach, swept volume."""
+"""The optional parts of the scene: frames of the joints, manipulability, workspace, swept volume."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 _AXES = 0.13  # [m]
 _BESIDE = ("bottom-right", "bottom-left")
-"""Where names stand in turn: the frames of two joints often have one origin."""
+"""Positions of names in turn: the frames of two joints often have the same origin."""
 _ELLIPSOID_COLOR, _SWEPT_COLOR = (126, 87, 194), (70, 140, 255)
 _POOR_COLOR, _GOOD_COLOR = np.array([240.0, 150.0, 20.0]), np.array([30.0, 140.0, 200.0])
 _GOOD = 0.25  # Smallest singular value from which on a point of the cloud is blue.
 
 
 class ExtrasView:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
-        drawing: Where the arm is drawn.
-        arm: The live arm, which bears the frames.
+        drawing: Drawing of the arm.
+        arm: The live arm, with the frames.
     """
 
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, arm: ArmView) -> None:
@@ -57,7 +57,7 @@ class ExtrasView:
             self._draw_swept(seen.swept)
 
     def remove(self) -> None:
-        """Takes everything away; the frames' nodes go with the arm."""
+        """Removes everything; the frames are removed with the arm."""
         self._exchange_frames(None)
         self._draw_cloud(None)
         for name in ("ellipsoid", "swept"):
@@ -120,6 +120,6 @@ class ExtrasView:
 
 
 def link_frames(model: RobotModel) -> list[Pose]:
-    """Returns the Denavit-Hartenberg frame after each joint in the frame that its link is drawn in."""
+    """Returns the Denavit-Hartenberg frame after each joint in the frame of its link's drawing."""
     heights = np.cumsum([joint.origin for joint in upright_joints(model.description)], axis=0)
     return [Pose(-height) @ frame for height, frame in zip(heights, model.joint_frames(np.zeros(model.n)), strict=True)]

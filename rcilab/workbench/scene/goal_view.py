@@ -1,4 +1,4 @@
-"""The target in the scene: its handles, and the verdict of the inverse beside it."""
+"""The target in the scene: its handles, with its status."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ _GIZMO_SCALE = 0.26  # [m]
 
 
 class GoalView:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
-        state: Where the target is at first.
+        state: State with the initial target.
         ask: Takes requests.
     """
 
@@ -70,16 +70,16 @@ class GoalView:
 
     @property
     def is_held(self) -> bool:
-        """Whether a hand moves the handles, or has just let go of them."""
+        """Whether the handles are being dragged, or have just been."""
         return time.monotonic() - self._touched <= HAND_AWAY
 
     @property
     def handles(self) -> tuple[str, ...]:
-        """The nodes that a hand can move just now."""
+        """The nodes that can be dragged now."""
         return (self._gizmo.name,) if self._gizmo.visible else ()
 
     def show(self, state: UiState, text: Text) -> None:
-        """Follows the goal, unless a hand is moving the handles."""
+        """Follows the goal, unless the handles are being dragged."""
         goal = state.goal
         away = hides_target(state)
         if self._gizmo.visible == away:
@@ -106,7 +106,7 @@ class GoalView:
         self._show_via(state, text)
 
     def remove(self) -> None:
-        """Takes everything of it out of the scene."""
+        """Removes everything of it from the scene."""
         for handle in (self._gizmo, self._mark, self._label, self._via_mark, self._via_label):
             handle.remove()
 
@@ -123,6 +123,6 @@ class GoalView:
 
 
 def _below(position: np.ndarray) -> tuple[float, float, float]:
-    """Returns a place clear of the handles, and of the wrist, which is above most of the time."""
+    """Returns a position for the label clear of the handles, and of the wrist, which is mostly above."""
     x, y, z = (float(number) for number in position)
     return x, y, z - 1.1 * _GIZMO_SCALE

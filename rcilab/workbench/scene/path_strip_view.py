@@ -1,4 +1,4 @@
-"""The planned path in the scene, coloured by how much of its limits it uses, with a bead at each violation."""
+"""The planned path in the scene, coloured by its utilisation of the limits, with a bead at each violation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
 
 _NAMED = 5
-"""Beads with words beside them; the others say theirs when they are clicked."""
+"""Number of beads with a label; the others show theirs after a click."""
 _BEAD = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1.35), (0, 0, -1.35)]) * 0.024  # [m]
 _BEAD_FACES = np.array(
     [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
@@ -31,7 +31,7 @@ _THICK = 0.011  # [m]
 
 
 class PathStripView:
-    """Owned by the stage, and made anew with its arm.
+    """Owned by the stage, and created again with its arm.
 
     Args:
         server: The page.
@@ -44,14 +44,14 @@ class PathStripView:
         self._drawn: tuple[PathStrip | None, str, bool] = (None, "", False)
         self._beads = 0
         self._labels: list[Any] = []
-        # There from the beginning: a page that renders in software can take seconds to mount a line that comes later.
+        # Created at the start: with software rendering, a page can take seconds to add a line later.
         drawing.add_segments("/path", np.zeros((PATH_POINTS - 1, 2, 3)), color=_BEAD_COLOR, thickness=_THICK)
         drawing.set_visible("/path", False)
 
     def show(self, state: UiState, text: Text) -> None:
         """Draws the path of the newest plan."""
         ribbon = state.scene.ribbon if state.plan is not None else None
-        is_old = state.learn.show is None and outdated(state) is not None  # What was broken may be kept by now.
+        is_old = state.learn.show is None and outdated(state) is not None  # Its violations may no longer exist.
         wanted = (ribbon, text.language, is_old)
         if wanted[0] is self._drawn[0] and wanted[1:] == self._drawn[1:]:
             return
@@ -65,7 +65,7 @@ class PathStripView:
         self._exchange_beads(() if ribbon is None or is_old else ribbon.beads, text)
 
     def remove(self) -> None:
-        """Takes path and beads away."""
+        """Removes path and beads."""
         self._exchange_beads((), None)
         self._drawing.remove("/path")
 
@@ -79,7 +79,7 @@ class PathStripView:
             name = f"/bead{number}"
             self._drawing.add_mesh(name, _BEAD, _BEAD_FACES, color=_BEAD_COLOR)
             self._drawing.set_transform(name, position=bead.position.tolist())
-            self._drawing.on_click(name, self._hear(number))
+            self._drawing.on_click(name, self._click_handler(number))
             if number < _NAMED and text is not None:
                 x, y, z = (float(value) for value in bead.position)
                 self._labels.append(
@@ -93,7 +93,7 @@ class PathStripView:
                     )
                 )
 
-    def _hear(self, number: int) -> Any:
+    def _click_handler(self, number: int) -> Any:
         async def act(event: Any) -> None:
             self._ask(ShowViolation(page=event.client_id, number=number))
 
@@ -101,7 +101,7 @@ class PathStripView:
 
 
 def bead_words(bead: ViolationMarker, text: Text) -> str:
-    """Returns what is broken there, of which joint and when, in a few words."""
+    """Returns the violated condition, its joint and its time, as a short text."""
     worst = bead.violations[0]
     joint = f" J{worst.joint}" if worst.joint else ""
     more = f" +{len(bead.violations) - 1}" if len(bead.violations) > 1 else ""

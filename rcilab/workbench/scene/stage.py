@@ -1,4 +1,4 @@
-"""The 3D scene: the arms in their room, and everything that stands around them. Owned by the renderer."""
+"""The 3D scene: the arms in their environment, and everything around them. Owned by the renderer."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ if TYPE_CHECKING:
 
 _Ghost = Literal["commanded", "candidate", "plan"]
 _CANDIDATE_COLORS = {"good": (46, 180, 124), "warn": (240, 165, 40), "bad": (225, 62, 52), "peek": (130, 86, 225)}
-_SAME_POSE = 2e-3  # [rad] Ghosts closer than this to the arm would only flicker on its surface.
-_ABSENT = 0.25  # Opacity of an arm that no robot stands for.
+_SAME_POSE = 2e-3  # [rad] At a smaller distance from the arm a ghost would only flicker on its surface.
+_ABSENT = 0.25  # Opacity of an arm without a robot.
 _STRAYED, _BACK = 0.01, 0.006
-"""[rad] The commanded arm is drawn from where a joint is more than 0.6 degrees away from it, some 10 mm at
-the tool, and until it is back within the second."""
+"""[rad] The commanded arm is drawn if a joint is more than 0.6 degrees away from it, some 10 mm at the tool, and
+until the distance has been smaller for a second."""
 
 
 class Stage:
-    """Draws snapshots; handles in the scene ask.
+    """Draws snapshots; handles in the scene send requests.
 
     Args:
         server: The page.
@@ -57,7 +57,7 @@ class Stage:
 
     @property
     def is_held(self) -> bool:
-        """Whether a hand drags the goal, or has just let go of it."""
+        """Whether the goal is being dragged, or has just been."""
         return self._built is not None and (self._goal.is_held or self._elbow.is_held)
 
     def show(self, state: UiState, status: SupervisorStatus, text: Text) -> None:
@@ -76,7 +76,7 @@ class Stage:
         self._model, live = state.model, status.q
         replayed = replayed_pose(state) if live is None else None
         self._show_presence(is_connected(status) or replayed is not None)
-        if live is None:  # Nothing is connected: what stands there is the run that is looked at, or the target.
+        if live is None:  # Without a connection, the position is that of a displayed run, or the target.
             live = state.goal.q if replayed is None else replayed
         self._live.show(live)
         self._show_commanded(status, live)
@@ -88,7 +88,7 @@ class Stage:
         self._extras.show(state)
         self._grip.show(state, status, text)
         self._setup.show(state, text)
-        self._watchers.show(state.lease, self._goal.handles + self._elbow.handles + self._setup.handles)
+        self._watchers.show(state.control_lock, self._goal.handles + self._elbow.handles + self._setup.handles)
 
     def _build(self, state: UiState) -> None:
         server, full = self._server, state.quality == "full"
@@ -113,19 +113,19 @@ class Stage:
         self._tool = model.T_flange_tool
 
     def _show_presence(self, is_there: bool) -> None:
-        """Draws the arm translucent while no robot reports where it is."""
+        """Draws the arm translucent while no robot reports its position."""
         if is_there != self._is_there:
             self._is_there = is_there
             self._live.set_look(opacity=1.0 if is_there else _ABSENT)
 
     def _show_commanded(self, status: SupervisorStatus, live: np.ndarray) -> None:
-        """Draws the commanded pose of the arm where it differs from the measured one."""
+        """Draws the commanded pose of the arm if it differs from the measured one."""
         commanded = status.q_c if status.q is not None else None
         bound = _BACK if "commanded" in self._visible else _STRAYED
         self._see("commanded", commanded, commanded is not None and _apart(commanded, live) > bound)
 
     def _show_candidate(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
-        """Draws the goal, or the branch of it that is under the mouse."""
+        """Draws the goal, or its branch under the mouse."""
         goal, peek = state.goal, state.scene.peek
         solutions = goal.reach.solutions
         q, look = goal.q, goal.reach.tone
@@ -146,7 +146,7 @@ class Stage:
         self._see("plan", q, _apart(q, live) > _SAME_POSE)
 
     def _see(self, name: _Ghost, q: JointVector | None, visible: bool) -> None:
-        """Shows a ghost in a pose, or hides it; makes it when it is first seen: no page that opens waits for it."""
+        """Shows or hides a ghost; creates it at its first use, so that opening a page does not wait for it."""
         if visible and name not in self._ghosts:
             self._ghosts[name] = ArmView(self._drawing, name, self._model, name)
             self._visible.add(name)

@@ -1,4 +1,4 @@
-"""Handles that only the page with the controls can use, and so only that one sees."""
+"""Handles in the scene that only the page with the controls can use, and so only that page shows."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from rcilab.app.control_lock import ControlLock
 
 _SETTLING = 10.0
-"""[s] For so long a change is sent repeatedly: viser replays the scene to a new page, and informs all pages of nodes
-that come back, in an order of its own. A tuning value."""
+"""[s] Time for which a change is sent repeatedly: viser replays the scene to a new page, and informs all pages of
+restored nodes, in any order. A tuning value."""
 _AGAIN = 0.5
 """[s] Between two messages. A tuning value."""
 
 
 class Watchers:
-    """Hides handles from the pages that watch. Owned by the stage.
+    """Hides handles from spectators. Owned by the stage.
 
     Args:
         server: The pages.
@@ -29,29 +29,29 @@ class Watchers:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._handles: tuple[str, ...] = ()
-        self._watching: dict[int, float] = {}  # Since when each watching page sees these handles no more, [s].
+        self._watching: dict[int, float] = {}  # Since when the handles are hidden from each spectator, [s].
         self._sent = 0.0
 
-    def show(self, lease: ControlLock, handles: tuple[str, ...]) -> None:
-        """Sends each page what has changed for it.
+    def show(self, lock: ControlLock, handles: tuple[str, ...]) -> None:
+        """Sends each page its changes.
 
         Args:
-            lease: Which pages there are, and which has the controls.
+            lock: The open pages, and the holder of the controls.
             handles: The nodes that are handles, and that are visible.
         """
         now = time.monotonic()
         if handles != self._handles:
             self._handles, self._watching = handles, dict.fromkeys(self._watching, now)
-        watching = {page: self._watching.get(page, now) for page in lease.pages if page != lease.holder}
+        watching = {page: self._watching.get(page, now) for page in lock.pages if page != lock.holder}
         is_time = now - self._sent >= _AGAIN
         hidden = [page for page, since in watching.items() if since == now or (is_time and now - since < _SETTLING)]
-        shown = [page for page in self._watching if page == lease.holder]
+        shown = [page for page in self._watching if page == lock.holder]
         self._watching = watching
         if hidden or shown:
             self._sent = now
             clients = self._server.get_clients()
             for page in (*hidden, *shown):
                 client = clients.get(page)
-                if client is not None:  # It may have gone just now.
+                if client is not None:  # It may have disconnected just now.
                     for name in handles:
                         show_node(client, name, visible=page in shown)

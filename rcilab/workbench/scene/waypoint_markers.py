@@ -1,4 +1,4 @@
-"""The waypoints of the program in the scene: a point each, a label for those close together. Owned by the renderer."""
+"""The waypoints of the program in the scene: one point each, one label for those close together."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
     from rcilab.app.store import UiState
 
-_MOST = 60  # More labels than that hide the arm, and cost the browser more than it has.
-_NEAR = 0.03  # [m] A tuning value: at the home view, two numbers closer than that overlap.
-_CHARACTER, _LINE = 0.018, 0.05  # [m] A character at the home view, wide and high, about.
-_RANGES = 2  # A label that lists more is wider than what it labels.
+_MOST = 60  # More labels hide the arm, and slow the browser down.
+_NEAR = 0.03  # [m] A tuning value: at the home view, two numbers at a smaller distance overlap.
+_CHARACTER, _LINE = 0.018, 0.05  # [m] Approximate width and height of a character at the home view.
+_RANGES = 2  # A label with more ranges would be wider than its points.
 _PLAIN, _CHOSEN, _FAILED = (70, 110, 160), (11, 111, 194), (209, 57, 43)
 _SIZE = 0.016  # [m]
 _ABOVE = 0.022  # [m]
 
 
 class ProgramMarks:
-    """Draws the program of the state; the selected waypoint and the one that failed stand out by colour and by sign.
+    """Draws the program of the state; the selected waypoint and a failed one stand out by colour and sign.
 
     Args:
         server: The page.
@@ -85,11 +85,11 @@ class ProgramMarks:
 
 
 def labels_of(points: list[Array], numbers: list[tuple[int, str]]) -> list[tuple[list[int], str]]:
-    """Returns the labels of waypoints, none on another at the home view: which points each is for, and its words.
+    """Returns the labels of waypoints, which do not overlap at the home view: the points of each, and its text.
 
     Args:
-        points: Where they are, [m].
-        numbers: The number of each, rising, and its own words where it stands out, else "".
+        points: Their positions, [m].
+        numbers: The number of each, ascending, and its own text if it stands out, else "".
     """
     near = _NEAR
     while True:
@@ -110,7 +110,7 @@ def _overlap(places: list[Array], said: list[str]) -> bool:
 
 
 def neighbours(points: list[Array], near: float) -> list[list[int]]:
-    """Returns which points are nearer than `near`, [m], to the first of a group, as their places, group by group."""
+    """Returns the points nearer than `near`, [m], to the first of a group, as indices, group by group."""
     anchors = np.empty((len(points), 3))
     groups: list[list[int]] = []
     for at, point in enumerate(points):
@@ -125,10 +125,10 @@ def neighbours(points: list[Array], near: float) -> list[list[int]]:
 
 
 def label_of(numbers: list[tuple[int, str]]) -> str:
-    """Returns one label for waypoints that are near each other: their numbers as ranges, and what stands out.
+    """Returns one label for waypoints near each other: their numbers as ranges, and those that stand out.
 
     Args:
-        numbers: The number of each, rising, and its own words where it stands out, else "".
+        numbers: The number of each, ascending, and its own text if it stands out, else "".
     """
     if len(numbers) == 1:
         return numbers[0][1] or str(numbers[0][0])

@@ -1,4 +1,4 @@
-"""Every fault of the gallery is one that a controller really reports, with numbers that are the controller's own."""
+"""Every fault of the fault lab is one that a controller really reports, with numbers that are the controller's own."""
 
 from __future__ import annotations
 
@@ -33,21 +33,19 @@ def booth() -> Iterator[fault_lab.FaultLab]:
 
 @pytest.mark.parametrize("fault", BY_POSE, ids=lambda fault: fault.name)
 def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.FaultLab, fault: Fault) -> None:
-    exhibit = booth.provoke(fault)
-    assert exhibit.reported == (fault,)
-    assert exhibit.cycles["faults"][-1] == 1 << fault
-    assert not exhibit.cycles["faults"][:-1].any()
-    assert exhibit.condition.fault is fault
-    assert exhibit.signal.is_broken
-    inside = exhibit.signal.values[:-1]
-    assert ((exhibit.signal.lower < inside) & (inside < exhibit.signal.upper)).all(), "the first one past its bound"
+    demo = booth.provoke(fault)
+    assert demo.reported == (fault,)
+    assert demo.cycles["faults"][-1] == 1 << fault
+    assert not demo.cycles["faults"][:-1].any()
+    assert demo.condition.fault is fault
+    assert demo.signal.is_broken
+    inside = demo.signal.values[:-1]
+    assert ((demo.signal.lower < inside) & (inside < demo.signal.upper)).all(), "the first one past its bound"
     if fault is not Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME:
-        numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", exhibit.said)]
-        assert np.isclose(numbers, exhibit.value, rtol=5e-3).any(), (
-            "the controller's own number"
-        )  # It rounds to 3 digits.
-    assert exhibit.way_out[-1] == "move"
-    assert np.isfinite(exhibit.moved.q).all()
+        numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", demo.said)]
+        assert np.isclose(numbers, demo.value, rtol=5e-3).any(), "the controller's own number"  # It rounds to 3 digits.
+    assert demo.way_out[-1] == "move"
+    assert np.isfinite(demo.moved.q).all()
 
 
 def test_every_fault_is_in_the_table_once() -> None:

@@ -2,7 +2,7 @@
 
 `SPECIFICATION` is the maker's page "Robot and interface specifications" for the Panda. `LIBRARY` stands for the
 comments of the maker's client library, which gives the ranges of settings that the page leaves out. `IDENTIFIED` are
-figures that were found by moving a real arm, because the maker publishes none of his own.
+figures that were identified on a real arm, because the maker does not publish them.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ CRAIG = (
 )
 """The table as the page prints it, by Craig's convention; the last row is the flange."""
 
-ELBOW_FLIP = -0.467002423653011  # [rad] Joint 4 with the arm stretched as far as it goes; SPECIFICATION.
+ELBOW_FLIP = -0.467002423653011  # [rad] Joint 4 with the arm stretched as far as possible; SPECIFICATION.
 
 _SHOULDER = 0.333  # [m]
 _ELBOW = _SHOULDER + 0.316  # [m]

@@ -1,15 +1,15 @@
-"""What the controller does on each fault, as a table one can print.
+"""The reaction of the controller to each fault, as a table that can be printed.
 
     print(fault_stop.as_text())
 
-Where one command or one measurement breaks several conditions, all their bits are set in that cycle. A state, a report
-and an error list them in the order of the error bytes on the wire, that of this table, which says nothing about what
-came first. Commands are checked before the measurement: after a bad command no measurement is checked in that cycle.
+Where one command or one measurement violates several conditions, all their bits are set in that cycle. A state, a
+report and an error list them in the order of the error bytes on the wire, that of this table, which does not tell
+which came first. Commands are checked before the measurement: after a bad command no measurement is checked.
 
-What is the same for all: the bit is set in the state of the cycle in which the condition is violated and stays set
-until the error recovery; queued commands are forgotten; the arm stops inside its acceleration and jerk limits
-under the position servo, then the brakes close; StopMove is answered with success. What differs is whose value broke
-the condition, and where the stop begins. A joint limit without auto_limit also switches the motors off (manual 3.1.15).
+Common to all: the bit is set in the state of the cycle in which the condition is violated and stays set until the
+error recovery; queued commands are dropped; the arm stops inside its acceleration and jerk limits under the position
+servo, then the brakes engage; StopMove is answered with success. The faults differ in the value that violates the
+condition, and in where the stop begins. A joint limit without auto_limit also switches the motors off (manual 3.1.15).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
 
 
 class FaultSource(Enum):
-    """What broke the condition, and what becomes of it."""
+    """The violating value, and its fate."""
 
     COMMAND = "the command of this cycle is not given to the arm"
     MEASUREMENT = "the command of this cycle has been followed; the arm, not the command, broke the condition"
@@ -38,7 +38,7 @@ class FaultStop(NamedTuple):
     modes: str
     """In which controller modes it is checked."""
     recovery: str
-    """What the error recovery asks for."""
+    """What the error recovery needs."""
 
 
 _ANYTIME = "none: recover, then start the next motion"
@@ -86,7 +86,7 @@ FAULT_STOP: Final = {
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: FaultStop(_COMMAND, _TORQUES, _ANYTIME),
     Fault.INSTABILITY_DETECTION: FaultStop(FaultSource.ABSENCE, _ALL, "none; after an emergency stop, its release"),
 }
-"""Every fault. While a person guides the arm by hand nothing is checked."""
+"""Every fault. Nothing is checked during hand guiding."""
 
 ARM_FAULTS: Final = {
     ArmCondition.FINITE_ANGLES: Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION,
@@ -112,14 +112,14 @@ def faults_of(violations: Iterable[CycleViolation]) -> tuple[Fault, ...]:
 
 
 def is_beyond_range(violation: CycleViolation) -> bool:
-    """Returns whether a joint is beyond its range, which costs motor power. An angle that is not finite is not."""
+    """Returns whether a joint is beyond its range, which switches the motors off; an infinite or NaN angle is not."""
     return violation.condition is not ArmCondition.FINITE_ANGLES and not RANGE_FAULTS.isdisjoint(
         faults_of((violation,))
     )
 
 
 def as_text() -> str:
-    """Returns the table as text, three lines a fault."""
+    """Returns the table as text, three lines per fault."""
     return "\n".join(
         f"{fault.value:2} {fault.manual_name}: {fault.cause}; checked in: {row.modes}\n"
         f"   {row.offender.value}\n   recovery: {row.recovery}"

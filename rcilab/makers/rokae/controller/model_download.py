@@ -1,11 +1,11 @@
-"""The figures that LoadRobotModel serves, in the form the vendor's model library computes with.
+"""The figures in the answer to LoadRobotModel, in the form of the vendor's model library.
 
-Geometry is the DH table in millimetres. Dynamics are base parameters: as few numbers as the torques of a 7-axis arm
-can tell apart. They are found from the arm's own rigid-body model by least squares over random states, which is exact
-because they span it (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter 9); so a vendor
-program that compensates gravity agrees with the arm it drives, but for one thing: in its calls without friction the
-vendor's library ignores the last two numbers, the first moments of link 7, for constants of its own. Friction is
-served as zero: the library's misplaced single call would take viscous friction for an offset.
+Geometry is the DH table in millimetres. Dynamics are base parameters: the smallest set of numbers that determines the
+torques of a 7-axis arm. They are computed from the arm's own rigid-body model by least squares over random states,
+which is exact because these span it (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter
+9). So a vendor program that compensates gravity agrees with the arm it drives, with one exception: in its calls without
+friction the vendor's library replaces the last two numbers, the first moments of link 7, by constants. Friction is
+served as zero: the library misplaces it in one call and would use viscous friction as an offset.
 
 The vendor's library does not support the 6-axis arms; they get their geometry, and zeros for dynamics.
 """
@@ -31,7 +31,7 @@ _SERVED = (
     *(("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "mx", "mz"),) * 5,
     ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my"),
 )
-"""Which of them each link needs beside the others' (wire notes, section 8)."""
+"""The parameters of each link that are not determined by those of others (wire notes, section 8)."""
 _COLUMNS = tuple(9 * link + _ENTRIES.index(name) for link, names in enumerate(_SERVED) for name in names)
 
 
@@ -90,7 +90,7 @@ def regressor(model: RobotModel, q: JointVector, dq: JointVector, ddq: JointVect
 
 
 def _skew(v: Array) -> Array:
-    """Returns the matrix that takes the cross product with v from the left."""
+    """Returns the matrix of the cross product with v from the left."""
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 

@@ -1,4 +1,4 @@
-"""The five controller modes of the RCI: which pairs of modes StartMove can ask for, and what each runs.
+"""The five controller modes of the RCI: the pairs of modes that StartMove accepts, and what each runs.
 
 A pair selects what the client commands (joint angles, tool poses, torques) and the control law of the drives. Pairs
 that are not in the table are refused as not possible.

@@ -1,12 +1,12 @@
-"""The RCI controller around a virtual arm: requests and commands in, one state a cycle out. No sockets, no clock.
+"""The RCI controller of a virtual arm: requests and commands in, one state per cycle out. No sockets, no clock.
 
 Each `step` advances the arm by one cycle, turns its violations into faults, and reports the state.
 
-What a position controller does on a fault, and every other one here: the offending command is never given to the arm;
-the fault's bit is in the state of that very cycle, and stays; queued commands are forgotten; the arm stops on
-one path, `ReferenceTrajectory.stop`, inside its acceleration and jerk limits, under the position servo; then the
-brakes close. Where the arm followed its angles the stop begins from the last good command; where it was compliant
-(impedance, torque, hand guiding), from where it is and how it moves. `fault_stop` lists it fault by fault.
+The reaction to a fault: the violating command is never given to the arm; the fault's bit is in the state of the same
+cycle, and stays; queued commands are dropped; the arm stops on one path, `ReferenceTrajectory.stop`, inside its
+acceleration and jerk limits, under the position servo; then the brakes engage. Where the arm followed its angles the
+stop begins from the last good command; where it was compliant (impedance, torque, hand guiding), from its measured
+position and velocity. `fault_stop` lists it fault by fault.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from rcilab.sim.plant import Plant
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
-RECOVERY_TIME = 50  # [cycles] How long an error recovery takes at least, so that a client sees it.
+RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that a client sees it.
 _PRESSED = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
@@ -69,26 +69,26 @@ _REPORTED = (
     rci.CommandCode.SET_FC_COOR,
     rci.CommandCode.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
 )
-"""Setters that change how states are reported."""
+"""Setters that change the form of states."""
 
 
 class RciController:
     """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
 
     Attributes:
-        arm: What moves.
-        settings: Everything that was set.
-        phase: What the robot is doing.
-        faults: The error bits that are set, in wire order.
-        reason: Why the last fault was raised, in words and numbers.
+        arm: The arm.
+        settings: All settings.
+        phase: The phase of the robot.
+        faults: The set error bits, in wire order.
+        reason: Why the last fault was raised, as a sentence with numbers.
         state: The last reported state.
-        ignored: Commands that came while none was wanted.
-        safety_stop: Which emergency stop is pressed.
+        ignored: Number of commands that came outside of a motion.
+        safety_stop: The active safety stop.
 
     Args:
-        arm: What moves, as it is after power-up.
+        arm: The arm, as after power-up.
         mode_delay: Cycles from StartMove to the requested modes in the state.
-        recovery_time: Cycles that an error recovery takes at least.
+        recovery_time: Shortest duration of an error recovery, [cycles].
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class RciController:
         self.ignored = 0
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
-        self._model_response = model_response(model.description)  # Now: it takes longer than a cycle.
+        self._model_response = model_response(model.description)  # Here, as it takes longer than a cycle.
         self.arm = arm
         arm.configure(self.settings)
         self._reporter = StateReporter(model, self.settings)
@@ -121,12 +121,12 @@ class RciController:
 
     @property
     def model(self) -> RobotModel:
-        """The arm with the tool and load that were set."""
+        """The arm with its tool and load."""
         return self.arm.model
 
     @property
     def plant(self) -> Plant:
-        """What moves."""
+        """The plant."""
         return self.arm.plant
 
     @property
@@ -141,38 +141,38 @@ class RciController:
 
     @property
     def phase_name(self) -> str:
-        """What the robot is doing, such as "idle"."""
+        """Name of the phase, such as "idle"."""
         return self.phase.name.lower()
 
     @property
     def safety_box(self) -> SafetyBox | None:
-        """The safety box that is configured."""
+        """The safety box."""
         return self.settings.safety_box
 
     @property
     def button(self) -> SafetyButton:
-        """Which emergency stop is pressed."""
+        """The active safety stop."""
         return _BUTTONS[self.safety_stop]
 
     def press_button(self, button: SafetyButton) -> None:
-        """Presses an emergency stop, or releases it."""
+        """Activates or releases a safety stop."""
         self.press_safety_stop(rci.SafetyStop[button.upper()])
 
     @property
     def datagram(self) -> bytes:
-        """The last reported state as it goes over the wire."""
+        """The last reported state, as a datagram."""
         if self._datagram is None:
             self._datagram = rci.encode_state(self.state)
         return self._datagram
 
     @property
     def is_settled(self) -> bool:
-        """Whether the arm stands still in no phase that ends by itself: deferred replies are due."""
+        """Whether the arm stands still in a phase that does not end by itself: deferred replies are due."""
         return self.arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
     def is_moving(self) -> bool:
-        """Whether the arm moves, or listens for commands that would make it."""
+        """Whether the arm moves, or waits for commands that would make it move."""
         return self.phase in _MOVING or not self.arm.commanded.is_stationary
 
     @property
@@ -182,12 +182,12 @@ class RciController:
 
     @property
     def is_starved(self) -> bool:
-        """Whether a motion runs whose next command is not there."""
+        """Whether a motion is in progress and its next command is missing."""
         return self.phase is Phase.MOVING and self.playout.is_starved
 
     @property
     def lacks_commands(self) -> bool:
-        """Whether a fault is set that a lack of commands raises."""
+        """Whether a fault is set that missing commands raise."""
         return Fault.INSTABILITY_DETECTION in self.faults
 
     @property
@@ -201,7 +201,7 @@ class RciController:
 
     @property
     def limit_table(self) -> str:
-        """Whose limits of the tool's motion apply, from the next motion on: "manual" or "sdk"."""
+        """The table of tool limits, from the next motion on: "manual" or "sdk"."""
         return self._limit_table
 
     @limit_table.setter
@@ -210,7 +210,7 @@ class RciController:
 
     @property
     def auto_limit(self) -> bool:
-        """Whether joints are led to rest inside their soft limits instead of a fault, from the next motion on."""
+        """Whether joints stop inside their soft limits instead of a fault, from the next motion on."""
         return self.settings.auto_limit
 
     @auto_limit.setter
@@ -227,12 +227,12 @@ class RciController:
         self.settings = self.settings.with_input(signal, level)
 
     def reset(self, q: JointVector) -> None:
-        """Puts the resting arm somewhere else: what a virtual robot can do and a real one cannot."""
+        """Moves the arm at standstill to another position, which only a simulation can do."""
         self._is_still = False
         self.arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
-        """Takes a command that came from the network; it is kept while a motion is in progress."""
+        """Takes a command from the network; it is kept while a motion is in progress."""
         self.ignored += not self.arm.receive(ArmCommand(*packet))
 
     def handle(self, request: rci.Request) -> Reply:
@@ -266,7 +266,7 @@ class RciController:
         return Reply(rci.StatusResponse(status), refusal=why)
 
     def conclude(self, reply: Reply) -> rci.Response:
-        """Returns what to answer now that a reply is due: meanwhile a recovery may have been overtaken."""
+        """Returns the answer that is due: a recovery may have been interrupted meanwhile."""
         return conclude(reply, self.phase)
 
     def on_event(self, event: Event, *faults: Fault) -> None:
@@ -274,10 +274,10 @@ class RciController:
         self._enter(transition(self.phase, event), faults=faults)
 
     def press_safety_stop(self, kind: rci.SafetyStop) -> None:
-        """Presses an emergency stop or opens the safety gate, or ends either with NONE.
+        """Presses an emergency stop or opens the safety gate, or ends both with NONE.
 
-        Both stop the arm and hold it stopped; from StartMove to the end of a motion they also set an error bit, or the
-        client would not notice.
+        Both stop the arm and keep it stopped; from StartMove to the end of a motion they also set an error bit, as the
+        client would not notice otherwise.
         """
         if kind is not self.safety_stop:
             self.safety_stop = kind
@@ -290,7 +290,7 @@ class RciController:
         """Advances by one cycle and returns the state at its end.
 
         Args:
-            is_seen: Whether that state is sent. One that is not has no number of its own: for the client,
+            is_seen: Whether that state is sent. One that is not sent has no number of its own: for the client,
                 which takes numbers for cycles, nothing is missing.
         """
         self._message_id += is_seen
@@ -313,7 +313,7 @@ class RciController:
             self.on_event(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
-        """Returns whether the next cycle will be like this one, unless a request comes or the arm is moved."""
+        """Returns whether the next cycle will equal this one, unless a request comes or the arm is moved."""
         return self.phase in _STILL and self._countdown == 0 and self.arm.has_settled
 
     def _repeat(self) -> RobotState:

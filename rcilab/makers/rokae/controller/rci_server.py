@@ -1,6 +1,6 @@
-"""The virtual side of the RCI: one TCP client whose requests are handled in order, commands and states over UDP.
+"""The server of the RCI: one TCP client whose requests are handled in order, commands and states over UDP.
 
-An answer may have to wait, for the next state or until the arm stands still; then it holds up the requests behind it.
+An answer may have to wait, for the next state or until the arm stands still; then the requests behind it wait, too.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
 DEFAULT_PORT = 1337  # By convention of the manual (2.5).
-SHUTDOWN_NOTICE = 20  # [cycles] For which the states of an ended motion are still sent, with the error bit.
+SHUTDOWN_NOTICE = 20  # [cycles] During which the states of an ended motion are still sent, with the error bit.
 _PROTOCOL = "RCI"
 _QUIET = (Phase.OFF, Phase.IDLE)
 _ACTIVE = (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
 
 
 def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
-    """Returns the RCI server of an arm as it is configured."""
+    """Returns the RCI server of an arm with a configuration."""
     controller = RciController(arm, mode_delay=config.mode_delay_cycles)
     controller.auto_limit = config.auto_limit
     controller.loop_back = config.loop_back
@@ -47,10 +47,10 @@ class RciServer:
     """A `MakerServer` for the RCI.
 
     Args:
-        controller: What grants or refuses requests and follows commands.
+        controller: Grants or refuses requests and follows commands.
         port: TCP port; 0 takes any free one.
         udp_port: For commands; None: the same number, as the vendor's client expects it.
-        client_port: Where states go; None: the same number.
+        client_port: Port for states; None: the same number.
     """
 
     scheme = "rci"
@@ -74,11 +74,11 @@ class RciServer:
         return self.controller.phase in _QUIET and self._pending is None
 
     def attach(self, link: Link) -> None:
-        """Takes what it sends with."""
+        """Takes the link to clients."""
         self._link = link
 
     def connect(self, peer: Peer) -> None:
-        """Takes a client and sends a state before anything else: the vendor's waits for it a few milliseconds."""
+        """Takes a client and sends a state first: the vendor's client waits for it a few milliseconds."""
         self._peer = peer
         self.send_states()
 
@@ -92,7 +92,7 @@ class RciServer:
         return was_moving
 
     def receive(self, peer: Peer, frame: bytes) -> None:
-        """Takes a request and handles it when it is its turn."""
+        """Takes a request and handles it in its turn."""
         self._frames.append(frame)
         self._serve(peer)
 
@@ -112,7 +112,7 @@ class RciServer:
         self._link.send_datagram(self.controller.datagram)
 
     def settle(self) -> None:
-        """Gives the answer that had to wait if it is due, and goes on to the requests behind it."""
+        """Sends the answer that had to wait if it is due, and continues with the requests behind it."""
         if self._pending is not None and self._is_due(self._pending[2].when):
             waited, self._pending = self._pending, None
             assert self._peer is not None
@@ -147,7 +147,7 @@ class RciServer:
                 self._link.log(reply.refusal)
             if isinstance(request, Connect):
                 self._link.direct_datagrams(peer, request.udp_port)
-            # An answer is given when its effect shows: after a reply that waits, every state shows the new mode.
+            # An answer is sent when its effect is visible: after a reply that waits, every state shows the new mode.
             if reply.when is When.NOW:
                 self._answer(peer, request, command_id, reply)
             else:

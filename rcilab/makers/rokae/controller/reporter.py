@@ -1,19 +1,19 @@
-"""The state as the controller reports it: everything that follows from the reference and the measurement.
+"""The reported state: all fields that follow from the reference and the measurement.
 
-What this virtual arm knows and how (each documented here because a state must not lie):
+How this virtual arm computes its fields:
 
 * Commanded velocities and accelerations are backward differences of the commanded angles over one cycle, the tool's
   twist is the Jacobian times them, the tool's acceleration the twist's backward difference; so for the arm angle.
-* While the arm goes where forces take it (torque commands, hand guiding), the commanded angles are the measured ones.
-* The arm angle is undefined where shoulder and wrist are one above the other or the arm is stretched: there its last
-  value stays, and at first 0. On 6-axis arms it is 0.
-* `tau_c` is what the client commands while it commands torques (without gravity), otherwise what the rigid-body model
-  says the commanded motion takes (with gravity). Where the one gives way to the other its rate is said to be zero.
-* Outside torques are the observer's estimates of what the surroundings exert on the arm. `tau_ext_in_base` is the
+* While forces move the arm (torque commands, hand guiding), the commanded angles are the measured ones.
+* The arm angle is undefined where shoulder and wrist are above one another or the arm is stretched: there its last
+  value stays, and 0 at first. On 6-axis arms it is 0.
+* `tau_c` is the client's command in torque mode (without gravity), otherwise the torque of the commanded motion by
+  the rigid-body model (with gravity). At a change between the two its rate is reported as zero.
+* External torques are the observer's estimates of what the environment exerts on the arm. `tau_ext_in_base` is the
   wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
   frame of setFcCoor, in axes that its type names: WORLD those of the base, TOOL those of the force frame, PATH x along
-  the commanded velocity of the tool (where it stands still, its last direction), z as near to the force frame's z as
-  that allows; where a path turns sharply its axes turn within 0.5 s. The sign is that of what acts on the arm: a hand
+  the commanded velocity of the tool (at standstill, its last direction), z as near to the force frame's z as that
+  allows; where a path turns sharply its axes turn within 0.5 s. The sign is that of the action on the arm: a hand
   that presses down shows as a negative z in base axes. The manual leaves it open; the opposite is what the arm exerts.
 * Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
   frequency of SetTorqueFilterCutOffFrequency.
@@ -46,11 +46,11 @@ class StateReporter:
     """Builds the state of each cycle; while nothing moves it repeats the last one. Owned by the controller's cycle.
 
     Attributes:
-        has_repeated: Whether the last state had the arm as the one before it, and the next will if the arm stays.
+        has_repeated: Whether the last state equals the one before, and the next will if the arm stands still.
 
     Args:
         model: The arm with its tool and load.
-        settings: What the client has set.
+        settings: The client's settings.
     """
 
     def __init__(self, model: RobotModel, settings: Settings) -> None:
@@ -59,7 +59,7 @@ class StateReporter:
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
-        """Takes a new tool, load, force frame or filter; only while the arm is at rest."""
+        """Takes a new tool, load, force frame or filter; only at standstill."""
         self._model = model
         self._axes.configure(model, settings)
         self._is_wrench_at_tool = self._axes.is_world and not any(self._axes.T_tool_force.parts[1])
@@ -94,7 +94,7 @@ class StateReporter:
         return self.repeat(message_id)
 
     def repeat(self, message_id: int) -> RobotState:
-        """Returns the state of a cycle that differs from the last one in its number only."""
+        """Returns the state of a cycle that differs from the last one only in its number."""
         return build_state((message_id, *self._rest))
 
     def _is_same(self, signals: CycleSignals) -> bool:

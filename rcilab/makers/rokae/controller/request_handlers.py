@@ -1,4 +1,4 @@
-"""What the controller answers to a request beyond its table of phases: contents, and arguments that cannot be."""
+"""The answers of the controller beyond its table of phases: contents, and invalid arguments."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 
 class Reply(NamedTuple):
-    """What to answer, and when."""
+    """The answer, and when it is sent."""
 
     response: rci.Response
     when: When = When.NOW
     ends_connection: bool = False
     refusal: str = ""
-    """Why it refuses, in words; "" for what was granted."""
+    """Why the request is refused, as a sentence; "" if it is granted."""
 
 
 def answer_query(
@@ -49,7 +49,7 @@ def answer_query(
     settings: Settings,
     model_response: rci.Response,
 ) -> rci.Response | None:
-    """Returns the content that a query asks for, or None when the request is no query."""
+    """Returns the content for a query, or None if the request is no query."""
     match request:
         case rci.GetMotorState():
             return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.CUT_OFF, Phase.USER_STOPPED)))
@@ -66,7 +66,7 @@ def answer_query(
 
 
 def check_request(request: rci.Request, phase: Phase, settings: Settings, arm: VirtualArm) -> Transition | rci.Status:
-    """Returns what a request does, or the status that refuses it whatever its values do to the settings."""
+    """Returns the effect of a request, or the status that refuses it regardless of the settings."""
     cell = transition(phase, request.code)
     refusal: rci.Status | None = None
     match request:
@@ -78,7 +78,7 @@ def check_request(request: rci.Request, phase: Phase, settings: Settings, arm: V
             refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
             if refusal is None and phase is Phase.OFF and not arm.is_standstill:  # The brakes have not stopped it yet.
                 return cell._replace(when=When.AT_REST)
-        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # What the phase says comes first.
+        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # A refusal by the phase takes precedence.
             refusal = _check_start(request, arm.model, arm.commanded)
         case rci.StartDrag(space=space, type=kind):
             is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
@@ -105,15 +105,15 @@ def _check_start(request: rci.StartMove, model: RobotModel, commanded: Reference
 
 
 def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.RecoveryStatus | None:
-    """Returns why a stopped arm cannot recover by itself, or None when it can.
+    """Returns why a stopped arm cannot recover, or None if it can.
 
-    Beyond a soft limit or the safety box by more than a measurement may be, a person has to bring it back (power off
-    and on, then hand guiding, or a motion that leads back): MANUAL_RECOVERY_NEEDED. While something still presses on
-    it harder than the collision thresholds: REFLEX.
+    Beyond a soft limit or the safety box by more than a measurement error, an operator has to move it back (power off
+    and on, then hand guiding, or a motion that leads back): MANUAL_RECOVERY_NEEDED. While an external force is still
+    above the collision thresholds: REFLEX.
 
     Args:
-        settings: With soft limits, box and thresholds.
-        sensors: Where the arm is, and what presses on it.
+        settings: Soft limits, box and thresholds.
+        sensors: Position of the arm, and external forces.
     """
     if _find_outside(settings, sensors) is not None:
         return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
@@ -121,7 +121,7 @@ def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.Rec
 
 
 def _find_outside(settings: Settings, sensors: MeasuredStateMonitor) -> str | None:
-    """Returns which joint is too far beyond its range, or how far the tool is outside its box; None for neither."""
+    """Returns the joint that is too far beyond its range, or how far the tool is outside its box; None for neither."""
     bounds = zip(sensors.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True)
     for number, (q, lower, upper) in enumerate(bounds, 1):
         if not lower - ANGLE_ALLOWANCE < q < upper + ANGLE_ALLOWANCE:
@@ -142,7 +142,7 @@ def describe_refusal(
     safety_stop: rci.SafetyStop,
     faults: Iterable[Fault],
 ) -> str:
-    """Returns why a request was refused, for the log of the controller."""
+    """Returns why a request was refused, for the log."""
     why: object = _describe_phase(phase, safety_stop, faults)
     if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
@@ -161,7 +161,7 @@ def describe_refusal(
 
 
 def _describe_phase(phase: Phase, safety_stop: rci.SafetyStop, faults: Iterable[Fault]) -> str:
-    """Returns what the robot is doing and, where it was stopped, by what."""
+    """Returns the phase of the robot and, if it was stopped, the cause."""
     match phase:
         case Phase.USER_STOPPED:
             return _PRESSED[safety_stop]
@@ -174,7 +174,7 @@ def _describe_phase(phase: Phase, safety_stop: rci.SafetyStop, faults: Iterable[
 
 
 def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm) -> str:
-    """Returns which value of a request is out of its bounds."""
+    """Returns the value of a request that is out of its bounds."""
     try:
         apply_request(settings, request, arm.model.description)
     except InvalidValueError as error:
@@ -183,7 +183,7 @@ def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm
 
 
 def conclude(reply: Reply, phase: Phase) -> rci.Response:
-    """Returns what to answer once a reply is due: a recovery that was overtaken by something says by what."""
+    """Returns the answer that is due: a recovery that was interrupted names the cause."""
     status = getattr(reply.response, "status", None)
     if reply.when is When.AT_REST and isinstance(status, rci.RecoveryStatus):
         return rci.StatusResponse(_OVERTAKEN.get(phase, rci.RecoveryStatus.ABORTED))

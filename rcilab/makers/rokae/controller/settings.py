@@ -1,8 +1,8 @@
-"""Everything a client can set over TCP, checked again by the controller.
+"""All settings of a client over TCP, checked again by the controller.
 
 The vendor's client checks some values before it sends them and lets NaN through nearly every check, so here every
-value is checked: finite, inside its range, a proper pose where one is due. What fails is answered with "invalid
-argument" and changes nothing. On 6-axis arms the seventh elements are not even looked at.
+value is checked: finite, inside its range, a proper pose. An invalid value is answered with "invalid argument" and
+changes nothing. On 6-axis arms the seventh elements are ignored.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ _FREEDOMS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(ArmParameters):
-    """All values that commands set: those of the arm, and those of the controller alone."""
+    """All settable values: those of the arm, and those of the controller alone."""
 
     torque_report_filter: float = REPORT_FREQUENCY
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
-    """Levels of the digital inputs; nothing is wired to a virtual controller, they are set from outside."""
+    """Levels of the digital inputs; a virtual controller has no wiring, they are set from outside."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
 
@@ -71,7 +71,7 @@ class Settings(ArmParameters):
         return replace(self, loop_back=on, inputs=self.outputs if on else self.inputs)
 
     def rebooted(self, arm: RobotDescription) -> Settings:
-        """Returns what is left after a reboot: the defaults, and what is wired or chosen outside of the controller."""
+        """Returns the settings after a reboot: the defaults, and what is wired or chosen outside of the controller."""
         kept = replace(Settings.of(arm), inputs=self.inputs, auto_limit=self.auto_limit)
         return kept.with_loop_back(self.loop_back)
 
@@ -80,18 +80,18 @@ def apply_request(settings: Settings, request: rci.Request, arm: RobotDescriptio
     """Returns the settings with a request's values in them.
 
     Args:
-        settings: The settings so far.
+        settings: The settings before.
         request: A setter; anything else leaves them as they are.
-        arm: Whose ranges count.
+        arm: Its ranges apply.
 
     Raises:
-        InvalidValueError: A value is out of its bounds, or values do not fit each other; it names the first.
+        InvalidValueError: A value is out of its bounds, or values do not fit together; it names the first.
     """
     return replace(settings, **_changes(request, arm, settings))
 
 
 def guided_freedom(request: rci.StartDrag) -> GuidedFreedom:
-    """Returns what a drag leaves free: in joint space every joint, whatever its type, as with the vendor's client."""
+    """Returns the free directions of a drag: in joint space all joints, for any type, as with the vendor's client."""
     return GuidedFreedom.ALL if request.space == rci.DragSpace.JOINT else _FREEDOMS[rci.DragType(request.type)]
 
 
@@ -158,7 +158,7 @@ def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) ->
 
 
 def _require(name: str, value: float, lowest: float, largest: float, unit: str) -> None:
-    if not lowest <= value <= largest:  # Nor is NaN, which is in no range.
+    if not lowest <= value <= largest:  # NaN is in no range.
         raise InvalidValueError(name, _round(value), f"{unit} is outside {lowest:g} to {largest:g} {unit}")
 
 

@@ -1,12 +1,12 @@
-"""What the robot is doing, and what each event does to that: one table, pure.
+"""The phases of the robot, and the effect of each event: one table, pure.
 
     OFF <-> IDLE -> STARTING -> MOVING -> STOPPING -> IDLE
     IDLE <-> GUIDING            any of them -> REFLEX -> RECOVERING -> IDLE
                                 MOVING, STOPPING -> CUT_OFF -> OFF
                                 any of them <-> USER_STOPPED
 
-In every phase but MOVING and GUIDING the arm stops if it still moves, and then stays; that is the one
-stop path, and no event needs to ask for it. A reply that waits for `AT_REST` is sent when the arm stands still.
+In every phase except for MOVING and GUIDING the arm stops if it still moves, and then stands still; that is the one
+stop path, and no event needs to ask for it. A reply with `AT_REST` is sent when the arm stands still.
 `print(state_machine.as_text())` shows the table.
 """
 
@@ -28,7 +28,7 @@ from rcilab.makers.rokae.wire import (
 
 
 class Phase(Enum):
-    """What the robot is doing; the value is the robot mode that its state reports meanwhile."""
+    """The phase of the robot; the value is the robot mode in its state."""
 
     OFF = (RobotMode.OTHER, 0)
     """Motors off, brakes closed."""
@@ -39,11 +39,11 @@ class Phase(Enum):
     MOVING = (RobotMode.MOVE, 0)
     """Commands are followed."""
     STOPPING = (RobotMode.MOVE, 1)
-    """The motion was ended; what is queued is played, then the arm stops."""
+    """The motion was ended; queued commands are followed, then the arm stops."""
     GUIDING = (RobotMode.GUIDING, 0)
-    """A person moves the arm by hand."""
+    """Hand guiding."""
     REFLEX = (RobotMode.REFLEX, 0)
-    """A fault stopped the arm; brakes closed once it rests."""
+    """A fault stopped the arm; the brakes engage at standstill."""
     CUT_OFF = (RobotMode.REFLEX, 1)
     """As REFLEX, and without motor power: a joint passed its range without `auto_limit` (manual 3.1.15)."""
     USER_STOPPED = (RobotMode.USER_STOPPED, 0)
@@ -53,11 +53,11 @@ class Phase(Enum):
 
     def __init__(self, robot_mode: RobotMode, _number: int) -> None:
         self.robot_mode: Final = robot_mode
-        """What the state reports in this phase."""
+        """The modes in the state in this phase."""
 
 
 class Event(Enum):
-    """What happens inside the controller, beside the client's commands."""
+    """Events inside the controller, in addition to the client's commands."""
 
     MODES_SHOWN = "the delay after StartMove is over"
     FAULT = "a condition was broken"
@@ -70,7 +70,7 @@ class Event(Enum):
 
 
 class Action(Enum):
-    """What a transition asks of the cycle."""
+    """Actions of a transition."""
 
     APPLY = "take the request's values into the settings"
     BEGIN = "arm the play-out and count down to the modes"
@@ -98,7 +98,7 @@ Trigger: TypeAlias = CommandCode | Event
 
 
 class Transition(NamedTuple):
-    """What one event does in one phase."""
+    """The effect of one event in one phase."""
 
     phase: Phase
     """The phase afterwards."""
@@ -115,7 +115,7 @@ QUERIES: Final = (C.GET_MOTOR_STATE, C.LOAD_ROBOT_MODEL, C.GET_DI_STATE, C.GET_S
 """Answered with content, always."""
 
 ANYTIME: Final = (C.CONNECT, C.SET_DO, C.SET_CART_IMP_DESIRED_TAU)
-"""Setters that may be used while the arm moves: they change nothing under its feet."""
+"""Setters that are allowed while the arm moves: they do not affect the motion."""
 
 GROUNDED: Final = (
     C.SET_CARTESIAN_LIMIT,
@@ -130,17 +130,17 @@ GROUNDED: Final = (
     C.SET_FC_COOR,
     C.ENABLE_VIRTUAL_GUIDE,
 )
-"""Setters for an arm at rest and in good health. The manual gives no list: this one is on the safe side."""
+"""Setters for an arm at standstill without faults. The manual gives no list: this one is conservative."""
 
 REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
-"""Those of them that also a stopped arm takes: the manual's way out of a collision without contact is to raise the
+"""Those that a stopped arm accepts, too: the manual's remedy for a collision without contact is to raise the
 thresholds (4.6), and an error recovery waits until nothing is above them."""
 
 _IN_MOTION = (P.STARTING, P.MOVING, P.STOPPING)
 """Phases that a client takes for its motion: only an error bit stops it there.
 
-In STARTING the vendor's client looks at nothing but the modes, without end, so what stops it there shows them with the
-bit; they are hidden again when it stops the motion.
+In STARTING the vendor's client waits for the modes, without a timeout, so a stop there shows them with the bit; they
+are hidden again when the client ends the motion.
 """
 
 _BUSY = (P.STARTING, P.MOVING, P.STOPPING, P.GUIDING, P.RECOVERING)
@@ -152,7 +152,7 @@ _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
 
 
 def _modes_after(phase: Phase) -> Action:
-    """Returns what becomes of the modes when something stops the arm in a phase."""
+    """Returns the modes in the state when something stops the arm in a phase."""
     return A.REVEAL_MODES if phase is P.STARTING else A.HIDE_MODES
 
 
@@ -177,7 +177,7 @@ def _setters(phase: Phase) -> dict[Trigger, Transition]:
 
 
 def _motion(phase: Phase) -> dict[Trigger, Transition]:
-    stopped = StopStatus.SUCCESS  # Always: the vendor's client dies of any other answer.
+    stopped = StopStatus.SUCCESS  # Always: the vendor's client aborts at any other answer.
     rows: dict[Trigger, Transition] = {}
     if phase is P.IDLE:
         rows[C.START_MOVE] = Transition(P.STARTING, (A.BEGIN,), StartStatus.SUCCESS)
@@ -187,7 +187,7 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
         rows[C.STOP_MOVE] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD), stopped, When.AT_REST)
     elif phase is P.MOVING:
         rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
-    else:  # A guided arm need not stop at all.
+    else:  # A guided arm need not stop.
         when = When.NOW if phase is P.GUIDING else When.AT_REST
         rows[C.STOP_MOVE] = Transition(phase, (A.HIDE_MODES,), stopped, when)
     if phase is P.IDLE:
@@ -225,7 +225,7 @@ def _recovery(phase: Phase) -> dict[Trigger, Transition]:
         return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
     if phase is P.CUT_OFF:
         return {command: Transition(P.OFF, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS, When.AT_REST)}
-    if phase in (P.OFF, P.IDLE):  # All there may be is the bit of a motion that a stop or power-off ended.
+    if phase in (P.OFF, P.IDLE):  # There can only be the bit of a motion that a stop or power-off ended.
         return {command: Transition(phase, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS)}
     status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
     return {command: Transition(phase, (), status)}
@@ -239,7 +239,7 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         rows[E.AT_REST] = Transition(P.IDLE, (A.DISCARD,))
     if phase is P.RECOVERING:
         rows[E.RECOVERED] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS))
-    if phase is P.USER_STOPPED:  # A stop that was pressed and released between two states is seen by its bit alone.
+    if phase is P.USER_STOPPED:  # A stop that is pressed and released between two states shows by its bit alone.
         rows[E.SAFETY_RELEASE] = Transition(P.OFF)
         rows[E.FAULT] = rows[E.JOINT_LIMIT] = Transition(phase, (A.SET_FAULTS,))
     elif phase is not P.OFF:
@@ -275,12 +275,12 @@ POWER_OFF: Final = {phase: _power_off(phase) for phase in Phase}
 
 
 def transition(phase: Phase, trigger: Trigger) -> Transition:
-    """Returns what a command or an event does in a phase."""
+    """Returns the effect of a command or an event in a phase."""
     return TABLE[phase, trigger]
 
 
 def as_text() -> str:
-    """Returns the table as text, one line a pair."""
+    """Returns the table as text, one line per pair."""
     lines: list[str] = []
     for (phase, trigger), cell in TABLE.items():
         actions = ", ".join(action.name for action in cell.actions)

@@ -1,4 +1,4 @@
-"""Where a robot is, and which address and ports of ours it will talk to."""
+"""The address of a robot, and our own addresses and ports for it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rcilab.makers.network import find_route
 
 DEFAULT_PORT = 1337  # By convention of the manual; the teach pendant's RCI page shows the one in force.
 SPARE_LOOPBACK = "127.0.0.3"
-"""Our address when the robot already owns the one that we would have used; any other in 127/8 would do."""
+"""Our address if the robot has the one that we would have used; any other in 127/8 would do."""
 
 _NAME = re.compile(r"(?=.{1,253}$)[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?(\.[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?)*")
 _KNOWN_OPTIONS = ("udp_port", "client_port", "world_port")
@@ -29,10 +29,10 @@ class RciAddress:
     udp_port: int | None = None
     """Where the controller receives commands; None: at the same number as `port`."""
     client_port: int | None = None
-    """Where the controller sends states; None: at the same number as `port`, as the RCI does it by itself."""
+    """Where the controller sends states; None: to the same number as `port`, the default of the RCI."""
 
     world_port: int | None = None
-    """Where a virtual controller lets things happen to its robot; None: unknown, or a real robot."""
+    """Simulation port of a virtual controller; None: unknown, or a real robot."""
 
     @property
     def is_here(self) -> bool:
@@ -44,12 +44,12 @@ class RciAddress:
 
     @property
     def command_port(self) -> int:
-        """UDP port that commands go to."""
+        """UDP port for commands."""
         return self.port if self.udp_port is None else self.udp_port
 
     @property
     def state_port(self) -> int:
-        """UDP port of ours that states come to."""
+        """Our UDP port for states."""
         return self.port if self.client_port is None else self.client_port
 
     def __str__(self) -> str:
@@ -64,7 +64,7 @@ def parse_address(text: str) -> RciAddress:
         text: `rci://HOST:PORT?udp_port=N&client_port=M`; everything but the host may be left out.
 
     Raises:
-        InvalidValueError: It is no such address; the message says which part is wrong.
+        InvalidValueError: It is not such an address; the message says which part is wrong.
     """
     if not isinstance(text, str) or not text.strip():
         raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
@@ -73,7 +73,7 @@ def parse_address(text: str) -> RciAddress:
         raise InvalidValueError(
             "address", text, f"looks like IPv6, which is not supported; write the robot's IPv4 address, like {_EXAMPLE}"
         )
-    if not any(mark in text for mark in ":.") and text != "localhost":  # "foo", or a robot's name: a slip, no host.
+    if not any(mark in text for mark in ":.") and text != "localhost":  # "foo", or a robot's name: a typing error.
         raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
     parts = urlsplit(text if "://" in text else f"rci://{text}")
     if parts.scheme != "rci":
@@ -112,12 +112,12 @@ class Route:
 
 
 def choose_route(address: RciAddress) -> Route:
-    """Returns which of our addresses to use towards a robot.
+    """Returns our address for the connection to a robot.
 
-    The robot sends states to the address our TCP connection comes from, so both are bound to one specific address,
-    never to the wildcard: that would also take the port from a virtual controller on the same machine (and receive
-    our own commands). When the robot is at our own address and needs the same port number there, our end moves to
-    another loopback address.
+    The robot sends states to the address of our TCP connection, so both are bound to one specific address, never to
+    the wildcard: that would also take the port from a virtual controller on the same machine (and receive our own
+    commands). If the robot is at our own address and needs the same port number there, our end uses another loopback
+    address.
 
     Raises:
         ConnectionLostError: The host name has no address, or no network of ours leads there.
@@ -135,7 +135,7 @@ def choose_route(address: RciAddress) -> Route:
 
 
 def _require_host(text: str, host: str) -> None:
-    """Raises where no machine can have this address or name; whether one has it, only the network knows."""
+    """Raises if no machine can have this address or name; whether one has it, only the network knows."""
     if not host.rpartition(".")[2].isdecimal():
         if not _NAME.fullmatch(host):
             raise InvalidValueError(

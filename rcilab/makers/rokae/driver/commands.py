@@ -33,14 +33,14 @@ class RciCommands(RciSettings):
         return bool(self._request(rci.GetMotorState()).power)
 
     def start_move(self, controller_mode: ControllerMode, motion_mode: rci.StartMotionMode) -> None:
-        """Begins a motion; commands must follow at once. `execute` and `control` do all of it by themselves."""
+        """Starts a motion; commands must follow at once. `execute` and `control` do this by themselves."""
         self._ask(rci.StartMove(controller_mode, motion_mode), rci.StartStatus.MOTION_STARTED)
 
     def stop_move(self, timeout: float | None = None) -> None:
         """Ends a motion.
 
         Args:
-            timeout: How long to wait for the answer, [s]; None: as for every request.
+            timeout: For the answer, [s]; None: that of every request.
         """
         self._ask(rci.StopMove(), timeout=timeout)
 
@@ -49,7 +49,7 @@ class RciCommands(RciSettings):
         self._ask(rci.AutomaticErrorRecovery())
 
     def load_model(self) -> rci.ModelResponse:
-        """Returns the figures of the arm as the controller knows them: DH rows and base dynamic parameters.
+        """Returns the controller's figures of the arm: DH rows and base dynamic parameters.
 
         Raises:
             CommandRejectedError: The controller has none.
@@ -72,16 +72,16 @@ class RciCommands(RciSettings):
         space: rci.DragSpace | Literal["joint", "cartesian"] = rci.DragSpace.JOINT,
         type: rci.DragType | Literal["translation", "rotation", "free"] = rci.DragType.FREE,
     ) -> None:
-        """Lets a person guide the arm by hand, until `stop_drag`.
+        """Starts hand guiding, until `stop_drag`.
 
         Args:
-            space: Where constraints hold: in joint space the type has no effect.
-            type: What stays free in Cartesian space.
+            space: Space of the constraints: in joint space the type has no effect.
+            type: The free directions in Cartesian space.
         """
         self._ask(rci.StartDrag(member(rci.DragSpace, "space", space), member(rci.DragType, "type", type)))
 
     def stop_drag(self) -> None:
-        """Ends hand guiding; returns once the arm is at rest."""
+        """Ends hand guiding; returns once the arm stands still."""
         self._ask(rci.StopDrag())
 
     def safety_stop(self) -> rci.SafetyStop:

@@ -1,4 +1,4 @@
-"""The link to a controller in values instead of bytes: requests and their answers, states, commands."""
+"""A connection in values instead of bytes: requests and their answers, states, commands."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rcilab.makers.rokae.wire import (
     encode_request,
 )
 
-_LOOK = 0.05  # [s] Longest wait before the deadline of a request is looked at again.
+_LOOK = 0.05  # [s] Longest wait between two checks of a request's deadline.
 
 
 class RciConnection:
@@ -30,8 +30,8 @@ class RciConnection:
     Args:
         transport: The wire.
         n: Number of joints of the arm at the other end.
-        name: What to call the other end in errors, such as its address.
-        timeout: How long the answer to a request may take, [s].
+        name: Name of the other end in errors, such as its address.
+        timeout: For the answer to a request, [s].
     """
 
     def __init__(self, transport: Transport, n: int, name: str, timeout: float) -> None:
@@ -41,31 +41,31 @@ class RciConnection:
         self.latest: RobotState | None = None
         """The newest state received so far."""
         self.received_ns = 0
-        """When that was, monotonic, [ns]."""
+        """Time of its arrival, monotonic, [ns]."""
         self._empty_ns = 0  # When the socket was last seen empty.
-        self._latest_since_ns = 0  # When it was last empty before the newest state came.
+        self._latest_since_ns = 0  # When it was last empty before the newest state arrived.
         self.on_states: Callable[[list[RobotState]], None] = _ignore
         """Called at least every 0.05 s while the answer to a request is awaited, with the states that came in."""
         self._transport = transport
         self._decoder = StateDecoder()
         self._command_id = 0
-        self._one_request = threading.Lock()  # Of the TCP connection: a motion's thread and others may ask.
+        self._one_request = threading.Lock()  # Of the TCP connection: a motion's thread and others may send requests.
 
     @property
     def local_address(self) -> tuple[str, int]:
-        """Where states come to: our address and UDP port."""
+        """Where states arrive: our address and UDP port."""
         return self._transport.local_address
 
     @property
     def age(self) -> float:
-        """How long ago the newest state was sent, at most: counted from when none was there before it, [s]."""
+        """Upper bound of the newest state's age: since the buffer was last empty before it arrived, [s]."""
         return (time.monotonic_ns() - self._latest_since_ns) * 1e-9
 
     def poll(self, timeout: float) -> list[RobotState]:
         """Returns every state that has arrived, oldest first; waits up to `timeout`, [s], for the first one."""
         deadline = time.monotonic() + timeout
         while self._transport.wait(deadline - time.monotonic()):
-            states = self._take_states()  # Empty when what came was no state of this robot.
+            states = self._take_states()  # Empty if the datagrams were no states of this robot.
             if states:
                 return states
         return []
@@ -80,7 +80,7 @@ class RciConnection:
         self._transport.send_command(encode_command(packet))
 
     def request(self, request: Request, timeout: float | None = None) -> Any:
-        """Sends a request and returns the answer to it; answers to older requests are dropped.
+        """Sends a request and returns its answer; answers to older requests are dropped.
 
         Raises:
             DeadlineError: No answer within the timeout.
@@ -136,4 +136,4 @@ class RciConnection:
 
 
 def _ignore(states: list[RobotState]) -> None:
-    """States that no listener takes."""
+    """Drops states without a listener."""

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
 
 def send_parameters(settings: RciSettings, control: ControllerParameters) -> None:
-    """Sends parameters to a controller; nothing may move meanwhile. After a refusal those before it are in force.
+    """Sends parameters to a controller at standstill. After a refusal, earlier ones are in force.
 
     Args:
         settings: The commands of a connection.
-        control: What to send.
+        control: The parameters.
 
     Raises:
         InvalidValueError: A number is outside its range; it was not sent.
@@ -39,11 +39,11 @@ def send_parameters(settings: RciSettings, control: ControllerParameters) -> Non
 
 
 def send_configuration(settings: RciSettings, setup: RobotConfiguration) -> None:
-    """Sends a configuration to a controller; nothing may move meanwhile. A refusal leaves earlier parts in force.
+    """Sends a configuration to a controller at standstill. After a refusal, earlier parts are in force.
 
     Args:
         settings: The commands of a connection.
-        setup: What to send.
+        setup: The configuration.
 
     Raises:
         CommandRejectedError: The controller refused a part; the error names it.

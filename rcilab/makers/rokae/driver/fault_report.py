@@ -1,4 +1,4 @@
-"""One sentence for a motion that the controller stopped: which fault, which joint, which number, what to do."""
+"""The diagnosis of a motion that the controller stopped: fault, joint, numbers, remedy."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ _OF_JOINTS = (
     "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
     "acceleration there, and stay away from singular poses"
 )
-_FOLLOWED = 10  # Cycles before the fault that are looked at for the joint that came nearest to a bound.
-_HISTORY = 3  # Commands that a third difference looks back to.
+_FOLLOWED = 10  # Cycles before the fault in which the joint nearest to a bound is searched.
+_HISTORY = 3  # Commands before a command that its third difference uses.
 
 
 def describe_faults(
@@ -52,20 +52,20 @@ def describe_faults(
     box: SafetyBox | None = None,
     collision_thresholds: JointVector | None = None,
 ) -> FaultReport:
-    """Returns what the error says that a motion ends with.
+    """Returns the diagnosis of a motion's end.
 
     Args:
-        faults: What the controller reported, in wire order.
+        faults: The reported faults, in wire order.
         record: The last cycles, see `cycle_dtype`.
-        t: Motion time of the state that carried the faults, [s]; NaN before the first command.
+        t: Motion time of the state with the faults, [s]; NaN before the first command.
         model: The arm with its tool and load.
         limits: Its bounds.
-        mode: How it was commanded.
+        mode: The command mode.
         late: What `CallTimes.describe` returned, for a motion that a slow callback may have ended.
-        pressed: Which safety stop ended the motion, in a sentence with what to do; "" for none. The RCI has no error
-            bit for it, so that the bits which a controller sets meanwhile say something else.
-        box: The safety box that the controller has, as far as it is known.
-        collision_thresholds: Its collision thresholds, shape (n,), [N m], as far as they are known.
+        pressed: The safety stop that ended the motion, as a sentence with the remedy; "" for none. The RCI has no error
+            bit for it, so the bits that a controller sets meanwhile have another meaning.
+        box: The controller's safety box, if it is known.
+        collision_thresholds: Its collision thresholds, shape (n,), [N m], if they are known.
     """
     faults = tuple(faults)
     when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
@@ -90,7 +90,7 @@ def describe_faults(
 
 
 def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
-    """Returns what to do about a fault; where the commands kept their limits, it is not the plan's."""
+    """Returns the remedy for a fault; if the commands kept their limits, it is not about the plan."""
     if mode is ControllerMode.TORQUE:
         return fault.torque_remedy
     if mode in YIELDING_MODES:
@@ -99,9 +99,9 @@ def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
 
 
 def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> str:
-    """Returns which joint was nearest to a bound of the faults, where joints follow from poses; "" for other faults.
+    """Returns the joint nearest to a bound of the faults, if joints follow from poses; "" for other faults.
 
-    The joint angles that broke it are the controller's; the state shows those before, that were still followed.
+    The joint angles that violated it are the controller's; the state shows the last ones that were followed.
     """
     q, joint = record["q_c"][-_FOLLOWED:], limits.joint
     for order, (fault, bounds, name, unit) in enumerate(
@@ -130,10 +130,10 @@ def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limi
 
 
 def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> tuple[str, bool]:
-    """Returns the first command in the record that breaks a condition, and whether one does; else the last command.
+    """Returns the first command in the record that violates a condition, and whether one does; else the last command.
 
-    What the controller measured, and the torques it computed, are not checked here. A condition of one of the faults is
-    what is looked for; another that is broken only counts for the second answer.
+    The controller's measurements and computed torques are not checked here. A condition of one of the faults is
+    searched; a violation of another one only counts for the second result.
     """
     sent = record[record["sent_ns"] != 0]
     is_broken = False
@@ -148,7 +148,7 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
         if not len(rows):
             continue
         values = rows[field]
-        if rows["t"][0] <= 0.0:  # The first command of the motion: before it the arm stood.
+        if rows["t"][0] <= 0.0:  # The first command of the motion: before it the arm stood still.
             stood = {"command": rows["q_c"][0], "command_pose": values[0], "command_tau": np.zeros_like(values[0])}
             values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
         first = len(values) - len(rows)

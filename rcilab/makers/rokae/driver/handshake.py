@@ -1,4 +1,4 @@
-"""What a new connection must have: the right arm at the other end, and states that arrive."""
+"""The checks of a new connection: the right arm at the other end, and states that arrive."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rcilab.makers.rokae.driver.identify import Lengths, require_same_arm
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_SAME_TOOL = 1e-3  # [m], [rad] Less is how well the arm's own geometry is known.
+_SAME_TOOL = 1e-3  # [m], [rad] The accuracy of the arm's own geometry.
 
 
 def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, address: str) -> None:
-    """Makes sure that the controller moves this arm; one that serves no model is believed.
+    """Checks that the controller has this arm; one that serves no model is accepted.
 
     Raises:
         ModelError: It is another arm; the message names both.
@@ -38,7 +38,7 @@ def await_first_state(link: RciConnection, place: RciAddress, local: tuple[str, 
     """Returns once a state has arrived.
 
     Raises:
-        ConnectionLostError: None has after `timeout`, [s].
+        ConnectionLostError: None has arrived after `timeout`, [s].
     """
     if not link.poll(timeout):
         raise ConnectionLostError(
@@ -49,7 +49,7 @@ def await_first_state(link: RciConnection, place: RciAddress, local: tuple[str, 
 
 
 def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
-    """Returns the model with the tool that the controller's state shows; warns where that is another one.
+    """Returns the model with the tool in the controller's state; warns if that is another one.
 
     Poses of a session with another tool than its controller's would be off by the difference.
     """

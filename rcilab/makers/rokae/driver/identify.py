@@ -13,7 +13,7 @@ Lengths: TypeAlias = Sequence[Sequence[float]]
 """a and d of every joint, [m]."""
 
 _LENGTH_TOLERANCE = 5e-5  # [m] The manual prints lengths to 0.1 mm.
-_CALIBRATION = 5e-3  # [m] A calibrated arm may differ so much from its manual; two arms differ by 15 mm at least.
+_CALIBRATION = 5e-3  # [m] Largest difference of a calibrated arm from its manual; two arms differ by 15 mm at least.
 _COLUMNS = 4
 
 
@@ -24,7 +24,7 @@ def identify_robot(dh: Sequence[float]) -> str:
         dh: 28 numbers: 7 rows of a [mm], alpha [rad], d [mm], theta [rad]; a 6-axis arm leaves the last row at zero.
 
     Raises:
-        ModelError: No robot of ours has them; the message says how to name one.
+        ModelError: No known robot has them; the message says how to name one.
     """
     served = _served_lengths(dh)
     name = _find_name(served)
@@ -37,16 +37,16 @@ def identify_robot(dh: Sequence[float]) -> str:
 
 
 def require_same_arm(dh: Sequence[float], name: str, lengths: Lengths, address: str) -> None:
-    """Makes sure that the controller moves the arm that motions will be planned for.
+    """Checks that the controller has the arm that motions are planned for.
 
-    A controller that serves zeros says nothing and is believed. An arm that rcilab does not know must have the given
-    lengths, up to a calibration.
+    A controller that serves zeros is accepted. An arm that rcilab does not know must have the given lengths, up to a
+    calibration.
 
     Args:
-        dh: What the controller serves, see `identify_robot`.
+        dh: The controller's table, see `identify_robot`.
         name: Name of the given model.
         lengths: Its lengths, see `dh_lengths`.
-        address: Where the controller is, for the message.
+        address: Address of the controller, for the message.
 
     Raises:
         ModelError: It is another arm; the message names both.

@@ -1,4 +1,4 @@
-"""What was measured in the last cycles of a motion that the controller stopped: the joint, its value and its bound."""
+"""The measurements in the last cycles of a motion that the controller stopped: the joint, its value and its bound."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_CLOSE = math.radians(1.0)  # A joint farther inside than this has not come near the limits that we know of.
-_LEAST = 1e-3  # [N m] So that a threshold of zero divides nothing by zero.
+_CLOSE = math.radians(1.0)  # A joint farther inside has not come near the known limits.
+_LEAST = 1e-3  # [N m] Against a division by a threshold of zero.
 _CARTESIAN = (ControllerMode.CARTESIAN_POSITION, ControllerMode.CARTESIAN_IMPEDANCE)
 YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPEDANCE, ControllerMode.TORQUE)
-"""In which forces move the arm, and not its commands alone."""
+"""Modes in which forces move the arm, too."""
 
 
 class _Measured(NamedTuple):
-    """The last cycles, checked as our virtual controller does; a real one may allow less."""
+    """The last cycles, checked as by our virtual controller; a real one may allow less."""
 
     violations: list[LimitViolation]
     ddq: Array
@@ -47,15 +47,15 @@ def describe_measured(
     mode: ControllerMode,
     collision_thresholds: JointVector | None = None,
 ) -> Iterator[str]:
-    """Yields what was measured in the last cycles of what the faults name.
+    """Yields the measurements in the last cycles that belong to the faults.
 
     Args:
-        faults: What the controller reported.
+        faults: The reported faults.
         record: The last cycles, see `cycle_dtype`.
         model: The arm with its tool and load.
         limits: Its bounds.
-        mode: How it was commanded.
-        collision_thresholds: Those of the controller, shape (n,), [N m]; None: not known.
+        mode: The command mode.
+        collision_thresholds: Those of the controller, shape (n,), [N m]; None: unknown.
     """
     faults = set(faults)
     if not len(record):
@@ -103,9 +103,9 @@ def describe_measured(
 
 
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
-    """Returns which face of the safety box the tool passed, and how far; "" where that is not known.
+    """Returns the face of the safety box that the tool exceeded, and by how much; "" if that is unknown.
 
-    A face that the tool was beyond at the first of these cycles counts only as far as the tool moved farther out.
+    For a face that the tool was beyond at the first of these cycles, only the distance that it moved out counts.
     """
     if box is None or not BOX_FAULTS & set(faults) or not len(record):
         return ""
@@ -173,7 +173,7 @@ def _describe_range(faults: set[Fault], record: NDArray[np.void], limits: Limits
 def _describe_collision(
     record: NDArray[np.void], model: RobotModel, limits: Limits, thresholds: JointVector | None
 ) -> str:
-    """Says what presses on which joint, from the wrench that the controller estimates at the tool."""
+    """Returns the force on which joint, from the wrench that the controller estimates at the tool."""
     last, known = record[-1], limits.joint.collision_threshold if thresholds is None else thresholds
     wrench = last["tau_ext_in_base"]
     outside = np.abs(model.jacobian(last["q"]).T @ wrench)

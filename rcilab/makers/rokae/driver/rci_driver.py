@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 __all__ = ["RciDriver", "open_driver", "parse_address"]
 
 _MOST_JOINTS = 7
-_RECOVERY_TIMEOUT = 3.0  # [s] for the error bits to go after the controller has agreed to clear them.
-_FRESH = 0.1  # [s] Longest wait for one state while faults are expected to go.
+_RECOVERY_TIMEOUT = 3.0  # [s] For the error bits to clear after the controller has accepted the recovery.
+_FRESH = 0.1  # [s] Longest wait for one state while the bits are expected to clear.
 _MOTION_MODES = {
     ControllerMode.JOINT_POSITION: StartMotionMode.JOINT,
     ControllerMode.JOINT_IMPEDANCE: StartMotionMode.JOINT,
@@ -73,12 +73,12 @@ def open_driver(address: str, timeout: float, expected: ExpectedArm | None) -> R
 
 
 class RciDriver:
-    """A connection to an RCI controller, in the terms of `StreamingDriver`.
+    """A connection to an RCI controller with the interface of `StreamingDriver`.
 
     Args:
         connection: The connection.
-        address: Where the controller is.
-        arm_name: Name of the arm that it moves.
+        address: Address of the controller.
+        arm_name: Name of its arm.
     """
 
     scheme = "rci"
@@ -108,7 +108,7 @@ class RciDriver:
 
     @property
     def age(self) -> float:
-        """How long ago it was sent, at most, [s]."""
+        """Upper bound of its age, [s]."""
         return self.connection.age
 
     @property
@@ -192,7 +192,7 @@ class RciDriver:
         """Begins a motion (StartMove).
 
         Raises:
-            InvalidValueError: It is not a mode to move in.
+            InvalidValueError: It is not a mode for motions.
         """
         if mode not in _MOTION_MODES:
             known = [known.name for known in _MOTION_MODES]
@@ -211,7 +211,7 @@ class RciDriver:
 
     def send(self, state: RobotState, command: Command) -> None:
         """Sends the command that answers a state."""
-        # The end is announced by StopMove alone: a set `finished` byte has never been seen from the vendor's client.
+        # StopMove alone announces the end: the vendor's client has never been seen to set the `finished` byte.
         self.connection.send(build_command(state.message_id, command, state)._replace(finished=False))
 
     def end(self, timeout: float | None = None) -> None:
@@ -219,18 +219,18 @@ class RciDriver:
         self._commands.stop_move(timeout)
 
     def find_safety_stop(self, state: RobotState) -> SafetyStopReason | None:
-        """Returns which safety stop a state shows; the state shows that there is one, a query which."""
+        """Returns the safety stop that a state shows; the state shows that there is one, a query which."""
         if state.robot_mode is not RobotMode.USER_STOPPED:
             return None
         try:
             is_gate = self._commands.safety_stop() is SafetyStop.GSTOP
-        except RcilabError:  # The state says that there is one.
+        except RcilabError:  # The state shows that there is one.
             is_gate = False
         reason = Refusal.GSTOP if is_gate else Refusal.ESTOP
         return SafetyStopReason(reason.word, reason.sentence)
 
     def is_lack_of_commands(self, faults: tuple[Any, ...]) -> bool:
-        """Returns whether the controller lacked commands: it reports an instability then."""
+        """Returns whether the controller lacked commands, which it reports as an instability."""
         return Fault.INSTABILITY_DETECTION in faults
 
     def select_limits(self, limits: Limits, table: str) -> Limits:

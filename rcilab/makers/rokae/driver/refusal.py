@@ -1,4 +1,4 @@
-"""Why a controller refuses a request: the RCI answers with a number, its state and two queries give the reason."""
+"""Why a controller refuses a request: the RCI answers with a number; its state and two queries give the reason."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rcilab.makers.rokae import wire as rci
 
 
 class Refusal(Enum):
-    """What keeps a controller from doing as requested; the value names its words, `status.VALUE` of the catalogues."""
+    """The reason of a refusal; the value names its texts, `status.VALUE` of the catalogues."""
 
     ESTOP = "estop", "an emergency stop is pressed: release it first, then switch the power on (power_on())"
     GSTOP = "gstop", "the safety gate is open: close it first, then switch the power on (power_on())"
@@ -26,7 +26,7 @@ class Refusal(Enum):
     def __init__(self, word: str, sentence: str) -> None:
         self.word: Final = word
         self.sentence: Final = sentence
-        """What it is and what to do, in English."""
+        """Its name and remedy, in English."""
 
 
 _BY_MODE = {
@@ -36,17 +36,17 @@ _BY_MODE = {
     RobotMode.MOVE: Refusal.MOVING,
 }
 _STOPS = {rci.SafetyStop.ESTOP: Refusal.ESTOP, rci.SafetyStop.GSTOP: Refusal.GSTOP}
-_STILL = 1e-9  # [rad/s] Commanded velocity of an arm that is commanded to stay; more is a stop that is not over yet.
+_STILL = 1e-9  # [rad/s] Commanded velocity at standstill; more is a stop that is not over yet.
 
 
 def find_refusal(ask: Callable[[rci.Request], Any], latest: Callable[[], RobotState | None]) -> Refusal | None:
-    """Returns why a controller has just refused a request as not possible now; None when nothing of it is known.
+    """Returns why a controller has just refused a request as not possible now; None if it is unknown.
 
     Args:
         ask: Sends a request and returns the answer.
         latest: Returns the newest state.
     """
-    with suppress(RcilabError):  # What the refusal says matters more than why its reason cannot be found.
+    with suppress(RcilabError):  # The refusal itself matters more than an error of the queries.
         stop = _STOPS.get(ask(rci.GetSafetyStopState()).state)
         if stop is not None:
             return stop

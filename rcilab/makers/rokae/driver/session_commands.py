@@ -24,15 +24,15 @@ from rcilab.robots import RobotDescription
 class RciSessionCommands(RciCommands):
     """Every command of the RCI, for the user of a session.
 
-    While a motion runs, what a controller answers then may be sent, from any thread and from a callback: `set_do`,
-    `get_di`, `safety_stop`, `motor_state`, `load_model`, `set_cart_imp_desired_tau`, and `set_motor_power(False)`,
-    which ends the motion. In a callback such a request takes about a millisecond. All else is refused and does not
-    disturb the motion.
+    During a motion, the requests that a controller answers then may be sent, from any thread and from a callback:
+    `set_do`, `get_di`, `safety_stop`, `motor_state`, `load_model`, `set_cart_imp_desired_tau`, and
+    `set_motor_power(False)`, which ends the motion. In a callback such a request takes about a millisecond. All others
+    are refused and do not disturb the motion.
 
     Args:
         connection: The connection.
-        description: The arm, to check arguments with: its own bounds, whatever soft limits a model has.
-        arm: What the session has configured.
+        description: The arm, to check arguments with: its own bounds, without a model's soft limits.
+        arm: The session's configuration.
         lock: The session's lock.
     """
 
@@ -44,7 +44,7 @@ class RciSessionCommands(RciCommands):
         self._lock = lock
 
     def configure(self, configuration: RobotConfiguration) -> None:
-        """Sends a configuration; after a refusal the parts before it are in force."""
+        """Sends a configuration; after a refusal, earlier parts are in force."""
         send_configuration(self, configuration)
 
     def set_coor(self, T_flange_tool: Pose) -> None:
@@ -55,7 +55,7 @@ class RciSessionCommands(RciCommands):
             self._arm.model = model
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
-        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        """Sets the safety box for the origin of the tool, and whether it is active."""
         with self._lock.acquire("SetCartesianLimit"):
             super().set_cartesian_limit(box)
             self._arm.safety_box = box

@@ -1,6 +1,6 @@
-"""Every setter of the RCI as a method: arguments checked before they are sent, in the words of the axis they are for.
+"""Every setter of the RCI as a method: arguments are checked before they are sent, with errors that name the axis.
 
-Most are settable while nothing moves; a refusal says what the controller is doing instead.
+Most need an arm at standstill; otherwise the refusal names the phase of the controller.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ _ADVICE: dict[tuple[type[rci.Request], IntEnum], str] = {
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.USER_STOP): Refusal.ESTOP.sentence,
     (rci.AutomaticErrorRecovery, rci.RecoveryStatus.ABORTED): "something ended it half-way: try again",
 }
-"""What to do where the controller's state does not tell the reason either."""
+"""The remedy if the controller's state does not give the reason either."""
 _TEMPORARY = frozenset({"NOT_POSSIBLE", "USER_STOP", "FAILED"})
-"""Names of statuses that refuse a request because of what the controller is doing, whatever its values."""
+"""Statuses that refuse a request because of the controller's phase, whatever its values."""
 
 _COUNTED_FROM_1 = (rci.ForceFrame, rci.DragSpace, rci.DragType)
-"""What the manual counts from 1 (3.1.16, 3.1.17) and the wire from 0."""
+"""Enumerations that the manual counts from 1 (3.1.16, 3.1.17) and the wire from 0."""
 
 _Member = TypeVar("_Member", bound=IntEnum)
 
@@ -89,7 +89,7 @@ class RciSettings:
         self._ask(rci.SetCollisionBehavior(_floats(values)))
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
-        """Sets the safety box that the origin of the tool must stay in, and whether it is watched."""
+        """Sets the safety box for the origin of the tool, and whether it is active."""
         require_box(box)
         _vector("safety box size", box.size, _AXES[:3], "m", 0.0, LARGEST_BOX)
         _vector("safety box centre", box.T_base_box.position, _AXES[:3], "m", -FARTHEST_BOX, FARTHEST_BOX)
@@ -98,7 +98,7 @@ class RciSettings:
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
         """Sets soft limits of the joint angles, each of shape (n,), [rad], inside the arm's own limits.
 
-        What happens there is the controller's choice: the manual's `auto_limit` never goes over the wire.
+        The behaviour at them is set on the controller: the manual's `auto_limit` is never sent over the wire.
         """
         joint = None if self._limits is None else self._limits.joint
         least = largest = None
@@ -128,7 +128,7 @@ class RciSettings:
         )
 
     def set_cart_imp_desired_tau(self, wrench: ArrayLike) -> None:
-        """Sets the force and moment that Cartesian impedance presses with, shape (6,), [N, N m]."""
+        """Sets the force and moment of Cartesian impedance, shape (6,), [N, N m]."""
         largest = None
         if self._limits is not None:
             largest = np.repeat((self._limits.cartesian.force, self._limits.cartesian.moment), 3)
@@ -156,7 +156,7 @@ class RciSettings:
             raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
         names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
         values = _vector("inertia", flat, names, "kg m^2")
-        # A body that cannot exist is refused here.
+        # A physically impossible body is refused here.
         Payload(mass=kilograms, center_of_mass=center, inertia=values.reshape(3, 3))
         self._ask(rci.SetLoad(kilograms, _floats(center), _floats(values)))
 
@@ -178,13 +178,13 @@ class RciSettings:
 
         Args:
             T_flange_force: Its pose in the flange frame.
-            type: What its axes follow: the base ("world"), the tool, or the path.
+            type: The reference of its axes: the base ("world"), the tool, or the path.
         """
         kind = member(rci.ForceFrame, "type", type)
         self._ask(rci.SetFcCoor(_pose_at_flange("T_flange_force", T_flange_force).as_row_major(), kind))
 
     def enable_virtual_guide(self, enable: bool) -> None:
-        """Switches the virtual guide: walls at the faces of the safety box while a person or a force moves the arm."""
+        """Switches the virtual guide: walls at the faces of the safety box during hand guiding and under forces."""
         self._ask(rci.EnableVirtualGuide(flag("enable", enable)))
 
     def _joints(self) -> list[str]:
@@ -204,15 +204,15 @@ class RciSettings:
         raise kind(type(request).__name__, status, advice, reason=word)
 
     def _request(self, request: rci.Request, timeout: float | None = None) -> Any:
-        """Sends a request and returns the answer; every command comes through here."""
+        """Sends a request and returns the answer; every command uses this method."""
         return self._link.request(request, timeout)
 
 
 def member(kind: type[_Member], name: str, value: object) -> _Member:
-    """Returns the member of an enumeration that a value means: the member itself, or its name in any case.
+    """Returns the member of an enumeration for a value: the member itself, or its name in any case.
 
     Raises:
-        InvalidValueError: It means none; the message lists those that exist.
+        InvalidValueError: There is no such member; the message lists all.
     """
     if isinstance(value, kind):
         return value
@@ -226,7 +226,7 @@ def member(kind: type[_Member], name: str, value: object) -> _Member:
 
 
 def flag(name: str, value: object) -> bool:
-    """Returns a switch as a bool; 0 and 1 will do.
+    """Returns a switch as a bool; 0 and 1 are accepted.
 
     Raises:
         InvalidValueError: It is anything else, such as the text "off", which Python takes for true.
@@ -240,12 +240,12 @@ def _vector(
     name: str, values: ArrayLike, axes: Sequence[str], unit: str, least: ArrayLike | None = None,
     largest: ArrayLike | None = None,
 ) -> Array:  # fmt: skip
-    """Returns a vector, one number an axis, each finite and inside its bounds; None is no bound."""
+    """Returns a vector, one number per axis, each finite and inside its bounds; None is no bound."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         if len(axes) == 1:
-            as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put in a list.
+            as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put into a list.
         raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error
     if array.shape != (len(axes),):
         raise InvalidValueError(name, described(values), f"has shape {array.shape}, needs ({len(axes)},) [{unit}]")
@@ -263,7 +263,7 @@ def _vector(
 
 
 def load_center(center_of_mass: ArrayLike) -> Array:
-    """Returns a load's centre of mass in the flange frame, as far from the flange as the controller takes it, [m].
+    """Returns a load's centre of mass in the flange frame, [m], if the controller accepts its distance.
 
     Raises:
         InvalidValueError: It is not three finite numbers, or farther away.

@@ -15,16 +15,16 @@ from rcilab.makers.rokae.driver.address import RciAddress, Route, choose_route
 from rcilab.makers.rokae.wire import FrameReader
 
 _LARGEST = 2048  # [bytes] More than any datagram of the RCI.
-_DATAGRAMS_AT_ONCE = 512  # Read in one call: more than the buffer holds of states, and no flood keeps the caller.
+_DATAGRAMS_AT_ONCE = 512  # Read in one call: more states than the buffer holds, so that a flood blocks no caller.
 _MS = 1000.0
 
 
 class Transport(Protocol):
-    """What a client needs of the wire. Owned by one thread."""
+    """The interface of a client's sockets. Owned by one thread."""
 
     @property
     def local_address(self) -> tuple[str, int]:
-        """Where states come to: our address and UDP port."""
+        """Where states arrive: our address and UDP port."""
         ...
 
     def send_request(self, frame: bytes) -> None:
@@ -57,21 +57,21 @@ class Transport(Protocol):
 
 
 class SocketTransport:
-    """The real wire.
+    """The sockets of a connection.
 
     Args:
-        address: Where the robot is.
+        address: Address of the robot.
         state_size: Bytes of a state datagram; others are counted in `foreign` and dropped.
-        timeout: How long to wait for the TCP connection, [s].
+        timeout: For the TCP connection, [s].
 
     Raises:
-        ConnectionLostError: The robot cannot be reached, or the port that states come to is taken.
+        ConnectionLostError: The robot cannot be reached, or the port for states is taken.
     """
 
     def __init__(self, address: RciAddress, state_size: int, timeout: float) -> None:
         self.address = address
         self.foreign = 0
-        """Datagrams dropped because of their size or sender, as far as they were read."""
+        """Number of datagrams that were read and dropped because of their size or sender."""
         self._state_size = state_size
         route = choose_route(address)
         self._robot_host = route.robot_udp[0]
@@ -79,8 +79,8 @@ class SocketTransport:
         self._was_answered = False
         self._reader = FrameReader()
         self._udp, rest = _bind_udp(address, route)
-        self._rest: socket.socket | None = rest  # What comes from other ports; until a state comes to the other socket.
-        self._other_port: int | None = None  # Of the robot, that states come from.
+        self._rest: socket.socket | None = rest  # For other ports; until a state arrives at the other socket.
+        self._other_port: int | None = None  # The robot's port that states come from.
         try:
             self._tcp = _connect_tcp(address, route, timeout)
         except BaseException:
@@ -135,8 +135,8 @@ class SocketTransport:
     def receive_states(self) -> list[bytes]:
         """Returns the state datagrams that have arrived, oldest first; does not wait.
 
-        States count that come from the robot's address, and from the port that commands go to. From another port they
-        are taken at the first one's, until one comes from where commands go.
+        States are accepted from the robot's address, and from the port that commands go to. From another port they are
+        accepted from the first one, until one comes from the port that commands go to.
         """
         states: list[bytes] = []
         for _ in range(_DATAGRAMS_AT_ONCE):
@@ -144,13 +144,13 @@ class SocketTransport:
                 datagram = self._udp.recv(_LARGEST)
             except (BlockingIOError, InterruptedError):
                 break
-            except ConnectionError:  # An earlier command met a closed port; its ICMP answer says nothing new.
+            except ConnectionError:  # An earlier command met a closed port; its ICMP answer contains nothing new.
                 continue
             if len(datagram) == self._state_size:
                 states.append(datagram)
             else:
                 self.foreign += 1
-            if not self._states_ready.poll(0):  # A third of what an exception takes, and there is mostly just one.
+            if not self._states_ready.poll(0):  # A third of the time of an exception, and there is mostly just one.
                 break
         if self._rest is not None:
             if not states:
@@ -177,7 +177,7 @@ class SocketTransport:
             states.append(datagram)
             if self._other_port is None:
                 self._other_port = port
-                udp.connect((host, port))  # From here on its buffer, too, takes no strangers' datagrams.
+                udp.connect((host, port))  # From here on its buffer, too, accepts no strangers' datagrams.
         return states
 
     def send_command(self, datagram: bytes) -> None:
@@ -228,7 +228,7 @@ class SocketTransport:
 
 
 def _bind_udp(address: RciAddress, route: Route) -> tuple[socket.socket, socket.socket]:
-    """Returns a socket that is connected to the robot, and one for what comes from elsewhere to the same port of ours.
+    """Returns a socket that is connected to the robot, and one for datagrams from elsewhere to the same port of ours.
 
     The kernel prefers the connected one. Only these two share the port: another client of the robot finds it taken.
     """
@@ -247,7 +247,7 @@ def _bind_udp(address: RciAddress, route: Route) -> tuple[socket.socket, socket.
         udp.connect(route.robot_udp)
         with suppress(BlockingIOError):
             while True:
-                udp.recv(_LARGEST)  # Until it was connected, anybody's came here.
+                udp.recv(_LARGEST)  # Until it was connected, it accepted any sender.
     except OSError as error:
         udp.close()
         rest.close()

@@ -1,4 +1,4 @@
-"""What the four xMate arms share: the limits of the manual and the way their tables are written down.
+"""The common data of the four xMate arms: the limits of the manual and the form of their tables.
 
 `MANUAL` is the RCI user manual V1.3.1; `ROS2` the vendor's public ROS 2 description package (figures only).
 """

@@ -1,4 +1,4 @@
-"""The twenty faults of the RCI, each provoked by the shortest stream of commands or push that breaks its condition."""
+"""The twenty faults of the RCI, each provoked by the shortest stream of commands, or a push, that raises it."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from rcilab.makers.scenario import FaultScenario
 
 
 def _order(scenario: FaultScenario) -> tuple[int, bool]:
-    """What is commanded comes next to what is measured of the same quantity."""
+    """Order of scenarios: measured values follow commanded ones of the same quantity."""
     name = scenario.fault.name.removeprefix("ACTUAL_").removeprefix("COMMAND_")
     first = min(fault for fault in Fault if fault.name.endswith(name))
     return int(first), scenario.fault.name.startswith("ACTUAL_")
 
 
 SCENARIOS = tuple(sorted((*COMMAND_SCENARIOS, *MEASURED_SCENARIOS), key=_order))
-"""Every fault once, in the order that user interfaces show them in."""
+"""Every fault once, in display order."""

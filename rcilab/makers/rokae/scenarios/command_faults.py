@@ -1,6 +1,6 @@
-"""Wrong commands: each fault of a command, and the shortest stream of commands that breaks its condition.
+"""Wrong commands: each fault of a command, and the shortest stream of commands that violates its condition.
 
-Paths are built from their second differences, cycle by cycle, so that nothing else breaks before.
+Paths are built from their second differences, cycle by cycle, so that no other condition is violated first.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from rcilab.model.robot_model import RobotModel
 
 
 def posed(*angles: float) -> Callable[[RobotModel], JointVector]:
-    """Returns where a scenario begins: seven joint angles, [rad], without the third one for a 6-axis arm."""
+    """Returns the start of a scenario: seven joint angles, [rad], without the third one for a 6-axis arm."""
     return lambda model: readonly_copy(angles if model.n == 7 else np.delete(angles, 2))
 
 
 lively_elbow = posed(*map(radians, (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0)))
-"""Where the elbow may turn fastest for what the joints may do, so that the arm angle passes its bound before them."""
+"""Position in which the elbow turns fastest for given joint velocities: the arm angle exceeds its bound first."""
 
-_PAUSE = 20  # [cycles] of standing still before, so that the plot shows where it began.
-_SOFT_LIMIT = 0.05  # [rad] from where the joint stands.
+_PAUSE = 20  # [cycles] Standstill at the start, so that the plot shows it.
+_SOFT_LIMIT = 0.05  # [rad] From the position of the joint.
 _HELD_LINK = 2
-_HOLD = 0.8  # Part of the collision threshold that something holds against at most.
-_SENT_EVERY = 4  # [cycles] How often that is sent to the simulation.
+_HOLD = 0.8  # Largest holding force, as a part of the collision threshold.
+_SENT_EVERY = 4  # [cycles] Interval at which it is sent to the simulation.
 _HALF_BOX = 0.03  # [m]
-_PAST = 1.006  # Times the bound: past it by more than rounding.
+_PAST = 1.006  # Factor on the bound: beyond it by more than rounding.
 
 
 def path(second: Array) -> Array:
-    """Returns the path whose second differences are given, [unit/s^2], from rest at 0."""
+    """Returns the path with these second differences, [unit/s^2], from standstill at 0."""
     return np.cumsum(np.cumsum(second)) * CYCLE_TIME**2
 
 
 def rise(slope: float, top: float, count: int) -> Array:
-    """Returns accelerations that stand still for a moment, rise by `slope` a cycle up to `top`, and stay there."""
+    """Returns accelerations that are zero at first, rise by `slope` per cycle up to `top`, and stay there."""
     return np.minimum(slope * np.maximum(np.arange(count) - _PAUSE, 0), top)
 
 
 def joint_stream(start: Array, joint: int, way: Array) -> Callback:
-    """Returns a callback that moves one joint, counted from 0, along a way; at its end it stands still."""
+    """Returns a callback that moves one joint, counted from 0, along a path; at its end it stands still."""
 
     def callback(state: RobotState, t: float) -> JointPosition:
         cycle = round(t / CYCLE_TIME)
@@ -62,7 +62,7 @@ def joint_stream(start: Array, joint: int, way: Array) -> Callback:
 
 
 def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way: Array, psi: float) -> Callback:
-    """Returns a callback that moves and turns the tool along a way: `offset` gives translation and rotation vector."""
+    """Returns a callback that moves and turns the tool along a path: `offset` gives translation and rotation vector."""
     held = None if np.isnan(psi) else psi
 
     def callback(state: RobotState, t: float) -> CartesianPosition:
@@ -77,7 +77,7 @@ def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way
 
 
 def torque_stream(n: int, joint: int, tau: Array) -> Callback:
-    """Returns a callback that puts torques on one joint, counted from 0, [N m]."""
+    """Returns a callback that commands torques of one joint, counted from 0, [N m]."""
 
     def callback(state: RobotState, t: float) -> JointTorque:
         cycle = round(t / CYCLE_TIME)
@@ -89,7 +89,7 @@ def torque_stream(n: int, joint: int, tau: Array) -> Callback:
 
 
 def soften_joint_1(scene: Scene) -> Scene:
-    """Sets a soft limit of joint 1 just beside where it stands."""
+    """Sets a soft limit of joint 1 next to its position."""
     upper = np.array(scene.limits.joint.upper)
     upper[0] = scene.start.q_c[0] + _SOFT_LIMIT
     scene.commands.set_joint_limit(scene.limits.joint.lower, upper)
@@ -148,7 +148,7 @@ def _joint_jerk(scene: Scene) -> Callback:
 
 
 def _singular(scene: Scene) -> Callback:
-    """Leads the tool straight away from the shoulder: so slowly that no joint is too fast before the arm is stretched.
+    """Moves the tool straight away from the shoulder, so slowly that no joint is too fast before the arm is stretched.
 
     Cartesian motions cannot go through a stretched arm, whatever their speed.
     """
@@ -167,7 +167,7 @@ def _torque_rate(scene: Scene) -> Callback:
 
 
 def _torque_range(scene: Scene) -> Callback:
-    """Something holds link 2 meanwhile: left alone it would be too fast before the bound is passed."""
+    """A force holds link 2 meanwhile: without it the link would be too fast before the bound is exceeded."""
     limits, robot = scene.limits.joint, scene.robot
     tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - _PAUSE, 0)
     axis = robot.model.rigid_body.link_jacobian(scene.start.q, _HELD_LINK, np.zeros(3))[3:, 1]
@@ -184,7 +184,7 @@ def _torque_range(scene: Scene) -> Callback:
 
 
 def _spin(value: float) -> tuple[Array, Array]:
-    """About the tool's own axis: the last joint alone, so that the tool's bounds are passed before any joint's."""
+    """About the tool's own axis: the last joint alone, so that the tool's bounds are exceeded before any joint's."""
     return np.zeros(3), np.array([0.0, 0.0, value])
 
 

@@ -1,4 +1,4 @@
-"""The arm itself goes wrong, the commands do not: it is pushed, thrown by torques, hit, or not heard of any more."""
+"""Faults of the arm with correct commands: it is pushed, accelerated by torques or hit, or the connection is lost."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rcilab.makers.rokae.scenarios.command_faults import box_around_tool, lively
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
 from rcilab.sim.api import NetworkFaults
 
-_PAUSE = 20  # [cycles] of standing still before.
-_LONGEST = 3000  # [cycles] in which a fault has to come.
-_STEP = 5  # [cycles] How often a growing push is sent to the simulation.
+_PAUSE = 20  # [cycles] Standstill at the start.
+_LONGEST = 3000  # [cycles] Within which a fault has to come.
+_STEP = 5  # [cycles] Interval at which a growing push is sent to the simulation.
 _ELBOW_LINK = 4
-_CUT = 40  # [cycles] after which the network goes.
+_CUT = 40  # [cycles] After which the network is cut.
 
 Push = Callable[[int], tuple[float, ...]]
-"""Wrench on the tool by the cycle since the push began: force and moment, base axes, [N, N m]."""
+"""Wrench on the tool by the cycle since the start of the push: force and moment, base axes, [N, N m]."""
 
 
 def held(scene: Scene, act: Callable[[int], None], *, tool: bool) -> Callback:
-    """Returns a callback that commands the arm to stay where it is, and tells `act` the cycle before each answer."""
+    """Returns a callback that commands standstill, and calls `act` with the cycle before each answer."""
     q, T, psi = scene.start.q_c, scene.start.T_base_tool_c, scene.start.psi_c
     angle = None if np.isnan(psi) else psi
 
@@ -39,7 +39,7 @@ def held(scene: Scene, act: Callable[[int], None], *, tool: bool) -> Callback:
 
 
 def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> Callback:
-    """Returns a callback that stays where it is while something presses harder and harder."""
+    """Returns a callback that commands standstill while an external force grows."""
 
     def act(cycle: int) -> None:
         since = cycle - _PAUSE
@@ -56,7 +56,7 @@ def _soft_joints(scene: Scene) -> Scene:
 
 
 def _loose_tool(scene: Scene) -> Scene:
-    """The tool keeps its place and turns freely."""
+    """The tool keeps its position and turns freely."""
     scene.commands.set_cartesian_impedance([1000.0] * 3 + [0.0] * 3)
     return scene.yielding()
 
@@ -86,7 +86,7 @@ def _down(scene: Scene) -> Callback:
 
 
 def _elbow(scene: Scene) -> Callback:
-    """Along the one way that the elbow has while the tool stays."""
+    """Along the only path of the elbow while the tool is held."""
     model, q = scene.robot.model, scene.start.q
     still = np.linalg.svd(model.jacobian(q))[2][-1]
     way = model.rigid_body.link_jacobian(q, _ELBOW_LINK, np.zeros(3))[:3] @ still
@@ -120,7 +120,7 @@ def _hit(scene: Scene) -> Callback:
 
 def _cut_off(scene: Scene) -> Callback:
     def act(cycle: int) -> None:
-        if cycle == _CUT - 1:  # From now on lock-step waits for commands that may be lost for a moment only.
+        if cycle == _CUT - 1:  # From now on lock-step waits only briefly for commands that may be lost.
             scene.robot.simulation.set_network(NetworkFaults(jitter=1e-6), "commands")
         elif cycle == _CUT:
             scene.robot.simulation.set_network(NetworkFaults(loss=1.0), "commands")

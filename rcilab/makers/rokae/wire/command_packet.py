@@ -42,7 +42,7 @@ class CommandPacket(NamedTuple):
     T_base_tool_c: tuple[float, ...] = _NO_POSE
     """Tool pose in base, 16 numbers, row-major, [m]."""
     psi_valid: bool = False
-    """Whether `psi_c` counts."""
+    """Whether `psi_c` is used."""
     psi_c: float = 0.0
     """Arm angle, [rad]."""
     finished: bool = False
@@ -52,12 +52,12 @@ class CommandPacket(NamedTuple):
 
 
 def build_command(message_id: int, command: Command, state: RobotState) -> CommandPacket:
-    """Returns the packet of a callback's command; the fields it does not use carry what the vendor's client puts there.
+    """Returns the packet of a callback's command; unused fields have the values of the vendor's client.
 
     Args:
-        message_id: Number of the state that is answered.
-        command: What the callback returned.
-        state: The state that is answered; its measured joints and pose fill the unused fields.
+        message_id: Number of the answered state.
+        command: The command.
+        state: The answered state; its measured joints and pose fill the unused fields.
     """
     if isinstance(command, JointPosition):
         pose = state.T_base_tool.as_row_major()
@@ -71,7 +71,7 @@ def build_command(message_id: int, command: Command, state: RobotState) -> Comma
 
 
 def encode_command(packet: CommandPacket) -> bytes:
-    """Returns the datagram of a command; 6-element arrays are filled up with a zero.
+    """Returns the datagram of a command; 6-element arrays are padded with a zero.
 
     Raises:
         InvalidValueError: An array has the wrong number of elements.
@@ -91,7 +91,7 @@ def decode_command(data: bytes, n: int) -> CommandPacket:
 
     Args:
         data: The datagram.
-        n: Number of joints, 6 or 7; the seventh element of a 6-axis arm is garbage and is dropped.
+        n: Number of joints, 6 or 7; the seventh element of a 6-axis arm is undefined and is dropped.
 
     Raises:
         DecodeError: Not exactly 290 bytes.

@@ -28,7 +28,7 @@ from rcilab.makers.rokae.wire.statuses import CommandCode, GuideStatus, SafetySt
 HEADER = Layout(
     "frame header",
     (
-        Field("length", "u16", order="big"),  # Of the whole frame, these two bytes included.
+        Field("length", "u16", order="big"),  # Of the whole frame, with these two bytes.
         Field("command_id", "u32", order="big"),
         Field("command", "u32", order="big"),
     ),
@@ -38,7 +38,7 @@ _E = TypeVar("_E", bound=IntEnum)
 _LENGTH = Struct(">H")
 
 MAX_FRAME_SIZE = HEADER.size + MODEL.size
-"""Length of the longest frame there is, the answer to LoadRobotModel, in bytes."""
+"""Length of the longest frame, the answer to LoadRobotModel, in bytes."""
 
 
 class Header(NamedTuple):
@@ -50,17 +50,17 @@ class Header(NamedTuple):
 
 
 class FrameReader:
-    """Cuts a TCP byte stream into frames, however the bytes were split or joined on the way."""
+    """Cuts a TCP byte stream into frames, for any division into reads."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._consumed = 0
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Takes the next bytes of the stream and returns the frames they complete.
+        """Takes the next bytes of the stream and returns the frames that they complete.
 
         Raises:
-            DecodeError: A length field is impossible; nothing after it can be understood, so every later call raises
+            DecodeError: A length field is impossible; nothing after it can be decoded, so every later call raises
                 too. The offset counts from the start of the stream.
         """
         self._buffer += data
@@ -81,7 +81,7 @@ def decode_header(frame: bytes) -> Header:
     """Returns the header of a frame.
 
     Raises:
-        DecodeError: The frame is shorter than a header, or not as long as its header says.
+        DecodeError: The frame is shorter than a header, or its length differs from the one in its header.
     """
     if len(frame) < HEADER.size:
         raise DecodeError(f"frame of {len(frame)} bytes, a header alone has {HEADER.size}", len(frame))
@@ -105,7 +105,7 @@ def decode_request(frame: bytes) -> tuple[int, Request]:
     """Returns the command id and the request of a frame.
 
     Raises:
-        DecodeError: Not a frame, not a known command, or not as long as that command is.
+        DecodeError: Not a frame, not a known command, or not of the length of that command.
     """
     header = decode_header(frame)
     try:
@@ -143,7 +143,7 @@ def decode_response(command: CommandCode, frame: bytes) -> tuple[int, Response]:
     """Returns the command id and the content of a response to `command`.
 
     Raises:
-        DecodeError: Not a frame, another command's, of the wrong length, or with a status that does not exist.
+        DecodeError: Not a frame, another command's, of the wrong length, or with an unknown status.
     """
     header = decode_header(frame)
     if header.command != command:

@@ -1,8 +1,8 @@
-"""A packed message as a table of fields, and the code that walks such a table.
+"""A packed message as a table of fields, and its encoder and decoder.
 
-The tables of this package are meant to be read beside the description of the wire: one row a field, its place given
-by the rows above it. Byte order is stated per field, because the RCI mixes them: ids and lengths are big-endian,
-doubles are little-endian, in one datagram.
+The tables of this package follow the description of the wire: one row per field, its offset given by the rows above
+it. Byte order is given per field, because the RCI mixes them: ids and lengths are big-endian, doubles are
+little-endian, in one datagram.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ class Field:
     count: int = 1
     unit: str = ""
     order: ByteOrder = "little"
-    """Byte order; means nothing for single bytes."""
+    """Byte order; without meaning for single bytes."""
 
     @property
     def size(self) -> int:
-        """Bytes the field takes."""
+        """Size of the field, in bytes."""
         return _SIZES[self.type] * self.count
 
 
 class Layout:
-    """The compiled form of a table: where each field stands, and how to pack and unpack a whole message.
+    """The compiled form of a table: the offset of each field, and how to pack and unpack a whole message.
 
     Args:
-        name: What the message is called, for errors.
+        name: Name of the message, for errors.
         fields: Its rows, first to last; packed, no padding.
     """
 
@@ -65,11 +65,11 @@ class Layout:
         """One compiled format for each run of fields of one byte order."""
 
     def offset(self, name: str) -> int:
-        """Returns where the field starts, in bytes from the start of the message."""
+        """Returns the offset of a field, in bytes from the start of the message."""
         return self._offsets[name]
 
     def pack(self, values: Sequence[Scalar | Sequence[Scalar]]) -> bytes:
-        """Returns the message with one value (or one sequence of `count` values) a field."""
+        """Returns the message with one value (or one sequence of `count` values) per field."""
         flat: list[Scalar] = []
         for value in values:
             if isinstance(value, int | float):
@@ -84,7 +84,7 @@ class Layout:
         return b"".join(parts)
 
     def unpack(self, data: bytes, offset: int = 0) -> list[Scalar | tuple[Scalar, ...]]:
-        """Returns one value a field: a number, or a tuple of `count` numbers where count is more than 1.
+        """Returns one value per field: a number, or a tuple of `count` numbers if count is more than 1.
 
         Raises:
             DecodeError: The message does not fill `data` from `offset` to its end exactly.

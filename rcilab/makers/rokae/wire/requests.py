@@ -1,8 +1,8 @@
-"""The 25 commands a client may send over TCP, each a frozen value with its layout table.
+"""The 25 commands of a client over TCP, each a frozen value with its layout table.
 
-Arrays are 7 long on the wire for every arm; a 6-element value is filled up with a zero, and on 6-axis arms whatever
-arrives in the seventh place means nothing. Modes, signals and types are plain integers here, because a client may
-send any byte; the enumerations in `statuses` name the known ones, and it is the controller that checks them.
+Arrays have 7 elements on the wire for every arm; a 6-element value is padded with a zero, and on 6-axis arms the
+seventh element is undefined. Modes, signals and types are plain integers here, because a client may send any byte; the
+enumerations in `statuses` name the known ones, and the controller checks them.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ class Request:
 
 
 REQUESTS: dict[CommandCode, type[Request]] = {}
-"""Which class carries which command."""
+"""The class of each command."""
 
 
 @dataclass(frozen=True)
 class Connect(Request, code=CommandCode.CONNECT, fields=(Field("udp_port", "u16", order="big"),)):
-    """Names the client's UDP port. Declared by the vendor, but its client never sends it."""
+    """Gives the client's UDP port. Declared by the vendor, but its client never sends it."""
 
     udp_port: int
 
@@ -163,7 +163,7 @@ class SetLoad(
 class SetCartImpDesiredTau(
     Request, code=CommandCode.SET_CART_IMP_DESIRED_TAU, fields=(Field("wrench", "f64", 6, "N, N m"),)
 ):
-    """Sets the force and moment that Cartesian impedance shall press with."""
+    """Sets the desired force and moment of Cartesian impedance."""
 
     wrench: Numbers
 
@@ -265,7 +265,7 @@ class StartDrag(
         Field("type", "u8"),
     ),
 ):
-    """Lets a person guide the arm by hand: see `DragSpace` and `DragType`."""
+    """Starts hand guiding: see `DragSpace` and `DragType`."""
 
     space: int
     type: int

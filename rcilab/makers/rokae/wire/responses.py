@@ -1,4 +1,4 @@
-"""What the controller answers, each a frozen value with its layout table."""
+"""The answers of the controller, each a frozen value with its layout table."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class SafetyStopResponse:
 
 @dataclass(frozen=True, slots=True)
 class ModelResponse:
-    """The answer to LoadRobotModel: the figures that the vendor's model library computes with."""
+    """The answer to LoadRobotModel: the figures for the vendor's model library."""
 
     dh: tuple[float, ...]
     """28 numbers: 7 rows of a [mm], alpha [rad], d [mm], theta [rad]."""
@@ -82,7 +82,7 @@ class ModelResponse:
     dynamics: tuple[float, ...]
     """45 base dynamic parameters, without friction."""
     dimensions: tuple[float, ...] = (0.0,) * 21
-    """Of no influence on the vendor's library."""
+    """Ignored by the vendor's library."""
     status: GuideStatus = GuideStatus.SUCCESS
 
 

@@ -1,6 +1,6 @@
 """The state datagram: 1247 bytes from the controller every millisecond.
 
-Encoding joins the memory of the state's arrays, decoding looks at the datagram through one array: no loop over fields
+Encoding joins the memory of the state's arrays, decoding reads the datagram through one array: no loop over fields
 runs per cycle.
 """
 
@@ -56,7 +56,7 @@ STATE_SIZE = STATE.size
 
 
 def _place(name: str) -> int:
-    """Returns which double of the datagram a field starts with."""
+    """Returns the index of the double at which a field starts."""
     return (STATE.offset(name) - _DOUBLES_OFFSET) // 8
 
 
@@ -136,7 +136,7 @@ def encode_state(state: RobotState) -> bytes:
 
 
 def renumber_state(datagram: bytes, message_id: int) -> bytes:
-    """Returns the datagram of a state that is the same but for its number."""
+    """Returns the datagram of a state with another number."""
     return _ID.pack(message_id) + datagram[_DOUBLES_OFFSET:]
 
 
@@ -145,16 +145,16 @@ def decode_state(data: bytes, n: int) -> RobotState:
 
     Args:
         data: The datagram. Bytes after the first 1247 are ignored, as the vendor's client ignores them.
-        n: Number of joints, 6 or 7: how many elements of a 7-element array mean something.
+        n: Number of joints, 6 or 7: the number of defined elements of a 7-element array.
 
     Raises:
-        DecodeError: Too short, or with a mode that does not exist.
+        DecodeError: Too short, or with an unknown mode.
     """
     return build_state(_decode_values(data, n))
 
 
 class StateDecoder:
-    """Decodes one stream of states: one that repeats the last but for its number shares its arrays."""
+    """Decodes a stream of states: a state that repeats the last one, except for its number, shares its arrays."""
 
     def __init__(self) -> None:
         self._n = 0
@@ -162,7 +162,7 @@ class StateDecoder:
         self._values: tuple[Any, ...] = ()
 
     def decode(self, data: bytes, n: int) -> RobotState:
-        """Returns what `decode_state` does, and raises what it raises."""
+        """Returns and raises the same as `decode_state`."""
         body = data[_DOUBLES_OFFSET:STATE_SIZE]
         if n == self._n and body == self._body:
             return build_state((_ID.unpack_from(data)[0], *self._values))

@@ -1,4 +1,4 @@
-"""The numbers the RCI answers and asks with, as enumerations."""
+"""The numbers in requests and answers of the RCI, as enumerations."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rcilab.core.state import MotionGeneratorMode
 
 
 class CommandCode(IntEnum):
-    """Which command a TCP frame carries."""
+    """The command of a TCP frame."""
 
     CONNECT = 0
     SET_MOTOR_POWER = 1
@@ -48,7 +48,7 @@ WHILE_MOVING: Final = frozenset(
         CommandCode.SET_CART_IMP_DESIRED_TAU,
     }
 )
-"""Commands that change nothing under a moving arm: a controller grants them in every phase."""
+"""Commands that do not affect a moving arm: a controller grants them in every phase."""
 
 
 class SettingStatus(IntEnum):
@@ -75,7 +75,7 @@ class StartStatus(IntEnum):
 
 
 class StopStatus(IntEnum):
-    """The answer to StopMove. The vendor's client dies of anything but the first one."""
+    """The answer to StopMove. The vendor's client aborts at any but the first one."""
 
     SUCCESS = 0
     NOT_POSSIBLE = 1
@@ -114,7 +114,7 @@ class SafetyStop(IntEnum):
 
 
 class StartMotionMode(IntEnum):
-    """What the commands of a motion will be, as StartMove numbers it; the state numbers Cartesian 3, not 2."""
+    """The kind of commands of a motion, as StartMove numbers it; the state numbers Cartesian 3, not 2."""
 
     IDLE = 0
     JOINT = 1
@@ -134,14 +134,14 @@ _SHOWN_AS = {
 
 
 class DragSpace(IntEnum):
-    """Where a drag keeps its constraints; the manual counts from 1, the wire from 0."""
+    """Space of a drag's constraints; the manual counts from 1, the wire from 0."""
 
     JOINT = 0
     CARTESIAN = 1
 
 
 class DragType(IntEnum):
-    """What a Cartesian drag leaves free; the manual counts from 1, the wire from 0."""
+    """Free directions of a Cartesian drag; the manual counts from 1, the wire from 0."""
 
     TRANSLATION = 0
     ROTATION = 1

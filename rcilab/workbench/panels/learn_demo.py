@@ -1,4 +1,4 @@
-"""Learn: one provoked fault at its moment: the curve that broke its bound, cause, remedy, the way out, the script."""
+"""Learn: one provoked fault: the curve that violated its bound, cause, remedy, recovery, script."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from rcilab.app.fault_lab.demo_view import body_html, head_html
 from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
-from rcilab.workbench.panels.learn_plot import exhibit_contents
+from rcilab.workbench.panels.learn_plot import demo_contents
 from rcilab.workbench.panels.plot_contents import plot_axes
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _HEIGHT = 150  # [px]
-_AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
+_AROUND = 0.06  # Part of the recorded time that the plot continues after the fault, so that its mark is complete.
 
 
-class LearnExhibitPanel:
-    """What the gallery shows of a fault; not there while nothing is on show."""
+class LearnDemoPanel:
+    """The displayed fault; hidden while there is none."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
@@ -35,7 +35,7 @@ class LearnExhibitPanel:
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
         on_press(self._back, ask, lambda page: PressLearn(page=page, what="close"))
         self._head = Html(gui)
-        data, series, bands = exhibit_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
+        data, series, bands = demo_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
         self._plot = gui.add_uplot(
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
@@ -56,33 +56,31 @@ class LearnExhibitPanel:
         self._script = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
-        """Draws the fault on show."""
+        """Draws the displayed fault."""
         learn, text = state.learn, self._text
-        exhibit = None if learn.show is None or learn.provoking is not None else learn.show.exhibit
-        wanted = (exhibit, learn.is_script_shown, state.theme)
+        demo = None if learn.show is None or learn.provoking is not None else learn.show.demo
+        wanted = (demo, learn.is_script_shown, state.theme)
         if wanted == self._drawn:
             return
         self._drawn = wanted
         for part in (self._back, self._plot, self._moment, self._python):
-            part.visible = exhibit is not None
-        if exhibit is None:
+            part.visible = demo is not None
+        if demo is None:
             for part in (self._head, self._body, self._script):
                 part.show("")
             return
-        self._head.show(head_html(exhibit, text))
-        self._draw(exhibit, state.theme)
-        self._body.show(body_html(exhibit, text))
-        code = f"<pre>{esc(exhibit.script)}</pre>"
+        self._head.show(head_html(demo, text))
+        self._draw(demo, state.theme)
+        self._body.show(body_html(demo, text))
+        code = f"<pre>{esc(demo.script)}</pre>"
         copy = f'<button type="button" data-rl-copy data-done="{esc(text("program.copied"))}">'
         copy += f"{esc(text('program.copy'))}</button>"
         self._script.show(f'<div class="rl-code">{copy}{code}</div>' if learn.is_script_shown else "")
 
-    def _draw(self, exhibit: FaultDemo, theme: Theme) -> None:
-        signal, t = exhibit.signal, np.array(exhibit.cycles["t"])
+    def _draw(self, demo: FaultDemo, theme: Theme) -> None:
+        signal, t = demo.signal, np.array(demo.cycles["t"])
         factor = self._text.units.from_si(signal.condition.unit)[0]
-        data, series, _ = exhibit_contents(
-            t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme
-        )
+        data, series, _ = demo_contents(t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data

@@ -1,4 +1,4 @@
-"""The curve that broke its bound, as SVG: the bound, what lies beyond it, and the sample with the fault."""
+"""The curve that violated its bound, as SVG: the bound, the area beyond it, and the sample with the fault."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.notebook.style import esc
 from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
 
-_WIDTH, _HEIGHT = 420.0, 150.0  # Units; the browser scales them to its place.
+_WIDTH, _HEIGHT = 420.0, 150.0  # Units; the browser scales them.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46.0, 8.0, 6.0, 20.0
-_AROUND = 0.06  # Part of the recorded time that the plot goes on behind the fault, so that its mark is whole.
+_AROUND = 0.06  # Part of the recorded time that the plot continues after the fault, so that its mark is complete.
 _MARGIN = 0.12  # Part of the height above and below.
-_NAME = 60.0  # What the name of the time axis takes at its end.
+_NAME = 60.0  # Width of the time axis' name.
 _CURVE = "#0072B2"
 
 
-def draw_exhibit(exhibit: FaultDemo, title: str, time: str, factor: float = 1.0) -> str:
+def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> str:
     """Returns the picture.
 
     Args:
-        exhibit: What is on show.
-        title: What the curve is.
-        time: What the time axis is called.
-        factor: From SI to the unit that is shown.
+        demo: The demo.
+        title: Name of the curve.
+        time: Name of the time axis.
+        factor: From SI to the displayed unit.
     """
-    t, values = np.array(exhibit.cycles["t"]), factor * exhibit.signal.values
-    lower, upper = seen_lower(values, factor * exhibit.signal.lower), factor * exhibit.signal.upper
+    t, values = np.array(demo.cycles["t"]), factor * demo.signal.values
+    lower, upper = seen_lower(values, factor * demo.signal.lower), factor * demo.signal.upper
     known = np.isfinite(values)
     seen = [float(values[known].min()), float(values[known].max()), upper]
     seen += [lower] if math.isfinite(lower) else []
@@ -44,7 +44,7 @@ def draw_exhibit(exhibit: FaultDemo, title: str, time: str, factor: float = 1.0)
         return _TOP + (bottom - _TOP) * (high - value) / (high - low)
 
     out = [
-        f'<svg class="rl-exhibit-plot" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(title)}" '
+        f'<svg class="rl-demo-plot" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(title)}" '
         'font-size="10.5">'
     ]
     for tick in ticks(low, high, 4):
@@ -61,13 +61,13 @@ def draw_exhibit(exhibit: FaultDemo, title: str, time: str, factor: float = 1.0)
     points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[known].tolist(), values[known].tolist(), strict=True))
     out.append(f'<polyline points="{points}" fill="none" stroke="{_CURVE}" stroke-width="2"/>')
     if known[-1]:
-        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(factor * exhibit.value):.1f}" r="5" fill="{BAD}"/>')
+        out.append(f'<circle cx="{x(float(t[-1])):.1f}" cy="{y(factor * demo.value):.1f}" r="5" fill="{BAD}"/>')
     frame = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{right - _LEFT:g}" height="{bottom - _TOP:g}" fill="none" '
     return "".join(out) + f'{frame}stroke="{LINE}"/></svg>'
 
 
 def _beyond(top: float, bottom: float, edge: float, right: float) -> str:
-    """Returns what lies beyond a bound, tinted, and the bound itself."""
+    """Returns the tinted area beyond a bound, and the bound itself."""
     return (
         f'<rect x="{_LEFT:g}" y="{top:.1f}" width="{right - _LEFT:g}" height="{bottom - top:.1f}" '
         f'fill="{BAD}" opacity=".1"/>'

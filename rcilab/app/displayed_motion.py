@@ -19,7 +19,7 @@ _FEWEST = 8  # [cycles] A shorter run of a cell did not move anything.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Exhibition:
+class DisplayedMotion:
     """What is drawn in place of the plan. It is never one to execute."""
 
     plan: Plan
@@ -32,7 +32,7 @@ class Exhibition:
     """When the fault was reported, on the clock of `plan`, [s]; None without one."""
 
 
-def exhibit_fault(demo: FaultDemo) -> Exhibition:
+def display_fault(demo: FaultDemo) -> DisplayedMotion:
     """Returns a provoked fault as scene, timeline and curves draw it."""
 
     def draw(motion: Motion) -> Plan:
@@ -41,7 +41,7 @@ def exhibit_fault(demo: FaultDemo) -> Exhibition:
         return build_plan_view(demo.model, motion, check(checked, demo.model, distance=None))
 
     commanded = demo.commanded
-    return Exhibition(
+    return DisplayedMotion(
         plan=draw(commanded),
         scene=draw(demo.moved),
         run=Run(plan=commanded, cycles=demo.whole, model=demo.model),
@@ -49,10 +49,10 @@ def exhibit_fault(demo: FaultDemo) -> Exhibition:
     )
 
 
-def exhibit_run(run: Run, model: RobotModel) -> Exhibition | None:
+def display_run(run: Run, model: RobotModel) -> DisplayedMotion | None:
     """Returns a run of `execute` or of a callback as it is drawn; None where there is too little to draw."""
     if len(run.cycles) < _FEWEST:
         return None
     motion = run.plan or run.commanded()
     plan = build_plan_view(model, motion, check(motion, model, distance=None))
-    return Exhibition(plan=plan, scene=plan, run=run)
+    return DisplayedMotion(plan=plan, scene=plan, run=run)
