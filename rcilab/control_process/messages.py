@@ -24,7 +24,7 @@ _MAX_TEXT = 1000  # Characters; longer texts are cut.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class WorkerSettings:
     """The data of the arm that the control process needs when it starts."""
 
     arm: ExpectedArm

@@ -27,10 +27,10 @@ from rcilab.control_process.messages import (
     Request,
     SetOutput,
     SetPower,
-    Settings,
     StartGuiding,
     Stop,
     StopGuiding,
+    WorkerSettings,
 )
 from rcilab.control_process.motion_upload import SharedRows, require_admissible, require_ready
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
@@ -651,9 +651,9 @@ class Supervisor(Closeable):
         return self._block
 
 
-def build_settings(model: RobotModel) -> Settings:
+def build_settings(model: RobotModel) -> WorkerSettings:
     """Returns the data of an arm that the control process needs at its start."""
-    return Settings(
+    return WorkerSettings(
         arm=ExpectedArm.of(model),
         limits=replace(model.limits, sources={}),
         T_flange_tool=model.T_flange_tool,

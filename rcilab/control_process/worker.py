@@ -30,11 +30,11 @@ from rcilab.control_process.messages import (
     Request,
     SetOutput,
     SetPower,
-    Settings,
     StartGuiding,
     Stop,
     StopGuiding,
     SwitchRows,
+    WorkerSettings,
 )
 from rcilab.control_process.motion_service import MotionService, StoppedError
 from rcilab.control_process.requests import RequestChannel
@@ -69,7 +69,7 @@ class ControlProcess:
 
     def __init__(self, block: ControlBlock, parent: int) -> None:
         settings = block.settings
-        assert isinstance(settings, Settings)  # Written by the supervisor.
+        assert isinstance(settings, WorkerSettings)  # Written by the supervisor.
         self._settings = settings
         self._requests = RequestChannel(block)
         self._stop_conditions = StopConditions(block.counters, parent)

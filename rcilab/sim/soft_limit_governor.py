@@ -61,7 +61,7 @@ class SoftLimitGovernor:
         return [joint.step(angle) for joint, angle in zip(self._joints, q, strict=True)]
 
 
-class Stop(NamedTuple):
+class StopProfile(NamedTuple):
     """The fastest stop from a velocity v >= 0: three phases of constant jerk, down to -peak and back to zero."""
 
     times: tuple[float, float, float]
@@ -70,7 +70,7 @@ class Stop(NamedTuple):
     """Distance, [rad]."""
 
 
-def plan_fastest_stop(v: float, a: float, acceleration: float, jerk: float) -> Stop:
+def plan_fastest_stop(v: float, a: float, acceleration: float, jerk: float) -> StopProfile:
     """Returns the fastest stop with limited jerk from a velocity upwards.
 
     A deceleration that is already too large for the velocity (v < a^2 / 2 jerk) is reduced at once; the joint then
@@ -83,7 +83,7 @@ def plan_fastest_stop(v: float, a: float, acceleration: float, jerk: float) -> S
         jerk: Its bound, [rad/s^3].
     """
     if a < 0.0 and v <= a * a / (2.0 * jerk):
-        return Stop((0.0, 0.0, -a / jerk), 0.0)
+        return StopProfile((0.0, 0.0, -a / jerk), 0.0)
     peak = sqrt(jerk * v + 0.5 * a * a)
     hold = 0.0
     if peak > acceleration:
@@ -91,7 +91,7 @@ def plan_fastest_stop(v: float, a: float, acceleration: float, jerk: float) -> S
         hold = (v + (a * a - 2.0 * peak * peak) / (2.0 * jerk)) / peak
     first, last = max(0.0, (a + peak) / jerk), peak / jerk
     times = (first, max(0.0, hold), last)
-    return Stop(times, _along(times, sum(times), v, a, jerk)[0])
+    return StopProfile(times, _along(times, sum(times), v, a, jerk)[0])
 
 
 def _along(times: tuple[float, float, float], t: float, v: float, a: float, jerk: float) -> tuple[float, float]:
@@ -117,7 +117,7 @@ class _Joint:
         self._mode = _Mode.FOLLOWING
         self._x, self._v, self._a = start, 0.0, 0.0
         self._u, self._du = start, 0.0
-        self._plan: tuple[Stop, float, float, float, float] | None = None
+        self._plan: tuple[StopProfile, float, float, float, float] | None = None
         self._elapsed = 0.0
 
     @property

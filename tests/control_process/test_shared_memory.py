@@ -19,7 +19,7 @@ import pytest
 from rcilab.control_process import jitter_histogram as lateness
 from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
-from rcilab.control_process.messages import Reply, Settings, as_sendable
+from rcilab.control_process.messages import Reply, WorkerSettings, as_sendable
 from rcilab.control_process.requests import MessageRing
 from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
@@ -205,7 +205,7 @@ def test_settings_pass_through_the_block():
     block = ControlBlock.create(6, build_settings(model))
     settings = ControlBlock(os.dup(block.descriptor)).settings
     block.close()
-    assert isinstance(settings, Settings)
+    assert isinstance(settings, WorkerSettings)
     assert (settings.arm.n, settings.arm.name) == (6, "xMate3")
     assert settings.T_flange_tool.is_close(model.T_flange_tool, 0.0)
     assert np.array_equal(settings.limits.joint.jerk, model.limits.joint.jerk)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.app.fault_lab.signals import Signal
+from rcilab.app.fault_lab.signals import FaultSignal
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.core.arrays import Array, JointVector, readonly_copy
@@ -47,7 +47,7 @@ class FaultDemo:
     """Recorded cycles from the first command on (`core.cycle_log.cycle_dtype`); the last one shows the fault."""
     after: NDArray[np.void]
     """Recorded cycles after the fault, in which the controller stops the arm; they contain no commands."""
-    signal: Signal
+    signal: FaultSignal
     """The quantity that violated its condition, cycle by cycle."""
     way_out: tuple[Step, ...]
     """The steps of the recovery, in this order; afterwards the arm moved again."""

@@ -29,7 +29,7 @@ _UNREACHABLE = 2.0  # Value of a pose without joint angles in the plot, where 1 
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Signal:
+class FaultSignal:
     """The quantity that a condition bounds, over the recorded cycles."""
 
     condition: Condition
@@ -83,19 +83,19 @@ class Signals:
         self._closed_form = model.solver
         self._period = CYCLE_TIME * state_cycles(rows)
 
-    def find(self, fault: FaultCode) -> Signal | None:
+    def find(self, fault: FaultCode) -> FaultSignal | None:
         """Returns the signal that raised a fault: the one farthest beyond its bound in the last row."""
         rows = condition_table(self._model.description).raising(fault)
         found = [signal for row in rows for signal in self._signals(row) if signal.is_broken]
         return max(found, key=lambda signal: signal.excess, default=None)
 
-    def _signals(self, condition: Condition) -> list[Signal]:
+    def _signals(self, condition: Condition) -> list[FaultSignal]:
         values = self._values(condition)
         if values is None:
             return []
         lower, upper = condition.bounds(self._limits)
         return [
-            Signal(
+            FaultSignal(
                 condition=condition,
                 axis=column + 1 if condition.is_per_joint else 0,
                 values=values[:, column],

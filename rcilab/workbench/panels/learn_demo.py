@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.fault_lab.demo_view import body_html, head_html
+from rcilab.app.fault_lab.demo_view import body_html, head_html, seen_lower
 from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
-from rcilab.workbench.panels.learn_plot import demo_contents
-from rcilab.workbench.panels.plot_contents import plot_axes
+from rcilab.core.arrays import Array
+from rcilab.workbench.panels.plot_contents import joint_color, plot_axes
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:
@@ -90,3 +91,36 @@ class LearnDemoPanel:
             "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
             "y": {"range": (low - margin, high + margin)},
         }
+
+
+_RED = {"light": "#d1392b", "dark": "#ff7b70"}
+
+
+def demo_contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
+    """Returns data, series and bands: bounds, the area beyond them, the curve, the sample with the fault."""
+    red = _RED[theme]
+    seen = np.where(np.isfinite(values), values, np.nan)
+    floor = seen_lower(values, lower)
+    top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
+
+    def level(value: float) -> Any:
+        return np.full(len(t), value)
+
+    mark = np.full(len(t), np.nan)
+    mark[-1] = seen[-1]
+    hidden: Any = {"width": 0, "points": {"show": False}}
+    edge: Any = {"stroke": red, "width": 1.2, "dash": (5, 4), "points": {"show": False}}
+    curve: Any = {"stroke": joint_color(0, theme), "width": 2, "points": {"show": False}}
+    fault: Any = {"stroke": red, "width": 0, "points": {"show": True, "size": 11, "fill": red}}
+    data = (
+        t,
+        level(top if upper >= 0.0 else 0.0),
+        level(upper),
+        level(floor),
+        level(-top if floor < 0 else math.nan),
+        seen,
+        mark,
+    )
+    series = ({}, hidden, edge, edge, hidden, curve, fault)
+    tint = "rgba(209,57,43,0.10)"
+    return data, series, ({"series": (1, 2), "fill": tint}, {"series": (3, 4), "fill": tint})
