@@ -36,7 +36,7 @@ class LearnDemoPanel:
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
         on_press(self._back, ask, lambda page: PressLearn(page=page, what="close"))
         self._head = Html(gui)
-        data, series, bands = demo_contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
+        data, series, bands = _contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
         self._plot = gui.add_uplot(
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
@@ -81,7 +81,7 @@ class LearnDemoPanel:
     def _draw(self, demo: FaultDemo, theme: Theme) -> None:
         signal, t = demo.signal, np.array(demo.cycles["t"])
         factor = self._text.units.from_si(signal.condition.unit)[0]
-        data, series, _ = demo_contents(t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme)
+        data, series, _ = _contents(t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
         margin = 0.12 * (high - low or 1.0)
         self._plot.data = data
@@ -96,7 +96,7 @@ class LearnDemoPanel:
 _RED = {"light": "#d1392b", "dark": "#ff7b70"}
 
 
-def demo_contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
+def _contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
     """Returns data, series and bands: bounds, the area beyond them, the curve, the sample with the fault."""
     red = _RED[theme]
     seen = np.where(np.isfinite(values), values, np.nan)
