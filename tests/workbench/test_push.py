@@ -270,7 +270,7 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
         wait(lambda: status().phase == "idle" and bool(status().powered), "a powered arm")
     ask(SetDrive(mode=mode))
     ask(SetPush(link=TOOL, direction="+z", newtons=40.0))
-    ask(SetSpeed(speed=0.08))
+    ask(SetSpeed(speed=0.05))
     last, q = bench.store.state.last_run, status().q_c
     angle = float(q[0]) + (0.5 if q[0] < 0.1 else -0.5)
     ask(MoveJoint(joint=0, angle=angle))
@@ -298,8 +298,6 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
     wait(given_way, "the arm to give way")
     assert status().code == "moving"
     wait(lambda: bench.store.state.push.acting is None, "the push to end")
-    wait(lambda: abs(height() - still) < 0.001, "the arm to come back")
-    assert status().code == "moving", "it came back while it went on"
     wait(lambda: (r := bench.store.state.last_run) not in (None, last) and r.run is not None, "the arrival")
     assert (status().code, status().faults) == ("idle.arrived", ())
     run = bench.store.state.last_run.run
@@ -309,5 +307,8 @@ def test_an_arm_that_is_pushed_in_a_soft_motion_gives_way_comes_back_arrives_and
         MODEL.forward(q).position[2] - MODEL.forward(q_c).position[2]
         for q, q_c in zip(run.cycles["q"][::20], run.cycles["q_c"][::20], strict=True)
     ]
-    assert max(away) > still + 0.002, "the recording shows the push"
+    pushed = int(np.argmax(away))
+    assert away[pushed] > still + 0.002, "the recording shows the push"
+    back = [pushed + row for row, gap in enumerate(away[pushed:]) if abs(gap - still) < 0.001]
+    assert 20 * back[0] < len(run.plan), "it came back while it went on"
     ask(SetDrive(mode="joint_position"))
