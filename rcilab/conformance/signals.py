@@ -28,8 +28,6 @@ HOLD_SAMPLES = 3
 _SMOOTH_RATE = 0.03
 """Part of the torque rate limits, as inertia times jerk, below which torques change smoothly, at speeds within the
 limits. The jerk alone is no measure: with a load of 5 kg, 1 % of its limit takes up to a quarter of the torque rate."""
-_INERTIA_STEP = 1024
-"""[cycles] Spacing of the rows whose inertia is computed; the greatest of them counts for the whole motion."""
 _SMOOTH_STEP = 16
 """[cycles] Spacing of computed torques where they change smoothly; between them they are interpolated linearly,
 accurate to 2 % of the bounds (tests/conformance/test_signals.py)."""
@@ -149,7 +147,8 @@ class MotionSignals:
         """Torques without gravity and their backward differences over one cycle, each of shape (N + 3, n)."""
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
-        inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(row)) for row in q[::_INERTIA_STEP]], axis=0)
+        places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.
+        inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(place)) for place in places], axis=0)
         change = (inertia @ np.abs(jerk.T)).T  # In the memory layout of the others.
         is_rough = (change > smooth * joint.torque_rate) | (np.abs(dq) > joint.velocity)
         chosen = _rows_to_compute(np.asarray(is_rough.any(axis=1), dtype=np.bool_))
