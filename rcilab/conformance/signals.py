@@ -149,9 +149,9 @@ class MotionSignals:
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
         places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.
         inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(place)) for place in places], axis=0)
-        change = (inertia @ np.abs(jerk.T)).T  # In the memory layout of the others.
-        is_rough = (change > smooth * joint.torque_rate) | (np.abs(dq) > joint.velocity)
-        chosen = _rows_to_compute(np.asarray(is_rough.any(axis=1), dtype=np.bool_))
+        weights = (inertia / joint.torque_rate[:, None]).max(axis=0)  # Of a joint's jerk, in the rate of any joint.
+        change = np.einsum("j,jn->n", weights, np.abs(jerk.T))  # Not by BLAS, whose threads take longer to start.
+        chosen = _rows_to_compute((change > smooth) | (np.abs(dq) > joint.velocity).any(axis=1))
         tau, rate = self._torques_at(chosen)
         is_near = (np.abs(tau) > _INTERPOLATED_PART * joint.torque) | (
             np.abs(rate) > _INTERPOLATED_PART * joint.torque_rate
