@@ -109,7 +109,7 @@ def make_plan(
     kind: PathKind = "joint",
     via: Pose | None = None,
 ) -> Plan | Message:
-    """Returns a motion from start to goal, checked except for collisions, or why there is none."""
+    """Returns a motion from start to goal, checked except for collisions, or why planning failed."""
     for place, q in (("start", start), ("goal", goal)):
         joint = find_outside(model, q)
         if joint is not None:

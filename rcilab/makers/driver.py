@@ -254,7 +254,7 @@ class StreamingDriver(Driver, Protocol):
         ...
 
     def find_safety_stop(self, state: RobotState) -> SafetyStopReason | None:
-        """Returns the safety stop that a state shows; None: there is none."""
+        """Returns the safety stop that a state shows, or None."""
         ...
 
     def is_lack_of_commands(self, faults: tuple[Any, ...]) -> bool:

@@ -228,7 +228,7 @@ class LabState:
             self.notify("plan")
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan, or why there is none."""
+        """Shows a plan, or why planning failed."""
         with self.lock:
             self.goals.show(made)
             self.moment, self.displayed = None, None
@@ -343,7 +343,7 @@ def state_of(subject: object) -> LabState:
         subject: A model, a session (all its parts share a state), another part, or a state.
 
     Raises:
-        InvalidValueError: It is none of these.
+        InvalidValueError: It has another type.
     """
     if isinstance(subject, LabState):
         return subject
@@ -357,6 +357,6 @@ def state_of(subject: object) -> LabState:
 
 
 def _is_session(subject: object) -> TypeGuard[RobotSession]:
-    """Returns whether it is a session, without loading the module of sessions: if it is not loaded, there is none."""
+    """Returns whether it is a session, without loading the module of sessions: before that, no session exists."""
     module = sys.modules.get("rcilab.execution.session")
     return module is not None and isinstance(subject, module.RobotSession)

@@ -42,9 +42,9 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.wait(lambda: page.status.code == "moving" and (page.status.motion_time or 0.0) > 0.1, "the arm on its way")
     page.button("Pause").click()
     page.wait(lambda: page.status.code == "moving.held", "the pause")
-    page.wait(lambda: "Held at" in page.tab.get_by_role("status").first.inner_text(), "the page to say so")
+    page.wait(lambda: "Paused at" in page.tab.get_by_role("status").first.inner_text(), "the page to say so")
     assert page.status.code == "moving.held", page.status
-    page.button("Go on").dispatch_event("click")
+    page.button("Resume").dispatch_event("click")
     page.wait(lambda: page.status.code == "moving", "the way on")
     place = page.status.motion_plan_time
     page.wait(lambda: page.status.motion_plan_time > place + 0.1, "the arm on its way again")

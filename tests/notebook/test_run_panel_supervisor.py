@@ -126,7 +126,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         speed_override.pause.click()
         wait_for(lambda: speed_override.resume.layout.display is None, what="the arm held")
         wait_for(
-            lambda: re.search(r"Held at \d+\.\d s of the plan", speed_override._way.value),
+            lambda: re.search(r"Paused at \d+\.\d s of the plan", speed_override._way.value),
             what="where it is held, in words",
         )
         speed_override.field.box.value = "50"

@@ -113,7 +113,7 @@ def nearest_free(
 
 
 def in_branch(model: RobotModel, target: Pose, psi: float, q: Array, branch: int) -> JointVector | None:
-    """Returns the joint angles of one branch, nearest to others; None where there are none.
+    """Returns the joint angles of one branch, nearest to others; None without a solution.
 
     Args:
         model: A 7-axis arm.

@@ -375,7 +375,7 @@ class GoalActions:
         self.show(make_recovery(state.model, readonly_copy(status.q_c), state.box))
 
     def show(self, made: Plan | Message) -> None:
-        """Shows a plan from its start, or why there is none."""
+        """Shows a plan from its start, or why planning failed."""
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
         else:

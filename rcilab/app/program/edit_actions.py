@@ -114,7 +114,7 @@ class EditActions:
             self._history.rename(name)
 
     def _configuration(self, source: str) -> JointVector | None:
-        """Returns the joint angles of the arm or of the goal; reports why there are none."""
+        """Returns the joint angles of the arm or of the goal; reports why they are unknown."""
         state, here = self._store.state, self._session.status().q_c
         if source == "target":
             if state.goal.reach.short is not None:

@@ -132,7 +132,7 @@ class ProgramState:
     """The program that was planned last."""
     tone: Tone = "good"
     answer: Message | None = None
-    """The result next to the plan: the approach to the start, or why there is none."""
+    """The result next to the plan: the approach to the start, or why it failed."""
     notes: tuple[Note, ...] = ()
     """The planner's remarks about the plan."""
     failed: int | None = None

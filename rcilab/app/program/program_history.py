@@ -103,7 +103,7 @@ class ProgramHistory:
             self._exchange(self._current.future.pop(), self.state.selected)
 
     def answer(self, name: str, problem: Message | None) -> bool:
-        """Shows or clears the problem of a typed value; returns whether there is none."""
+        """Shows or clears the problem of a typed value; returns whether the value is valid."""
         if problem is None:
             self._store.clear_problems(name)
             return True

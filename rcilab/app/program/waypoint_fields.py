@@ -93,7 +93,7 @@ def as_pose(waypoint: Waypoint, arm: RobotModel) -> Waypoint:
 
 
 def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
-    """Returns the arm angle of a waypoint, [rad]; None if there is none, or if it is left open."""
+    """Returns the arm angle of a waypoint, [rad]; None if it has no arm angle, or leaves it open."""
     if waypoint.q is None or not arm.redundancy:
         return waypoint.psi
     try:

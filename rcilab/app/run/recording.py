@@ -36,7 +36,7 @@ class Recording:
     tracking: Tracking | None = None
     """The tracking error, once the arm stands still."""
     file: str = ""
-    """Its file; "" if there is none."""
+    """Its file; "" without one."""
     is_left_alone: bool = False
     """Whether it was stopped because no page answered."""
     finding: str = ""

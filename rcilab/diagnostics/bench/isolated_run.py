@@ -17,7 +17,7 @@ _TIMEOUT = 240.0  # [s] Several times the slowest row on a busy machine, without
 
 
 def measure_isolated(name: str, seconds: float) -> Measurement | Absent:
-    """Returns the measurement of a row, or why there is none.
+    """Returns the measurement of a row, or why it failed.
 
     Args:
         name: One of `rows.ROWS`.

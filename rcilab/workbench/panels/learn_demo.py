@@ -24,7 +24,7 @@ _AROUND = 0.06  # Part of the recorded time that the plot continues after the fa
 
 
 class LearnDemoPanel:
-    """The displayed fault; hidden while there is none."""
+    """The displayed fault; hidden without one."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask

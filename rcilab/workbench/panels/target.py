@@ -65,7 +65,7 @@ def quaternion_text(wxyz: np.ndarray) -> str:
 
 
 def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns one line about the plan: its duration and verdict, or why there is none.
+    """Returns one line about the plan: its duration and verdict, or why planning failed.
 
     Without a connection a plan gets no verdict: the next arm may be at another position.
     """
