@@ -30,7 +30,7 @@ def test_plan_check_execute_and_the_arm_arrives(page):
         "a recording",
     )
     assert not page.button("Execute").is_enabled(), "a certificate that was used up must not be pressable again"
-    page.wait(lambda: "where this plan ends" in page.tab.locator(".rl-why").inner_text(), "the reason")
+    page.wait(lambda: "at the end of this plan" in page.tab.locator(".rl-why").inner_text(), "the reason")
     start = page.state.plan.motion.start
     page.button("Back to the start").click()
     page.wait(lambda: np.abs(page.state.plan.motion.goal - start).max() < 1e-9, "a plan back to the start")
