@@ -16,7 +16,7 @@ from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
-from rcilab.core.state import ControllerMode
+from rcilab.core.state import COMPLIANT_MODES, ControllerMode
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.conditions import RCI_MEASURED_CONDITIONS
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 _CLOSE = math.radians(1.0)  # A joint farther inside has not come near the known limits.
 _LEAST = 1e-3  # [N m] Against a division by a threshold of zero.
 _CARTESIAN = (ControllerMode.CARTESIAN_POSITION, ControllerMode.CARTESIAN_IMPEDANCE)
-YIELDING_MODES = (ControllerMode.JOINT_IMPEDANCE, ControllerMode.CARTESIAN_IMPEDANCE, ControllerMode.TORQUE)
-"""Modes in which forces move the arm, too."""
+YIELDING_MODES = tuple(ControllerMode[mode.upper()] for mode in COMPLIANT_MODES)
+"""`COMPLIANT_MODES` as the state reports them."""
 
 
 class _Measured(NamedTuple):
