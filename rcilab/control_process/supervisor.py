@@ -277,7 +277,7 @@ class Supervisor(Closeable):
             motion: The motion.
             certificate: From `check(motion, model, mode=mode).certificate`.
             mode: Command mode: the same motion as joint angles, as poses of the tool, or as torques; see
-                `rcilab.execution.motion_stream`.
+                `rcilab.execution.motion_executor`.
             speed_override: Initial speed override, 0.1 to 1; `set_speed_override` changes it.
             stops: Value of `stops` when the operator requested this; None: its value now.
 

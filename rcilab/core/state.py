@@ -115,7 +115,7 @@ class RobotState:
     faults: tuple[FaultCode, ...]
     """The error bits that are set, in wire order."""
     success_rate: float
-    """Share of the last commands that arrived in time, 0 to 1."""
+    """Share of the last commands that arrived in time, 0 to 1; 1 until the first command of a motion arrives."""
     motion_generator_mode: MotionGeneratorMode
     controller_mode: ControllerMode
     robot_mode: RobotMode

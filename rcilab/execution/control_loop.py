@@ -114,6 +114,9 @@ class ControlLoop:
         self._t = math.nan
         self._calls = CallTimes()
         self._command: Command | None = None
+        self._first_command: Command | None = None
+        self._has_moved = False  # A command differs from the first one, or is a torque.
+        self._is_executed = False  # The controller's commanded values have changed since the start.
         self._pending: deque[RobotState] = deque()
         self._stop_planner = _build_stop_planner(self._kind, limits, model)
 
@@ -225,15 +228,26 @@ class ControlLoop:
                 "within the limits, farther on; make the commands stationary before finished=True",
             )
         state = self._hold(last)
-        if distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE or self._is_unexecuted(state, last):
+        if self._is_unexecuted or distance_to(state, last, has_psi=self._has_psi) > ARRIVAL_TOLERANCE:
             raise self._not_arrived_error(state, last)
         return None
 
-    def _is_unexecuted(self, state: RobotState, command: Command) -> bool:
-        """Returns whether torques were sent but the controller still commands the torques from before the motion."""
-        if not isinstance(command, JointTorque) or np.abs(command.tau).max() < _MIN_TORQUE:
-            return False
-        return np.array_equal(state.tau_c, self._first_tau_c)
+    @property
+    def _is_unexecuted(self) -> bool:
+        """Whether the commands moved, but the controller still commands what it did before the motion."""
+        return self._has_moved and not self._is_executed
+
+    def _follow(self, state: RobotState, command: Command) -> None:
+        """Updates what `_is_unexecuted` compares; a motion that ends at its start arrives even if nothing moved."""
+        if self._first_command is None:
+            self._first_command = command
+        if not self._has_moved:
+            self._has_moved = _is_different(command, self._first_command)
+        if not self._is_executed:
+            now, first = (
+                (state.tau_c, self._first_tau_c) if isinstance(command, JointTorque) else (state.q_c, self._first_q_c)
+            )
+            self._is_executed = not np.array_equal(now, first)
 
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.
@@ -268,6 +282,7 @@ class ControlLoop:
         self._answered_id = state.message_id
         self._command = command
         self._t = self._time(state)
+        self._follow(state, command)
         self._stop_planner.remember(command, state.message_id - self._first_id, state)
         self._log.write(state, self._driver.received_ns, self._t, sent_ns, command)
 
@@ -284,7 +299,7 @@ class ControlLoop:
             state = self._next()
             self._answer(state, command)
             off, cycle = distance_to(state, command, has_psi=self._has_psi), cycle + 1
-            if off == 0.0:
+            if off == 0.0 and not self._is_unexecuted:
                 return state
             if cycle % SETTLE_CYCLES == 0:
                 if (
@@ -424,7 +439,7 @@ class ControlLoop:
         return error if pressed is None else error.coded("safety_stop", status=pressed.code)
 
     def _not_arrived_error(self, state: RobotState, command: Command) -> ControlError:
-        if isinstance(command, JointTorque) or np.array_equal(state.q_c, self._first_q_c):
+        if self._is_unexecuted:
             cause = "the controller has executed none of the commands: they are lost, check the network"
         elif state.success_rate < 1.0:
             cause = (
@@ -433,11 +448,11 @@ class ControlLoop:
         else:
             cause = "the controller holds it back: check its filters and soft limits"
         record = self._log.recorder.last(RECORD_CYCLES)
-        off = (
-            ""
-            if isinstance(command, JointTorque)
-            else f": {describe_distance(state, command, has_psi=self._has_psi)} away"
-        )
+        if isinstance(command, JointTorque):
+            return ControlError(f"the motion did not reach its end: {cause}", (), record)
+        if distance_to(state, command, has_psi=self._has_psi) == 0.0:
+            return ControlError(f"the motion was not executed: {cause}", (), record)
+        off = f": {describe_distance(state, command, has_psi=self._has_psi)} away"
         return ControlError(f"the motion was executed and did not reach its end{off}; {cause}", (), record)
 
     def _has_power(self) -> bool:
@@ -470,6 +485,19 @@ class ControlLoop:
             f"{self._driver.name}: no state for {self._state_timeout:g} s, {when}; check that the controller runs "
             "and the cable is connected, then connect again. The controller stops an arm without commands"
         )
+
+
+def _is_different(command: Command, first: Command) -> bool:
+    """Returns whether a command differs from the first one by more than `ARRIVAL_TOLERANCE`, or is a torque."""
+    if isinstance(command, JointTorque):
+        return float(np.abs(command.tau).max()) >= _MIN_TORQUE
+    if isinstance(command, CartesianPosition) and isinstance(first, CartesianPosition):
+        if float(np.abs(command.T_base_tool - first.T_base_tool).max()) > ARRIVAL_TOLERANCE:
+            return True
+        return command.psi is not None and first.psi is not None and abs(command.psi - first.psi) > ARRIVAL_TOLERANCE
+    assert isinstance(command, JointPosition)
+    assert isinstance(first, JointPosition)
+    return float(np.abs(command.q - first.q).max()) > ARRIVAL_TOLERANCE
 
 
 def _is_standstill(before: RobotState, after: RobotState) -> bool:

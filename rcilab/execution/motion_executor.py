@@ -1,18 +1,38 @@
-"""Execution of motions and callbacks over a driver, with the conditions that stop them."""
+"""Execution of motions and callbacks over a driver, with the conditions that stop them.
+
+A planned motion is a stream of rows that can be replaced while it runs: for speed override, pause, or a stop on its
+path. A row becomes a command of one of the five modes. Joint position and joint impedance take the angles themselves,
+Cartesian position and Cartesian impedance the pose of the tool and, on a 7-axis arm, the arm angle. Torque mode takes
+the torques of a computed-torque controller around the plan, with gravity and friction left to the robot as the manual
+has it (4.3):
+
+    tau = M (ddq_d + 2 D w (dq_d - dq) + w^2 (q_d - q)) + C dq
+
+w = `TORQUE_FREQUENCY` and D = `TORQUE_DAMPING` are the same for every joint and deliberately small. This loop closes
+over the network: with the jitter buffer of the virtual controller a torque acts about 45 ms after the state that it
+answers, and a bandwidth much above 10 rad/s cannot be damped with that delay. The arm is compliant.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias
 
-from rcilab.core.arrays import JointVector
+import numpy as np
+
+from rcilab.core.arrays import Array, JointPath, JointVector
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
-from rcilab.core.state import ControllerMode, Mode
+from rcilab.core.state import ControllerMode, Mode, RobotState
 from rcilab.execution.control_loop import STATE_TIMEOUT, Callback, ControlLoop, StopCheck
 from rcilab.execution.filters import CommandFilter, RateLimiter
-from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.recorder import CycleLog
 from rcilab.makers.driver import StreamingDriver
+from rcilab.motion import plan_stop
 
 if TYPE_CHECKING:
     from rcilab.core.safety_box import SafetyBox
@@ -21,6 +41,13 @@ if TYPE_CHECKING:
 LONGEST_PAUSE = 120_000  # Cycles for which a motion can be held: every one of them is recorded.
 HELD_TOO_LONG = "held for more than 120 s"
 """Reason for the end of a motion that is held for `LONGEST_PAUSE`."""
+TORQUE_FREQUENCY = 6.0  # [rad/s] Below the 10 rad/s that the delay allows, see above.
+TORQUE_DAMPING = 0.9  # Of critical: the delay takes some phase, so almost critical.
+TORQUE_SHARE = 0.95  # Largest part of the torque limits that is commanded, so that rounding stays inside them.
+SETTLING = 300  # Cycles that torque mode stays at the end: two time constants of the compliant arm.
+
+Commander: TypeAlias = Callable[[JointPath, int, RobotState], Command]
+"""`(rows, k, state) -> command`: what to send for row k of rows, shape (N, n), [rad]."""
 
 
 class MotionExecutor:
@@ -120,3 +147,130 @@ class MotionExecutor:
                 stream.stop()
                 self._log.braking = True
         return None if self._reason else reason
+
+
+class MotionStream:
+    """The callback of a prepared motion: row k in controller cycle k. Owned by the control loop's thread.
+
+    Args:
+        rows: Joint angles, shape (N, n), [rad].
+        mode: Command mode.
+        model: The arm, with its tool and load.
+        on_cycle: Called with the number of every cycle.
+    """
+
+    def __init__(
+        self, rows: JointPath, mode: Mode, model: RobotModel, on_cycle: Callable[[int], None] | None = None
+    ) -> None:
+        self._rows = rows
+        self._first = 0  # Cycle of row 0.
+        self._holds = False
+        self._next: tuple[int, JointPath, bool] | None = None
+        self._model = model
+        self._command = build_commander(mode, model)
+        self._settling = SETTLING if mode == "torque" else 0
+        self._on_cycle = on_cycle
+        self.cycle = 0
+        """Cycle of the newest command."""
+        self.held = 0
+        """Number of cycles for which the arm has been held; 0: it moves."""
+
+    def __call__(self, state: RobotState, t: float) -> Command:
+        """Returns the command that answers a state."""
+        cycle = self.cycle = round(t / CYCLE_TIME)
+        if self._next is not None and cycle >= self._next[0]:
+            self._first, self._rows, self._holds = self._next
+            self._next = None
+        if self._on_cycle is not None:
+            self._on_cycle(cycle)
+        rows, last = self._rows, len(self._rows) - 1
+        row = cycle - self._first
+        # With further rows to follow, the arm is held at the last one.
+        self.held = row - last if row > last and (self._holds or self._next is not None) else 0
+        is_over = not self._holds and self._next is None and row >= last + self._settling
+        command = self._command(rows, min(row, last), state)
+        return replace(command, finished=True) if is_over else command
+
+    def switch(self, first: int, rows: JointPath, *, holds: bool) -> bool:
+        """Replaces the following rows; returns False, without effect, if they do not continue the stream.
+
+        Args:
+            first: Cycle of their first row, in the future; they must continue the present rows.
+            rows: Shape (N, n), [rad].
+            holds: Whether the arm is held in the last row, before the goal.
+        """
+        if first <= self.cycle + 1 or not self._continues_stream(first, rows):
+            return False
+        self._next = (first, rows, holds)
+        return True
+
+    def _continues_stream(self, first: int, rows: JointPath) -> bool:
+        """Returns whether rows continue the stream without a jump: the caller may have planned from outdated rows."""
+        start, before, _ = self._next if self._next is not None else (math.inf, self._rows, False)
+        if first <= start:
+            start, before = self._first, self._rows
+        step = rows[0] - before[min(first - 1 - int(start), len(before) - 1)]
+        return bool((np.abs(step) <= CYCLE_TIME * self._model.limits.joint.velocity).all())
+
+    def stop(self) -> None:
+        """Stops from here, every joint as fast as its limits allow, and ends there.
+
+        For torque mode, which has no commanded position: the reference stops, and the torques make the arm follow it.
+        """
+        rows, k = self._rows, min(self.cycle - self._first, len(self._rows) - 1)
+        before, earlier = rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+        dq, ddq = (rows[k] - before) / CYCLE_TIME, (rows[k] - 2.0 * before + earlier) / CYCLE_TIME**2
+        stop = plan_stop(self._model.limits.joint, rows[k], dq, ddq).q
+        self._rows, self._first, self._holds, self._next = stop, self.cycle, False, None
+
+
+def build_commander(mode: Mode, model: RobotModel) -> Commander:
+    """Returns the function that turns rows into commands of a mode.
+
+    Args:
+        mode: Command mode.
+        model: The arm, with the tool and load of the controller.
+    """
+    if mode == "torque":
+        return _torques(model)
+    return _poses(model) if mode.startswith("cartesian") else _angles
+
+
+def _angles(rows: JointPath, k: int, state: RobotState) -> Command:
+    return JointPosition(rows[k])
+
+
+def _poses(model: RobotModel) -> Commander:
+    has_psi = bool(model.redundancy)
+
+    def command(rows: JointPath, k: int, state: RobotState) -> Command:
+        q = rows[k]
+        try:
+            psi = model.arm_angle(q) if has_psi else None
+        except KinematicsError:  # At a singularity; the controller holds its own.
+            psi = None
+        return CartesianPosition(model.forward(q).matrix, psi)
+
+    return command
+
+
+def _torques(model: RobotModel) -> Commander:
+    stiffness, damping = TORQUE_FREQUENCY**2, 2.0 * TORQUE_DAMPING * TORQUE_FREQUENCY
+    largest = TORQUE_SHARE * model.limits.joint.torque
+    motion_torque = model.rigid_body.motion_torque
+
+    def command(rows: JointPath, k: int, state: RobotState) -> Command:
+        q, dq, ddq = _reference(rows, k)
+        ddq = ddq + damping * (dq - state.dq) + stiffness * (q - state.q)
+        return JointTorque(np.clip(motion_torque(state.q, state.dq, ddq), -largest, largest))
+
+    return command
+
+
+def _reference(rows: JointPath, k: int) -> tuple[Array, Array, Array]:
+    """Returns position, velocity and acceleration of row k by backward differences, with standstill before row 0.
+
+    The first torque is then zero, as the torque rate requires.
+    """
+    now, before, earlier = rows[k], rows[max(k - 1, 0)], rows[max(k - 2, 0)]
+    return now, (now - before) / CYCLE_TIME, (now - 2.0 * before + earlier) / CYCLE_TIME**2

@@ -22,6 +22,7 @@ from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
+from rcilab.execution.motion_executor import MotionStream
 from rcilab.execution.motion_runner import (
     MotionProgress,
     MotionRunner,
@@ -30,7 +31,6 @@ from rcilab.execution.motion_runner import (
     follow_poses,
     report_progress,
 )
-from rcilab.execution.motion_stream import MotionStream
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.speed_override import SpeedOverride, StreamRows
@@ -319,9 +319,11 @@ class RobotSession(Closeable):
         self._driver.power(False, alongside=True)
 
     def is_powered(self) -> bool:
-        """Returns whether the motors are on."""
-        with self._lock.acquire("is_powered"):
-            return self._driver.is_powered()
+        """Returns whether the motors are on; also during a motion, from any thread and from a callback."""
+        with self._lock.acquire_unless_moving() as is_acquired:
+            if is_acquired:
+                return self._driver.is_powered()
+        return self._driver.is_powered(alongside=True)
 
     def set_tool(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame; `model` includes it from then on."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 from rcilab.conformance.speed_scaling_check import plan_speed_override
 from rcilab.core.errors import UsageError
 from rcilab.core.state import Mode
-from rcilab.execution.motion_stream import MotionStream
+from rcilab.execution.motion_executor import MotionStream
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
 if TYPE_CHECKING:

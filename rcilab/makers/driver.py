@@ -189,8 +189,8 @@ class Driver(Protocol):
         """Switches motor power; `alongside`: from another thread than the motion's."""
         ...
 
-    def is_powered(self) -> bool:
-        """Returns whether motor power is on."""
+    def is_powered(self, *, alongside: bool = False) -> bool:
+        """Returns whether motor power is on; `alongside`: from another thread than the motion's, or its callback."""
         ...
 
     def recover(self) -> None:

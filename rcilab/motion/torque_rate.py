@@ -62,7 +62,8 @@ def _worst_ratio(model: RobotModel, curve: PiecewisePolynomial) -> float:
     if not len(before):
         return 0.0
     after = np.minimum(before + CYCLE_TIME, curve.duration)
-    change = _torques(model, curve, after) - _torques(model, curve, before)
+    torque = _torques(model, curve, np.concatenate([before, after]))
+    change = torque[len(before) :] - torque[: len(before)]
     return float((np.abs(change).max(axis=0) / (CYCLE_TIME * model.limits.joint.torque_rate)).max())
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 _LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Range of window heights for the layout of plots.
+_SWITCH_INTERVAL = 1e-3  # [s] The event loop sends a new pose while the dispatcher plans: Python's 5 ms would show.
 _BEAT = 0.4  # [s] The control process stops a motion after 2 s without an operator.
 
 
@@ -117,6 +119,7 @@ class Workbench:
 
     def start(self) -> None:
         """Serves the page, then connects to the robot in the background."""
+        sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL))
         ask = self.dispatcher.ask
         self.live = live.LiveChannel(
             self.session.stop, self._receive, lambda: self._guarded_server.guard.count_malformed()
@@ -126,7 +129,7 @@ class Workbench:
             self._bound,
             gate,
             decorate=self._decorate,
-            routes={live.LIVE_PATH: self.live.serve},
+            routes={live.LIVE_PATH: self.live.serve, live.HEARTBEAT_PATH: self.live.serve_heartbeats},
             may_act=lambda page: self.store.state.control_lock.allows(page),
             refuse=lambda page: ask(Refuse(page=page)),
         )

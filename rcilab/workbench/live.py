@@ -17,6 +17,8 @@ from websockets.asyncio.server import broadcast
 from websockets.exceptions import ConnectionClosed
 
 LIVE_PATH = "/rcilab/live"
+HEARTBEAT_PATH = "/rcilab/heartbeat"
+"""Path for the heartbeat thread of a page: its connection gets heartbeats only."""
 
 _LARGEST_MESSAGE = 4096  # [bytes] The longest message of a page has some hundreds.
 
@@ -148,6 +150,7 @@ class LiveChannel:
     ) -> None:
         self._on_stop, self._on_message, self._on_malformed = on_stop, on_message, on_malformed
         self._pages: dict[Any, int | None] = {}  # Connection -> client id. Owned by the event loop.
+        self._heartbeats: dict[Any, int | None] = {}  # The same for connections of heartbeat threads.
         self._keys: dict[int, str] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
         self._latest: dict[str, Any] = {"server": secrets.token_hex(8)}
@@ -163,16 +166,24 @@ class LiveChannel:
 
     async def serve(self, connection: Any) -> None:
         """Serves one page until it disconnects; runs on the server's event loop."""
+        await self._serve(connection, self._pages, json.dumps(self._latest))
+
+    async def serve_heartbeats(self, connection: Any) -> None:
+        """Serves the heartbeat thread of a page until it disconnects; runs on the server's event loop."""
+        await self._serve(connection, self._heartbeats)
+
+    async def _serve(self, connection: Any, clients: dict[Any, int | None], *first: str) -> None:
         self._loop = asyncio.get_running_loop()
-        self._pages[connection] = None
+        clients[connection] = None  # Before anything is sent: a change that is published meanwhile follows.
         try:
-            await connection.send(json.dumps(self._latest))
+            for text in first:
+                await connection.send(text)
             async for raw in connection:
-                self._pages[connection] = self.receive(raw, self._pages[connection])
+                clients[connection] = self.receive(raw, clients[connection])
         except ConnectionClosed:
             pass
         finally:
-            self._pages.pop(connection, None)
+            clients.pop(connection, None)
 
     def receive(self, raw: str | bytes, page: int | None = None) -> int | None:
         """Handles one message.
@@ -207,15 +218,15 @@ class LiveChannel:
         changed = {name: value for name, value in values.items() if self._latest.get(name) != value}
         if changed:
             self._latest = {**self._latest, **changed}
-            self._send(json.dumps(changed))
+            self._send(json.dumps(changed), self._pages)
 
     def beat(self) -> None:
         """Sends a heartbeat to every page. A page answers even while its timers are throttled in the background."""
-        self._send('{"beat": 1}')
+        self._send('{"beat": 1}', self._pages, self._heartbeats)
 
-    def _send(self, text: str) -> None:
+    def _send(self, text: str, *clients: dict[Any, int | None]) -> None:
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(lambda: broadcast(self._pages, text))
+            self._loop.call_soon_threadsafe(lambda: broadcast([c for group in clients for c in group], text))
 
 
 def _decode(raw: str | bytes) -> PageMessage | None:

@@ -28,8 +28,8 @@ from rcilab.i18n.translator import Remark, message
 from rcilab.i18n.units import Units
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.driver.address import RciAddress
+from rcilab.makers.rokae.driver.connection import SocketTransport
 from rcilab.makers.rokae.driver.identify import dh_lengths, require_same_arm
-from rcilab.makers.rokae.driver.transport import SocketTransport
 from rcilab.makers.rokae.wire import RecoveryStatus, StartStatus
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model

@@ -19,8 +19,11 @@ def main(address: str, *goal: str) -> None:
     supervisor.start()
     supervisor.power_on().wait(10.0)
     motion = plan_joint(model, supervisor.status().q_c, np.array([float(angle) for angle in goal]), speed=0.1)
-    supervisor.execute(motion, check(motion, model).certificate)
+    request = supervisor.execute(motion, check(motion, model).certificate)
     while not (supervisor.status().motion_time or 0.0) > 0.3:
+        if request.done:
+            request.wait(0.0)  # Raises why the motion did not begin.
+            raise AssertionError("the motion ended too early")
         time.sleep(0.01)
     print(supervisor.status().worker_pid, flush=True)
     time.sleep(60.0)

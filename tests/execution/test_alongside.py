@@ -26,13 +26,14 @@ def robot():
     "ask",
     [
         lambda robot: robot.state,
+        lambda robot: robot.is_powered(),
         lambda robot: robot.rci.safety_stop(),
         lambda robot: robot.rci.motor_state(),
         lambda robot: robot.rci.get_di(0),
         lambda robot: robot.rci.set_do(0, True),
         lambda robot: robot.rci.set_cart_imp_desired_tau(np.zeros(6)),
     ],
-    ids=["state", "safety_stop", "motor_state", "get_di", "set_do", "set_cart_imp_desired_tau"],
+    ids=["state", "is_powered", "safety_stop", "motor_state", "get_di", "set_do", "set_cart_imp_desired_tau"],
 )
 def test_a_thread_that_watches_is_answered_whenever_a_motion_begins(robot, ask):
     over, answers, errors = threading.Event(), [], []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rcilab.control_process.simulate import simulate
-from rcilab.core.command import CartesianPosition, JointPosition
+from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import ControlError, InvalidValueError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -120,3 +120,37 @@ def test_limits_that_another_session_has_narrowed_are_guessed_from_the_fault():
         robot._arm.model = MODEL  # As a session that does not know of it.
         with pytest.raises(ControlError, match="the controller has narrower ones"):
             robot.move_j(MODEL.home + 0.5 * np.eye(7)[0])
+
+
+@pytest.mark.parametrize("is_free", [False, True], ids=["lock-step", "free"])
+@pytest.mark.parametrize("mode", ["joint_position", "cartesian_position", "torque"])
+def test_commands_that_were_all_lost_are_no_success_where_the_motion_ends_at_its_start(mode, is_free):
+    def out_and_back(state, t):
+        s = 0.5 - 0.5 * np.cos(np.pi * min(t / 0.4, 2.0))
+        if mode == "torque":
+            return JointTorque(3.0 * s * np.eye(7)[0], finished=t >= 0.8)
+        q = MODEL.home + 0.02 * s**3 * np.eye(7)[0]
+        if mode == "joint_position":
+            return JointPosition(q, finished=t >= 0.8)
+        return CartesianPosition(MODEL.forward(q), MODEL.arm_angle(q), finished=t >= 0.8)
+
+    with simulate(MODEL, lockstep=not is_free) as robot:
+        robot.power_on()
+        robot.world.set_network(NetworkFaults(loss=1.0), "commands")
+        with pytest.raises(ControlError, match="executed none of the commands"):
+            robot.control(out_and_back, mode)
+        robot.world.set_network(NetworkFaults(), "commands")
+        if mode != "torque":
+            robot.control(out_and_back, mode)
+            assert np.abs(robot.state.q_c - MODEL.home).max() < 1e-6
+
+
+def test_a_short_motion_back_to_its_start_is_executed_before_it_ends():
+    def bump(state, t):
+        s = np.sin(np.pi * min(t / 0.008, 1.0)) ** 4
+        return JointPosition(MODEL.home + 4e-6 * s * np.eye(7)[0], finished=t >= 0.008)
+
+    with simulate(MODEL) as robot:
+        robot.power_on()
+        run = robot.control(bump)
+        assert np.abs(run.cycles["q_c"][:, 0] - MODEL.home[0]).max() > 2e-6

@@ -250,8 +250,8 @@ def test_commands_of_every_kind_are_on_record(make_robot, tmp_path):
     assert np.isnan(run.command).all()
     run.save(tmp_path / "run.csv")
     assert len((tmp_path / "run.csv").read_text().splitlines()) == len(run.t) + 1
-    run = robot.control(lambda state, t: JointTorque(np.ones(7) * 0.5 * (t < 0.02), t >= 0.02), "torque")
-    assert np.array_equal(run.command_tau[:, 0], 0.5 * (run.t < 0.02))
+    run = robot.control(lambda state, t: JointTorque(np.ones(7) * 5e-4 * (t < 0.02), t >= 0.02), "torque")
+    assert np.array_equal(run.command_tau[:, 0], 5e-4 * (run.t < 0.02))
 
 
 def test_a_low_pass_ends_at_the_last_command_and_may_be_stopped_on_its_way(make_robot):

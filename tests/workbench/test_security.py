@@ -17,7 +17,7 @@ from rcilab.core.errors import UsageError
 from rcilab.views.access_control import AccessPolicy
 from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.workbench import security
-from rcilab.workbench.live import LIVE_PATH, Answer, Here, LiveChannel, PageMessage, Seek, Take
+from rcilab.workbench.live import HEARTBEAT_PATH, LIVE_PATH, Answer, Here, LiveChannel, PageMessage, Seek, Take
 from rcilab.workbench.page import decorate
 from rcilab.workbench.security import bind, check_host
 from tests.waiting import wait_for
@@ -89,7 +89,7 @@ class Door:
             bound,
             AccessPolicy(host="127.0.0.1", port=self.port),
             decorate=decorate,
-            routes={LIVE_PATH: self.live.serve},
+            routes={LIVE_PATH: self.live.serve, HEARTBEAT_PATH: self.live.serve_heartbeats},
         )
         self.server = self.guard.viser
 
@@ -117,7 +117,7 @@ PROTOCOL = f"viser-v{__import__('viser').__version__}"
 
 
 @pytest.mark.parametrize("origin", [None, "http://evil.example"])
-@pytest.mark.parametrize("path", ["/", "/rcilab/live"])
+@pytest.mark.parametrize("path", ["/", LIVE_PATH, HEARTBEAT_PATH])
 def test_the_real_server_answers_403_to_strangers(door, origin, path):
     with pytest.raises(InvalidStatus) as caught:
         door.connect(path, origin, PROTOCOL)
@@ -231,6 +231,21 @@ def test_published_values_reach_every_page_and_the_next_one_too(door):
         assert json.loads(first.recv(timeout=10)) == {"language": "zh"}
         with door.connect("/rcilab/live") as second:
             assert json.loads(second.recv(timeout=10))["language"] == "zh"
+
+
+def test_a_heartbeat_thread_gets_heartbeats_only_and_its_answers_count(door):
+    door.received.clear()
+    with door.connect(HEARTBEAT_PATH) as thread, door.connect(LIVE_PATH) as page:
+        page.recv(timeout=10)
+        thread.send(json.dumps({"kind": "hello", "page": 8, "key": door.live.introduce(8)}))
+        wait_for(lambda: door.received == [(8, Here())], what="the greeting")
+        door.live.publish(chips=[{"id": "b"}])
+        door.live.beat()
+        assert json.loads(thread.recv(timeout=10)) == {"beat": 1}
+        assert [json.loads(page.recv(timeout=10)) for _ in range(2)] == [{"chips": [{"id": "b"}]}, {"beat": 1}]
+        thread.send(json.dumps({"kind": "here"}))
+        wait_for(lambda: door.received == [(8, Here())] * 2, what="the answer")
+    door.live.forget(8)
 
 
 def test_only_a_page_that_brings_its_key_is_somebody(door):

@@ -22,7 +22,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
-from rcilab.execution.motion_stream import MotionStream
+from rcilab.execution.motion_executor import MotionStream
 from rcilab.execution.recorder import CycleLog, Recorder
 from rcilab.execution.session import RobotSession
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits

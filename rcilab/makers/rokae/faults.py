@@ -137,9 +137,9 @@ _BOX = (
 )
 
 _RANGE = (
-    "the joint is beyond its range or its soft limit, and without auto_limit the motors are off: switch the "
-    "power off and on, then lead the joint back inside (“Lead back inside” on the Run tab; in Python: "
-    "execute(plan_recovery(robot.model, robot.state.q_c)))"
+    "the joint is beyond its range or its soft limit: recover, or switch the power off and on where that is refused; "
+    "switch the power on if it is off, as a joint limit does without auto_limit; then lead the joint back inside "
+    "(“Lead back inside” on the Run tab; in Python: execute(plan_recovery(robot.model, robot.state.q_c)))"
 )
 RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
 """Faults after which `recover()` may be refused: the arm can be too far outside."""

@@ -4,23 +4,22 @@
   "use strict";
   const SLOWEST = 4000;  // [ms] The longest frame that software rendering was seen to take is 3.3 s.
   const work = (slowest) => {
-    let me = null, live = null, lastAnswer = 0;
-    const hello = () => { if (live && live.readyState === WebSocket.OPEN && me) live.send(JSON.stringify({ kind: "hello", ...me })); };
+    let me = null, socket = null, lastAnswer = 0;
+    const hello = () => { if (socket && socket.readyState === WebSocket.OPEN && me) socket.send(JSON.stringify({ kind: "hello", ...me })); };
     const connect = (address) => {
-      live = new WebSocket(address);
-      live.onopen = hello;
-      live.onmessage = (event) => {
-        if (!event.data.startsWith('{"beat"')) return;
+      socket = new WebSocket(address);
+      socket.onopen = hello;
+      socket.onmessage = () => {  // A heartbeat of the server.
         self.postMessage(0);  // The page's own thread answers when it can.
-        if (Date.now() - lastAnswer < slowest) live.send('{"kind":"here"}');
+        if (Date.now() - lastAnswer < slowest) socket.send('{"kind":"here"}');
       };
-      live.onclose = () => setTimeout(() => connect(address), 1000);
+      socket.onclose = () => setTimeout(() => connect(address), 1000);
     };
     self.onmessage = ({ data }) => {
       lastAnswer = Date.now();
       if (!data) return;
       me = data.me;
-      if (live) hello(); else connect(data.address);
+      if (socket) hello(); else connect(data.address);
     };
   };
   let worker;
@@ -28,6 +27,6 @@
     worker = new Worker(URL.createObjectURL(new Blob([`(${work})(${SLOWEST})`], { type: "text/javascript" })));
   } catch { return; }  // A browser without workers: the page's own thread answers alone.
   worker.onmessage = () => worker.postMessage(null);
-  const address = (location.protocol === "https:" ? "wss://" : "ws://") + location.host + "/rcilab/live";
+  const address = (location.protocol === "https:" ? "wss://" : "ws://") + location.host + "/rcilab/heartbeat";
   window.addEventListener("rl-me", (event) => worker.postMessage({ me: event.detail, address }));
 })();

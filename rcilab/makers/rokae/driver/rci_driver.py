@@ -22,14 +22,13 @@ from rcilab.makers.driver import (
 )
 from rcilab.makers.rokae.driver.address import RciAddress, parse_address
 from rcilab.makers.rokae.driver.commands import RciCommands
-from rcilab.makers.rokae.driver.connection import RciConnection
+from rcilab.makers.rokae.driver.connection import RciConnection, SocketTransport
 from rcilab.makers.rokae.driver.controller_parameters import send_configuration
 from rcilab.makers.rokae.driver.fault_report import describe_faults
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there, with_tool_of
 from rcilab.makers.rokae.driver.identify import identify_robot
 from rcilab.makers.rokae.driver.refusal import Refusal
 from rcilab.makers.rokae.driver.session_commands import RciSessionCommands
-from rcilab.makers.rokae.driver.transport import SocketTransport
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.makers.rokae.wire import STATE_SIZE, Request, SafetyStop, StartMotionMode, build_command
@@ -134,9 +133,10 @@ class RciDriver:
         commands = _AlongsideCommands(self.connection) if alongside else self._commands
         commands.set_motor_power(on)
 
-    def is_powered(self) -> bool:
+    def is_powered(self, *, alongside: bool = False) -> bool:
         """Returns whether motor power is on."""
-        return self._commands.motor_state()
+        commands = _AlongsideCommands(self.connection) if alongside else self._commands
+        return commands.motor_state()
 
     def recover(self) -> None:
         """Clears the controller's faults and returns once they are gone."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import pytest
 
 from rcilab.core.errors import ConnectionLostError
-from rcilab.makers.rokae.driver import transport as module
+from rcilab.makers.rokae.driver import connection as module
 from rcilab.makers.rokae.driver.address import parse_address
-from rcilab.makers.rokae.driver.transport import SocketTransport
+from rcilab.makers.rokae.driver.connection import SocketTransport
 
 HOST, SIZE = "127.0.0.2", 1000
 
