@@ -47,6 +47,7 @@ ARRIVAL_TOLERANCE = 1e-6  # [rad], [m] From the last command; far below the reso
 _APPROACH = 0.95  # Share of a distance left after SETTLE_CYCLES with a low pass filter; 0.88 at 0.1 Hz.
 STANDSTILL_TIMEOUT = 1.0  # [s] For the controller's own stop; the slowest joint needs 0.3 s from full speed.
 _MIN_TORQUE = 1e-3  # [N m] Smaller torques have no effect on the arm.
+_MIN_CHANGE = 1e-9  # [rad], [N m] Smaller changes of commanded values are rounding, or the end of an earlier motion.
 _NEAR_CYCLES = 2  # Consecutive cycles of a filter at its command until it counts as settled.
 RECORD_CYCLES = 50  # Cycles in a ControlError, as in the vendor's client.
 
@@ -247,7 +248,7 @@ class ControlLoop:
             now, first = (
                 (state.tau_c, self._first_tau_c) if isinstance(command, JointTorque) else (state.q_c, self._first_q_c)
             )
-            self._is_executed = not np.array_equal(now, first)
+            self._is_executed = float(np.abs(now - first).max()) > _MIN_CHANGE
 
     def _next(self) -> RobotState:
         """Returns the next state that has not been answered yet, oldest first.

@@ -150,7 +150,8 @@ def test_a_short_motion_back_to_its_start_is_executed_before_it_ends():
         s = np.sin(np.pi * min(t / 0.008, 1.0)) ** 4
         return JointPosition(MODEL.home + 4e-6 * s * np.eye(7)[0], finished=t >= 0.008)
 
-    with simulate(MODEL) as robot:
+    with simulate(MODEL, lockstep=False) as robot:  # With the delay of its jitter buffer.
         robot.power_on()
-        run = robot.control(bump)
-        assert np.abs(run.cycles["q_c"][:, 0] - MODEL.home[0]).max() > 2e-6
+        for _ in range(3):
+            run = robot.control(bump)
+            assert np.abs(run.cycles["q_c"][:, 0] - MODEL.home[0]).max() > 2e-6
