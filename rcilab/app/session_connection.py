@@ -65,9 +65,8 @@ class SessionConnection:
         self._powered: bool | None = None
         self._held = RobotConfiguration()  # The configuration that was sent from here.
         self._inputs: tuple[bool, ...] | None = None
-        self._outputs: tuple[bool | None, ...] = (None,) * len(
-            capabilities_of(session.model).outputs
-        )  # The configuration that was set from here.
+        outputs = len(capabilities_of(session.model).outputs)
+        self._outputs: tuple[bool | None, ...] = (None,) * outputs  # Levels that were set from here; None: unknown.
         self._power_seen = float("-inf")
         self._last = SupervisorStatus(phase="connecting", code="connecting", target=self.name)
         self._looked = float("-inf")
