@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.box_monitor import BoxMonitor
@@ -40,6 +40,8 @@ def test_twist_and_acceleration_are_those_of_the_jacobian_along_a_joint_motion(s
     goal = MODEL.home + rng.uniform(-0.4, 0.4, 7)
     motion = plan_joint(MODEL, MODEL.home, goal, speed=0.5, law="s_profile")
     row = int(rng.integers(5, len(motion) - 5))
+    breaks = motion.polynomial.breaks / CYCLE_TIME
+    assume(not ((row - 2.0 < breaks) & (breaks < row)).any())  # Where the jerk jumps, the mean is not the middle's.
     monitor = CartesianMonitor(LIMITS, rows=RCI_TOOL_CONDITIONS)
     monitor.reset(MODEL.forward(motion.q[row - 4]))
     play(monitor, [MODEL.forward(q) for q in motion.q[row - 3 : row + 1]])
