@@ -74,8 +74,8 @@ def test_who_moves_along_the_line_stays_on_it_though_the_speed_changes(model, se
     try:
         rest = plan_joint(model, now.q, goal, speed=second, start_velocity=now.dq, start_acceleration=now.ddq)
     except PlanningError as error:  # At the lower speed it brakes too gently to stop before a limit.
-        assert second < first
-        assert "plan with a higher speed" in str(error)
+        if second >= first or "plan with a higher speed" not in str(error):
+            raise
         reject()
     assert offset_from_line(rest.q, start, goal) < 1e-11
     assert np.abs(rest.at(0.0).dq - now.dq).max() < 1e-11
