@@ -68,7 +68,8 @@ def test_from_rest_it_is_the_fastest_motion_on_the_straight_line_in_joint_space(
 @given(st.sampled_from(ALL), st.integers(0, 2**32), st.floats(0.05, 1.0), st.floats(0.05, 1.0))
 def test_who_moves_along_the_line_stays_on_it_though_the_speed_changes(model, seed, first, second):
     rng = np.random.default_rng(seed)
-    start, goal = 0.5 * random_angles(rng, model), 0.5 * random_angles(rng, model)
+    middle = 0.5 * (model.limits.joint.lower + model.limits.joint.upper)
+    start, goal = (0.5 * (middle + random_angles(rng, model)) for _ in range(2))
     motion = plan_joint(model, start, goal, speed=first)
     now = motion.at(rng.uniform(0.1, 0.5) * motion.duration)
     try:
