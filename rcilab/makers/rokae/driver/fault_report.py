@@ -35,6 +35,7 @@ _OF_JOINTS = (
     "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
     "acceleration there, and stay away from singular poses"
 )
+_INVERTED = 100  # The last poses, whose joint angles are computed: more than a command is under way.
 _FOLLOWED = 10  # Cycles before the fault in which the joint nearest to a bound is searched.
 _HISTORY = 3  # Commands before a command that its third difference uses.
 
@@ -77,7 +78,7 @@ def describe_faults(
     parts = [f"the controller stopped the motion {when}: {names}"]
     commanded, is_broken = _describe_commanded(faults, record, limits)
     measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
-    followed = _describe_followed(faults, record, limits) if np.isfinite(record["command_pose"]).any() else ""
+    followed = _describe_followed(faults, record, model, limits)
     passed = describe_passed_face(faults, record, box)
     found = [said for said in (commanded, followed, *measured, passed) if said]
     parts += found
@@ -98,12 +99,50 @@ def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
     return fault.remedy if is_broken else fault.outside_remedy
 
 
-def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], limits: Limits) -> str:
-    """Returns the joint nearest to a bound of the faults, if joints follow from poses; "" for other faults.
+def _describe_followed(
+    faults: tuple[Fault, ...], record: NDArray[np.void], model: RobotModel, limits: Limits
+) -> str:
+    """Returns the joint that violates a condition of the faults, if joints follow from poses; "" for other faults.
 
-    The joint angles that violated it are the controller's; the state shows the last ones that were followed.
+    The angles that violate it are in no state: they are computed from the sent poses, as the controller does. If its
+    own filter or play-out made other angles of them, the joint nearest to the bound in the states is returned.
     """
-    q, joint = record["q_c"][-_FOLLOWED:], limits.joint
+    rows = record[(record["sent_ns"] != 0) & np.isfinite(record["command_pose"]).all(axis=(1, 2))][-_INVERTED:]
+    if not len(rows):
+        return ""
+    q = _follow_poses(rows, model)
+    begins = rows["t"][0] <= 0.0
+    if begins:  # Before the first command the arm stood still.
+        q = np.concatenate((np.repeat(rows["q_c"][:1], _HISTORY, axis=0), q))
+    for place, violations in _judge_joints(q, rows["command_psi"], limits):
+        for violation in violations:
+            if violation.condition.fault in faults:
+                remark = violation.remark
+                t = float(rows["t"][place - _HISTORY * begins])
+                sentence = f"{remark} in the joint angles that follow from the pose at t = {t:.3f} s"
+                return Remark(sentence, remark.code, **remark.facts)
+    return _describe_nearest(faults, record["q_c"][-_FOLLOWED:], limits)
+
+
+def _follow_poses(rows: NDArray[np.void], model: RobotModel) -> Array:
+    """Returns the joint angles of poses that follow each other, [rad], shape (N, n); up to the first without any."""
+    T_tool_flange = model.T_flange_tool.inverse()
+    near: list[float] = rows["q_c"][0].tolist()
+    psi = model.arm_angle(near) if model.redundancy else 0.0
+    found: list[list[float]] = []
+    for T, angle in zip(rows["command_pose"], rows["command_psi"].tolist(), strict=True):
+        psi = angle if math.isfinite(angle) else psi
+        q = model.solver.solve_near(_pose(T) @ T_tool_flange, psi, near)
+        if q is None:
+            break
+        found.append(q)
+        near = q
+    return np.array(found).reshape(-1, model.n)
+
+
+def _describe_nearest(faults: tuple[Fault, ...], q: Array, limits: Limits) -> str:
+    """Returns the joint nearest to a bound of the faults in the states before the fault; "" for other faults."""
+    joint = limits.joint
     for order, (fault, bounds, name, unit) in enumerate(
         (
             (Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION, joint.velocity, "velocity", "rad/s"),
