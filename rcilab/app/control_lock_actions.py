@@ -98,7 +98,7 @@ class ControlLockActions:
         after = lock.ask(page, self._presence.now())
         self._store.update(control_lock=after)
         if after.holder == page:
-            self._store.say("good", message("notice.taken", page=after.number(page)))
+            self._announce(page)
         elif after.asking == page:
             self._store.say(
                 "good", message("control_lock.asked", page=lock.number(page), holder=lock.number(lock.holder))
@@ -111,10 +111,11 @@ class ControlLockActions:
         lock = self._store.state.control_lock
         if request.page is None or request.page != lock.holder or lock.asking is None:
             return
-        asking = lock.number(lock.asking)
         self._store.update(control_lock=lock.answer(request.page, request.yes))
-        said = message("notice.taken", page=asking) if request.yes else message("control_lock.kept", page=asking)
-        self._store.say("good" if request.yes else "warn", said)
+        if request.yes:
+            self._announce(lock.asking)
+        else:
+            self._store.say("warn", message("control_lock.kept", page=lock.number(lock.asking)))
 
     def tick(self) -> None:
         """Handles timeouts: a silent holder loses the controls, a request without an answer is granted."""
@@ -130,6 +131,13 @@ class ControlLockActions:
             self._store.say("warn", message("control_lock.unanswered", page=taken))
         if lock.holder is None and lock.pages:
             self._find_holder(now)
+
+    def _announce(self, holder: int) -> None:
+        """Says on every page which one has the controls now."""
+        lock = self._store.state.control_lock
+        for page in lock.pages:
+            said = message("notice.yours") if page == holder else message("notice.taken", page=lock.number(holder))
+            self._store.say("good", said, page=page)
 
     def _find_holder(self, now: float) -> None:
         """Returns free controls to their former holder, or to the only page once the arm stands still."""

@@ -12,6 +12,9 @@ from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.target_status import Tone
 from rcilab.i18n.translator import Message
 
+ROBOT_TROUBLE = "robot"
+"""Name of the troubles while the robot cannot move, for `StateStore.settle`."""
+
 _UNDO_DEPTH = 100
 _NOTICES = 4  # For each page, and for all pages together: more would cover the scene.
 
@@ -75,8 +78,10 @@ class StateStore(Generic[S]):
 
     def clear_problems(self, *beginnings: str) -> None:
         """Clears the problems of all fields whose names begin so."""
-        kept = {field: said for field, said in self._state.problems.items() if not field.startswith(beginnings)}
-        self.update(problems=MappingProxyType(kept))
+        problems = self._state.problems
+        kept = {field: said for field, said in problems.items() if not field.startswith(beginnings)}
+        if len(kept) < len(problems):
+            self.update(problems=MappingProxyType(kept))
 
     def remember(self) -> None:
         """Stores the current goal for `undo`."""

@@ -76,6 +76,8 @@ def parse_number(
 
 
 def _bounds(low: float, high: float, unit: str) -> Message:
+    if not unit:
+        return message("parse.bounds.plain", low=_short(low), high=_short(high))
     if unit not in _UNITS:
         return message("parse.bounds", low=_short(low), high=_short(high), unit=unit)
     scale = math.pi / 180.0 if unit == "deg" else 1e-3

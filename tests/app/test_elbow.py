@@ -24,7 +24,9 @@ def free_in_words(elbow) -> list[tuple[int, int]]:
     """The ranges behind "Free:", in whole degrees as they are written; none for any other sentence."""
     said = re.search(r'aria-label="([^"]*)"', ring_html(elbow, EN))[1]
     numbers = [int(number.replace("−", "-")) for number in re.findall(r"[−-]?\d+(?=°)", said)]
-    return list(zip(numbers[::2], numbers[1::2], strict=True)) if said.startswith("Free: ") else []
+    ranges = list(zip(numbers[::2], numbers[1::2], strict=True)) if said.startswith("Free: ") else []
+    assert all(low <= high for low, high in ranges)  # A reader takes 122 ... 100 for a mistake.
+    return ranges
 
 
 def is_in(ranges, psi: float) -> bool:

@@ -54,6 +54,13 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
     page.wait(lambda: steps()[1].waypoint.speed == 0.4 and page.alerts() == [], "40 %")
     page.button("Plan all").click()
     page.wait(lambda: page.state.plan is not None and page.state.plan.program is not None, "the program's plan")
+    field(page, "Blend").fill("-5")
+    page.wait(lambda: any("-5 is outside" in text for text in page.alerts()), "why it is not taken")
+    assert page.tab.locator(".rl-problem").is_visible()
+    assert page.tab.get_by_text("The number was not taken").is_visible()
+    assert page.tab.locator("[role=tabpanel]").get_by_text("Passed").locator("visible=true").count() == 0
+    field(page, "Blend").fill("0")
+    page.wait(lambda: page.alerts() == [], "the verdict again")
     page.wait(lambda: page.tab.get_by_text("to waypoint 1 of 2, MoveJ").first.is_visible(), "the segment's name")
     with page.tab.expect_download() as coming:
         page.button("Save").click()

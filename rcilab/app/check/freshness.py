@@ -17,7 +17,7 @@ def beside_program(state: UiState) -> Message | None:
     fails = program.planned is None and program.tone == "bad" and program.answer is not None
     if plan is None or plan.program is not None or not fails:
         return None
-    return message("plan.not_program", answer=program.answer)
+    return message("plan.not_program")
 
 
 def outdated(state: UiState) -> Message | None:
@@ -26,9 +26,8 @@ def outdated(state: UiState) -> Message | None:
     if plan is None:
         return None
     if plan.program is not None and program.planned is not program.draft:
-        if program.planned is None and program.tone == "bad" and program.answer is not None:
-            return message("ready.program_fails", answer=program.answer)
-        return message("ready.program")
+        fails = program.planned is None and program.tone == "bad" and program.answer is not None
+        return message("ready.program_fails" if fails else "ready.program")
     if plan.program is not None and not program.draft.has_tool_of(state.model):
         return message("ready.program_tool")
     stale = plan.stale_parts(state.model, state.setup.wanted.box)

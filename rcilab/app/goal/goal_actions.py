@@ -30,6 +30,7 @@ QUATERNION = "wxyz"
 FURTHEST = 3.0  # [m] More than twice the reach of any arm, and the gizmo stays visible.
 SLOWEST = 0.01
 SETTLED = 0.15  # [s] A goal that has not changed for this time is taken as final.
+_FIELDS = ("joint.", "pose.", "psi")  # Beginnings of the names of the fields that a goal is typed into.
 _ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use of a slider's keys.
 RESTED = 0.6  # [s] The same for a gizmo that is still held: the operator may only pause.
 
@@ -191,6 +192,7 @@ class GoalActions:
         if request.name == "undo":
             goal = self._store.undo()
             if goal is not None:
+                self._store.clear_problems(*_FIELDS)
                 self._store.update(goal=goal)
                 self.plan()
             return
@@ -203,7 +205,6 @@ class GoalActions:
             "start": state.goal.q if state.plan is None else _beginning(state.plan),
         }
         self.pose(readonly_copy(named[request.name]))
-        self._store.clear_problems("")
 
     def move_target(self, request: MoveTarget) -> None:
         """Follows the gizmo."""
@@ -215,8 +216,6 @@ class GoalActions:
         position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
         self._remember_hand("target")
         self._is_held = not request.ended
-        if request.ended:
-            self._store.clear_problems("pose.")
         self.aim(Pose(position, request.wxyz))
 
     def _remember_hand(self, what: str) -> None:
@@ -251,7 +250,6 @@ class GoalActions:
             self.aim(target, psi)
         else:
             self.pose(q)
-        self._store.clear_problems("pose.")
 
     def type_field(self, request: TypeField) -> None:
         """Takes a typed number, or shows the problem next to its field."""
@@ -298,7 +296,9 @@ class GoalActions:
             return
         self._store.remember()
         self._store.clear_problems(request.field)
+        others = self._store.state.problems  # The texts of other fields stay there, to be corrected.
         act()
+        self._store.update(problems=others)
 
     def set_speed(self, request: SetSpeed) -> None:
         """Changes the speed of plans."""
@@ -406,7 +406,8 @@ class GoalActions:
         return goal
 
     def pose(self, q: JointVector) -> None:
-        """Sets the goal to joint angles."""
+        """Sets the goal to joint angles; rejected texts were about the previous one."""
+        self._store.clear_problems(*_FIELDS)
         self._store.update(goal=goal_at(self._store.state.model, q))
         self.plan()
 
@@ -417,7 +418,11 @@ class GoalActions:
         near: JointVector | None = None,
         snapped: Message | None = None,
     ) -> None:
-        """Sets the goal to a target pose, see `goal_toward`; `near` defaults to the current goal."""
+        """Sets the goal to a target pose, see `goal_toward`; `near` defaults to the current goal.
+
+        Rejected texts were about the previous goal.
+        """
+        self._store.clear_problems(*_FIELDS)
         state = self._store.state
         around = state.goal.q if near is None else near
         self._store.update(goal=goal_toward(state.model, target, around, psi, snapped))

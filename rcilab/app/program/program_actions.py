@@ -21,9 +21,10 @@ from rcilab.app.store import Store
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.background_job import BackgroundJob
 from rcilab.core.errors import InvalidValueError, PlanningError, RcilabError, VersionMismatchError
+from rcilab.core.safety_box import SafetyBox
 from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message, message
-from rcilab.model.robot_model import load_model
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion.program import Program
 
 
@@ -58,6 +59,7 @@ class ProgramActions:
     def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
         self._store, self._session = store, session
         self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
+        self._basis: tuple[RobotModel, SafetyBox | None] | None = None  # What the failure that is shown is about.
         self._history = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, session, goal, self._history)
 
@@ -94,6 +96,7 @@ class ProgramActions:
             rounds=self._history.state.rounds,
             box=state.setup.wanted.box,
         )
+        self._basis = state.model, job.box
         self._planner.start(job, partial(plan_job, job))
         self._store.update(busy=message("program.planning"))
         self._store.clear_problems(FILE_FIELD)
@@ -151,6 +154,8 @@ class ProgramActions:
             self._store.update(busy=None)
             self._history.set(progress=None)
             self._finish(*self._planner.pop_result())
+        elif self._history.state.tone == "bad" and self._is_failure_old():
+            self._history.set(tone="good", answer=None, failed=None)
         elif self._planner.progress != self._history.state.progress:
             self._history.set(progress=self._planner.progress)
         elif (
@@ -176,6 +181,12 @@ class ProgramActions:
         self._store.update(busy=None)
         self._history.set(progress=None)
         return True
+
+    def _is_failure_old(self) -> bool:
+        """Returns whether planning failed with another tool, load, joint limits or safety box than those of now."""
+        state = self._store.state
+        is_same = self._basis is not None and self._basis[0] is state.model and self._basis[1] is state.setup.wanted.box
+        return self._history.state.planned is None and not is_same
 
     def _was_stretched(self) -> bool:
         """Returns whether the current plan is slower than the speeds of its program."""

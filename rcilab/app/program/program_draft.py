@@ -22,6 +22,8 @@ FILE_FIELD = "program.0.file"
 MOST_ROUNDS = 100
 """Largest number of rounds: a longer motion could not be inspected."""
 
+_SAME_TIME = 1e-9  # [s]
+
 _KEYS = count(1)
 
 
@@ -184,10 +186,14 @@ def is_led_in(plan: Plan) -> bool:
 
 
 def number_at(plan: Plan, time: float) -> int | None:
-    """Returns the number of the waypoint that the motion leads to at a time, from 1; 0 during the approach."""
+    """Returns the number of the waypoint that the motion leads to at a time, from 1; 0 during the approach.
+
+    At the time of a waypoint it is that waypoint, whatever the rounding.
+    """
     if plan.program is None:
         return None
-    segment = int(np.searchsorted(plan.motion.segment_starts, time, side="right")) - 1 - is_led_in(plan)
+    before = max(time - _SAME_TIME, 0.0)
+    segment = int(np.searchsorted(plan.motion.segment_starts, before, side="right")) - 1 - is_led_in(plan)
     number = segment % (len(plan.program.waypoints) + 1) + 1
     return 0 if segment < 0 or number > len(plan.program.waypoints) else number
 

@@ -23,6 +23,9 @@ VIA_FIELDS = ("via_x", "via_y", "via_z")
 _BULGE = 0.25  # Distance of a new via point from the straight line, as a part of the line's length.
 _NO_WAY = 1e-3  # [m] A shorter line gets no arc.
 
+WAYPOINT_FIELDS = ("speed", "blend", "dwell", "psi", *POSE_FIELDS, *VIA_FIELDS)
+"""The numbers of a waypoint that can be typed."""
+
 _Take = Callable[[Waypoint, float], Waypoint]
 _PLAIN: dict[str, tuple[float, float, str, _Take]] = {
     "speed": (100.0 * MIN_SPEED, 100.0, "%", lambda waypoint, value: replace(waypoint, speed=value / 100.0)),

@@ -18,6 +18,7 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, drawn_parts, name_parts, setup_obstacle
+from rcilab.app.state_store import ROBOT_TROUBLE
 from rcilab.app.status_text import StartingError, describe_incident, explain_error
 from rcilab.app.store import Store, UiState
 from rcilab.core.clock import CYCLE_TIME
@@ -41,8 +42,6 @@ if TYPE_CHECKING:
     from rcilab.makers.configuration import RobotConfiguration, SetupPart
 
 _CONFIRM_TIMEOUT = 10.0  # [s] A later second press asks again.
-TROUBLE = "robot"
-"""Names of the troubles while the robot cannot move: see `Store.settle`."""
 _POWER_PAUSE = 2.0  # [s] Between two attempts to switch the virtual arm on.
 
 
@@ -239,7 +238,7 @@ class RunActions:
             self._trouble = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
                 said = describe_incident(status.incident.code, status.incident.message, status)
-                self._store.say("bad", said, trouble=TROUBLE)
+                self._store.say("bad", said, trouble=ROBOT_TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
@@ -259,7 +258,7 @@ class RunActions:
 
     def _settle(self) -> None:
         """Withdraws the notices of a trouble that is over; the end of one that cut the connection is reported."""
-        self._store.settle(TROUBLE)
+        self._store.settle(ROBOT_TROUBLE)
         if self._trouble.startswith(("crashed", "lost")):
             code = "lost" if self._trouble.startswith("lost") else self._trouble
             self._store.say("good", message(f"incident.over.{code}"))
@@ -315,7 +314,7 @@ class RunActions:
             if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
                 self._reached = 0.0  # It had begun, but no status showed it.
             self._is_stop_said = outcome.error.code == SAFETY_STOP
-            trouble = TROUBLE if _is_trouble(outcome.error) else ""
+            trouble = ROBOT_TROUBLE if _is_trouble(outcome.error) else ""
             self._store.say(*self._report_failure(outcome, outcome.error), trouble=trouble)
         elif outcome.what == "power_on":
             self._powered = True

@@ -11,7 +11,7 @@ from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request
 from rcilab.app.run.active_force import no_push
 from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
-from rcilab.app.state_store import StateStore
+from rcilab.app.state_store import ROBOT_TROUBLE, StateStore
 from rcilab.app.status_text import explain_error
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
@@ -99,7 +99,11 @@ class WorldActions:
         watch = self._require_watch()
         if watch is not None and request.button in ("none", "estop", "gstop"):
             watch.ask(Press(request.button))
-            self._store.say("warn" if request.button != "none" else "good", message(f"safety.{request.button}_done"))
+            status = self._store.state.world.status
+            if request.button != "none":
+                self._store.say("warn", message(f"safety.{request.button}_done"), trouble=ROBOT_TROUBLE)
+            elif status is not None and status.button != "none":
+                self._store.say("good", message(f"safety.{status.button}_over"), trouble=ROBOT_TROUBLE)
 
     def set_wiring(self, request: SetWiring) -> None:
         """Wires outputs to inputs, or stops commands at the soft limits; or ends that."""

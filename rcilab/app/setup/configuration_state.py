@@ -127,7 +127,7 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
     """Returns one part in a few numbers."""
     value = getattr(setup, part)
     if value is None:
-        return message("setup.own")
+        return message("setup.unset")
     if isinstance(value, SafetyBox):
         x, y, z = map(float, value.size)
         return message("setup.box_on" if value.active else "setup.box_off", x=x, y=y, z=z)
@@ -147,7 +147,7 @@ def describe_held(status: SupervisorStatus, part: str) -> Message:
     """Returns the controller's values: the tool by the poses that it reports, the rest as it acknowledged them."""
     if part == "tool" and status.T_flange_tool is not None:
         return _describe_pose(status.T_flange_tool)
-    return describe_part(status.setup, part)
+    return message("setup.own") if getattr(status.setup, part) is None else describe_part(status.setup, part)
 
 
 def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:

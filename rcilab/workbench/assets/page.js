@@ -18,7 +18,7 @@
   const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
   const TOGETHER = 1000;  // [ms] A choice: notices that come closer than this are shown together, at most three.
   const WARNED = 3500;  // [ms] A warning stays beside later notices for so long: time to read it once.
-  const TONES = ["good", "warn", "bad"];  // From the mildest; notices shown together have the worst.
+  const TONES = ["good", "warn", "bad"];  // From the mildest.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
   let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0, lines = [];
 
@@ -38,7 +38,12 @@
     const now = Date.now(), stays = (line) => now - line.at <= (TONES.indexOf(line.tone) > 0 ? WARNED : TOGETHER);
     const kept = toast.className ? lines.filter((line) => line.text !== message.text && stays(line)) : [];
     lines = [...kept, { text: message.text, tone: message.tone, at: now }].slice(-3);
-    toast.textContent = lines.map((line) => line.text).join("\n");
+    toast.replaceChildren(...lines.map((line) => {
+      const said = document.createElement("p");
+      said.className = "rl-" + line.tone;
+      said.textContent = line.text;
+      return said;
+    }));
     toast.className = "rl-shown rl-" + TONES[Math.max(...lines.map((line) => TONES.indexOf(line.tone)))];
     toast.dataset.serial = message.serial || "";
     place();

@@ -118,7 +118,7 @@ def _words(elbow: Elbow, text: Text, is_nearest: bool) -> str:
         return text("elbow.stretched" if free else "elbow.nowhere")
     listed = [arc for arc in free if _is_wide(arc) or (elbow.psi - arc.start) % math.tau < arc.end - arc.start]
     key = "elbow.free_nearest" if is_nearest else "elbow.free"
-    return text(key, ranges=", ".join(_range(arc.start, arc.end, text) for arc in listed))
+    return text(key, ranges=", ".join(_ranges(listed, text)))
 
 
 def _is_wide(arc: ElbowArc) -> bool:
@@ -148,11 +148,11 @@ def _unrolled(start: float, end: float) -> list[tuple[float, float]]:
     return [(start, end)] if end <= math.pi else [(start, math.pi), (-math.pi, end - math.tau)]
 
 
-def _range(start: float, end: float, text: Text) -> str:
-    ends = (-math.pi, math.pi)
-    if end - start < math.tau - 1e-9:
-        ends = (math.remainder(start, math.tau), math.remainder(end, math.tau))
-    return " … ".join(text.units.format_angle(angle, 0) for angle in ends)
+def _ranges(arcs: list[ElbowArc], text: Text) -> list[str]:
+    """Returns arcs as ranges in the order of the bar: one across the half turn is at both ends."""
+    whole = any(arc.end - arc.start > math.tau - 1e-9 for arc in arcs)
+    ranges = [(-math.pi, math.pi)] if whole else sorted(r for arc in arcs for r in _unrolled(arc.start, arc.end))
+    return [" … ".join(text.units.format_angle(angle, 0) for angle in ends) for ends in ranges]
 
 
 def _title(kind: str, joints: tuple[int, ...], text: Text) -> str:

@@ -64,12 +64,12 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     made = run.setup
     where = text(f"where.{made.plant}") if made.target == "virtual" and made.plant else made.target
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(made.started_ns * 1e-9)) if made.started_ns else ""
-    facts = ", ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
+    facts = " · ".join(filter(None, ("" if run.model is None else run.model.name, when, where)))
     tone, ended, _ = _outcome(recording, text)
     is_said = run.stopped is None or run.faults or run.is_safety_stop
     reason = "" if is_said else _describe_stop(run, text)
     why = reason and f"<br><small>{esc(reason)}</small>"
-    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}. {esc(ended)}{why}</p>'
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text("record.replay"))}</b> {esc(facts)}<br>{esc(ended)}{why}</p>'
 
 
 def _describe_stop(run: Run, text: Text) -> str:
@@ -84,7 +84,7 @@ def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -
     if there in ("", here) and arm == state.model.name and destination(state, status) != "preview":
         return ""
     where = text(f"where.{there}") if made.target == "virtual" and there else there
-    return ", ".join(filter(None, (where, arm)))
+    return " · ".join(filter(None, (where, arm)))
 
 
 def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:

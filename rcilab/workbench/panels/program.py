@@ -10,7 +10,8 @@ import numpy as np
 
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
-from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, describe_place, number_at
+from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, ProgramState, describe_place, number_at
+from rcilab.app.program.waypoint_fields import WAYPOINT_FIELDS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
@@ -108,22 +109,30 @@ class ProgramPanel:
         self._bar.visible = self._cancel.visible = planning and now - self._began > _MOMENT
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
-        said = problems_html(state, text, [("program.0.rounds", text("program.rounds"))])
+        said = problems_html(state, text, self._typed(program))
         if FILE_FIELD in state.problems:  # The message below is about the program that the file did not replace.
             said += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
+        elif said:  # A verdict beside it would seem to be about the number that was not taken.
+            said += f'<p class="rl-note">{esc(text("program.untaken"))}</p>'
         elif plan is not None:
             where = describe_place(plan, t)
             said += planned_html(state, status, text)
             said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.render(where))}</p>'
         elif count and not planning and program.answer is None:
             said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
-        if program.answer is not None:
+        if program.answer is not None and "rl-problem" not in said:
             said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.render(program.answer))}</p>'
         self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
 
         if program.notes is not self._noted:
             self._noted = program.notes
             self._notes.show(notes_html(program.notes, text))
+
+    def _typed(self, program: ProgramState) -> list[tuple[str, str]]:
+        """Returns the fields of numbers, and their labels: the rounds, and those of the selected waypoint."""
+        own = f"program.{program.selected}."
+        waypoint = [(f"{own}{name}", self._text(f"program.field.{name}")) for name in WAYPOINT_FIELDS]
+        return [("program.0.rounds", self._text("program.rounds")), *waypoint]
 
     def _elsewhere(self, draft: Draft, status: SupervisorStatus) -> str:
         """Returns whether the program starts at the arm's position, as text."""

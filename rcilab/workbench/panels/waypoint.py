@@ -11,7 +11,6 @@ from rcilab.app.program.program_draft import TYPES, target_of
 from rcilab.app.program.waypoint_fields import VIA_FIELDS, arm_angle_of
 from rcilab.app.text import Text
 from rcilab.motion.waypoint import Waypoint
-from rcilab.workbench.panels.jog import problems_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, shown_pose
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ class WaypointPanel:
                 ("aim", "target", "eye"),
             ):  # fmt: skip
                 self._button(gui, what, source, icon)
-        self._problems = Html(gui)  # Last: it comes and goes.
+        self._source = Html(gui)  # Last: it comes and goes.
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the selected waypoint."""
@@ -71,7 +70,7 @@ class WaypointPanel:
         if draft.model != state.model.name or waypoint is None or place is None:
             for folder in (self._folder, self._pose, self._via, self._teach):
                 folder.visible = False
-            self._problems.show("")
+            self._source.show("")
             return
         arm = draft.arm(state.model)
         values = _values(waypoint, arm)
@@ -79,12 +78,10 @@ class WaypointPanel:
         self._folder.label = self._text("program.selected", number=place + 1)
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
         self._show_kind(waypoint)
-        labels = []
         for name, field in self._fields.items():
             field.field = f"program.{key}.{name}"
             field.show(values.get(name, ""), state.problems.get(field.field), state.entered)
-            labels.append((field.field, self._text(f"program.field.{name}")))
-        self._problems.show(problems_html(state, self._text, labels) + self._note(waypoint))
+        self._source.show(self._note(waypoint))
 
     def _show_kind(self, waypoint: Waypoint) -> None:
         """Shows the type; a type that only files have is the only option."""

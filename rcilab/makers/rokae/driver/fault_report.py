@@ -99,9 +99,7 @@ def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
     return fault.remedy if is_broken else fault.outside_remedy
 
 
-def _describe_followed(
-    faults: tuple[Fault, ...], record: NDArray[np.void], model: RobotModel, limits: Limits
-) -> str:
+def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], model: RobotModel, limits: Limits) -> str:
     """Returns the joint that violates a condition of the faults, if joints follow from poses; "" for other faults.
 
     The angles that violate it are in no state: they are computed from the sent poses, as the controller does. If its
