@@ -20,9 +20,9 @@ def explain_lack(model: RobotModel, feature: Feature) -> Message | None:
     lack = find_lack(model, feature)
     if lack is None:
         return None
-    said = describe_error(lack)
-    assert isinstance(said, Message)  # Every lack has a code.
-    return said
+    sentence = describe_error(lack)
+    assert isinstance(sentence, Message)  # Every lack has a code.
+    return sentence
 
 
 def explain_lack_of_part(model: RobotModel, part: SetupPart) -> Message | None:

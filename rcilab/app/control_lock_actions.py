@@ -136,8 +136,8 @@ class ControlLockActions:
         """Says on every page which one has the controls now."""
         lock = self._store.state.control_lock
         for page in lock.pages:
-            said = message("notice.yours") if page == holder else message("notice.taken", page=lock.number(holder))
-            self._store.say("good", said, page=page)
+            sentence = message("notice.yours") if page == holder else message("notice.taken", page=lock.number(holder))
+            self._store.say("good", sentence, page=page)
 
     def _find_holder(self, now: float) -> None:
         """Returns free controls to their former holder, or to the only page once the arm stands still."""

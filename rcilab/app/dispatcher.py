@@ -206,8 +206,8 @@ class Dispatcher:
         self._refused_at[refused] = now
         self._refused_for = lock.holder
         code = "control_lock.free" if lock.holder is None else "notice.watching"
-        said = message(code, page=lock.number(lock.holder))
-        self._store.say("warn", said, page=request.page, trouble="control_lock")
+        sentence = message(code, page=lock.number(lock.holder))
+        self._store.say("warn", sentence, page=request.page, trouble="control_lock")
 
     def _drive(self, request: RobotCommand) -> None:
         if request.what == "pause":

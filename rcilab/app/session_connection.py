@@ -15,7 +15,7 @@ from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import ConnectionLostError, RcilabError, UsageError
 from rcilab.makers.configuration import RobotConfiguration
-from rcilab.makers.maker import capabilities_of
+from rcilab.makers.maker import capabilities_of, timing_of
 
 if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate
@@ -123,7 +123,7 @@ class SessionConnection:
             faults=state.faults,
             powered=self._powered,
             success_rate=state.success_rate,
-            rate_hz=1000.0,
+            rate_hz=1.0 / timing_of(self._session.model).state_period,
             message_id=state.message_id,
             setup=self._held,
             inputs=self._inputs,

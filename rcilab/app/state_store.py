@@ -79,7 +79,7 @@ class StateStore(Generic[S]):
     def clear_problems(self, *beginnings: str) -> None:
         """Clears the problems of all fields whose names begin so."""
         problems = self._state.problems
-        kept = {field: said for field, said in problems.items() if not field.startswith(beginnings)}
+        kept = {field: sentence for field, sentence in problems.items() if not field.startswith(beginnings)}
         if len(kept) < len(problems):
             self.update(problems=MappingProxyType(kept))
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 DESCRIPTION = """\
 Runs the virtual controller of an arm. Any client of the maker's interface can connect to it: this package, or a C++
 program that uses the vendor's client library. It prints one line when it is ready, a second one with the address of its
-world port, and ends on Ctrl-C.
+simulation port, and ends on Ctrl-C.
 """
 
 _OPTIONS = {"limit table": "--limits", "client_host": "--client", "client_port": "--client"}
@@ -85,10 +85,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_world_options(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("world port", "control of the simulated environment of the robot")
+    group = parser.add_argument_group("simulation port", "control of the simulated environment of the robot")
     choice = group.add_mutually_exclusive_group()
     choice.add_argument("--world-port", type=int, default=0, metavar="N", help="TCP port, on loopback (any free one)")
-    choice.add_argument("--no-world", action="store_true", help="no world port")
+    choice.add_argument("--no-world", action="store_true", help="no simulation port")
 
 
 def _add_network_options(parser: argparse.ArgumentParser) -> None:

@@ -23,11 +23,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "world",
         help="push a virtual robot, place an obstacle, press its emergency stop",
-        description="Controls the simulated environment of a virtual robot through its world port.",
+        description="Controls the simulated environment of a virtual robot through its simulation port.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("address", metavar="ADDRESS", help="world port, HOST:PORT, as the controller prints it")
+    parser.add_argument("address", metavar="ADDRESS", help="simulation port, HOST:PORT, as the controller prints it")
     parser.add_argument("request", metavar="REQUEST", help="request, such as push, place_box, press or status")
     parser.add_argument(
         "fields", nargs="*", metavar="FIELD=VALUE", default=[], help="arguments; values are JSON or plain words"

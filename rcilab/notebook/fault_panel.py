@@ -107,9 +107,9 @@ class FaultPanel(Part):
     def _tell(self) -> None:
         fault: FaultCode | None = self.fault.value  # None: an arm of no maker has no faults.
         text, demo = self.text, self._shown
-        said = self._failed
+        sentence = self._failed
         if self._work.is_busy and fault is not None:
-            said = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
+            sentence = verdict("warn", "…", text("learn.provoking", fault=fault.manual_name))
         obstacle = self._faults.obstacle(fault)
         self.moment.layout.display = "none" if demo is None else None
         if demo is not None:
@@ -118,7 +118,7 @@ class FaultPanel(Part):
             details = ("" if fault is None else _card_html(fault, text)) + soft(
                 text("fault.private") if obstacle is None else text.render(obstacle)
             )
-        write(self._shown_text, said + details)
+        write(self._shown_text, sentence + details)
         self.provoke.disabled = obstacle is not None or self._work.is_busy
 
     def _provoke(self) -> None:
@@ -137,11 +137,11 @@ class FaultPanel(Part):
         self._look()
 
     def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
-        said = self.text(code)
+        sentence = self.text(code)
         button = lean(
             ipywidgets.Button,
-            description=said,
-            tooltip=tooltip or said,
+            description=sentence,
+            tooltip=tooltip or sentence,
             icon=icon,
             layout=ipywidgets.Layout(width="auto"),
         )

@@ -66,7 +66,7 @@ class JogPanel(Part):
         rows: list[Any] = []
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
-            rows += [_row(slider, field), field.said]
+            rows += [_row(slider, field), field.sentence]
         buttons = [self._button(name) for name in _BUTTONS]
         self._pose, self._reach = block(), block()
         self.build([*rows, lean(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")

@@ -164,5 +164,5 @@ class Lab(Part):
         write(self._title, f'<span class="rl-title">rcilab · {esc(self.model.name)}</span>{chips}')
 
 
-def _chip(tone: Tone, said: str) -> str:
-    return f'<span class="rl-chip rl-{tone}">{esc(said)}</span>'
+def _chip(tone: Tone, sentence: str) -> str:
+    return f'<span class="rl-chip rl-{tone}">{esc(sentence)}</span>'

@@ -59,14 +59,14 @@ class LimitFields:
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
         self._inside: Any = lean(ipywidgets.VBox, [])
-        self.said, self._lack = block(), block()
+        self.sentence, self._lack = block(), block()
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         rows = [
             block(soft(text("softlimits.hint"))),
             self._lack,
             self._inside,
             lean(ipywidgets.HBox, [self.send, self.whole]),
-            self.said,
+            self.sentence,
             self._answers,
             self.auto,
             block(soft(text("softlimits.note"))),
@@ -103,19 +103,19 @@ class LimitFields:
         asked, self._asked = self._asked, None
         if error is None and asked is not None:
             self._state.limit_joints(asked.lower, asked.upper)
-            write(self.said, soft(self._text("softlimits.taken")))
+            write(self.sentence, soft(self._text("softlimits.taken")))
 
     def _propose(self, lower: list[float], upper: list[float]) -> None:
         joints = joint_limits_between(lower, upper)
         if isinstance(joints, Message):
-            write(self.said, problem(self._text.render(joints)))
+            write(self.sentence, problem(self._text.render(joints)))
             return
         self._asked = joints
         now = self._state.now
         if now.is_virtual:
             self._give()
             return
-        write(self.said, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
+        write(self.sentence, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
         self._answers.layout.display = None
 
     def _propose_whole(self) -> None:
@@ -124,7 +124,7 @@ class LimitFields:
 
     def _give(self) -> None:
         self._answers.layout.display = "none"
-        write(self.said, "")
+        write(self.sentence, "")
         asked = self._asked
         if asked is not None:
             self._send("limits", lambda robot: robot.set_up(RobotConfiguration(joints=asked)))
@@ -133,7 +133,7 @@ class LimitFields:
         if self._answers.layout.display is None:
             self._asked = None
             self._answers.layout.display = "none"
-            write(self.said, "")
+            write(self.sentence, "")
 
     def _on_auto(self, change: Any) -> None:
         if not self._writing:
@@ -149,7 +149,7 @@ class LimitFields:
         for joint, (least, largest) in enumerate(zip(np.degrees(own.lower), np.degrees(own.upper), strict=True)):
             low, high = self._field("lower", joint, least, largest), self._field("upper", joint, least, largest)
             self.fields.append((low, high))
-            rows += [lean(ipywidgets.HBox, [*low.cells, *high.cells]), low.said, high.said]
+            rows += [lean(ipywidgets.HBox, [*low.cells, *high.cells]), low.sentence, high.sentence]
         self._fill(self._state.model.limits.joint)
         self._inside.children = tuple(rows)
         self.show(self._state.status)

@@ -128,7 +128,7 @@ class ModeFields:
                 fields = self.fields[group.name] = [self._field(group, index) for index in range(len(group.parameters))]
                 self._fill(group)
                 inside.children = tuple(
-                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.said]) for field in fields
+                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.sentence]) for field in fields
                 )
 
         folder.observe(open_it, names="selected_index")

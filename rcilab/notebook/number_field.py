@@ -56,7 +56,7 @@ class NumberField:
             continuous_update=False, layout={"width": box}, style={"description_width": before},
         )  # fmt: skip
         self.unit: Any = lean(ipywidgets.Label, unit, layout={"width": behind})
-        self.said: Any = block()
+        self.sentence: Any = block()
         self.box.observe(self._on_typed, names="value")
 
     @property
@@ -67,12 +67,12 @@ class NumberField:
     @property
     def problem(self) -> bool:
         """Whether the text of the field was refused."""
-        return bool(self.said.value)
+        return bool(self.sentence.value)
 
     def show(self, value: float) -> None:
         """Shows a number in place of the text."""
         self._shown = self._write(value)
-        write(self.said, "")
+        write(self.sentence, "")
         if self.box.value != self._shown:
             self.box.value = self._shown
 
@@ -87,9 +87,9 @@ class NumberField:
         parsed = parse_number(change["new"], self._low, self._high, self._unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            write(self.said, problem(self._text.render(parsed.problem)))
+            write(self.sentence, problem(self._text.render(parsed.problem)))
             return
-        write(self.said, "")
+        write(self.sentence, "")
         self._shown = change["new"]  # This text was meant: a rounded number may follow.
         self._take(parsed.value)
 

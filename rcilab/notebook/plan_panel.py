@@ -76,7 +76,7 @@ class PlanPanel(Part):
         self.build([
             self.way,
             lean(ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}),
-            self._speed_field.said,
+            self._speed_field.sentence,
             self.law,
             block(soft(text("target.law_hint"))),
             lean(
@@ -155,20 +155,22 @@ class PlanPanel(Part):
         self.plan.disabled = self.slow_down.disabled = self._work.is_busy
         self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
-            said = "" if state.now.no_plan is None else verdict("warn", "▲", text.render(state.now.no_plan))
-            write(self._said, said or soft(text("plan.none", button=text("target.plan"))))
+            sentence = "" if state.now.no_plan is None else verdict("warn", "▲", text.render(state.now.no_plan))
+            write(self._said, sentence or soft(text("plan.none", button=text("target.plan"))))
             return
         report = plan.report
         tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
-        said = text("plan.ready", duration=f"{plan.motion.duration:.3f}")
+        sentence = text("plan.ready", duration=f"{plan.motion.duration:.3f}")
         if not report.ok:
-            said += " " + text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            sentence += " " + text(
+                "check.failed_long", conditions=report.broken_conditions, count=len(report.violations)
+            )
         elif plan.short is not None:
             tone, word = "warn", "target.not_there"
-            said += " " + text("target.leads_short", short=text.render(plan.short))
+            sentence += " " + text("target.leads_short", short=text.render(plan.short))
         if not state.is_goal_of_plan and plan.short is None:
-            said += " " + text("plan.moved")
-        write(self._said, verdict(tone, text(word), said) + self._describe_slowing(plan))
+            sentence += " " + text("plan.moved")
+        write(self._said, verdict(tone, text(word), sentence) + self._describe_slowing(plan))
 
     def _is_to_slow_down(self, plan: Plan) -> bool:
         """Whether the plan violates a condition, or a recommendation that was not left over by a slow-down."""
@@ -179,5 +181,5 @@ class PlanPanel(Part):
         if self._slowed is None or self._slowed[0] is not plan:
             return ""
         found = self._slowed[1]
-        said = found.explain(self.text.language)
-        return soft(said) if found.ok else problem(said)
+        sentence = found.explain(self.text.language)
+        return soft(sentence) if found.ok else problem(sentence)

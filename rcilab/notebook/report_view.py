@@ -48,11 +48,11 @@ class ReportView(Part):
         unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
         if report.ok:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
-            said = verdict("good", text("check.passed"), text(code, count=unheeded))
+            sentence = verdict("good", text("check.passed"), text(code, count=unheeded))
         else:
             failed = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
-            said = verdict("bad", text("check.failed"), failed)
-        write(self._verdict, said + soft(text("check.note")))
+            sentence = verdict("bad", text("check.failed"), failed)
+        write(self._verdict, sentence + soft(text("check.note")))
         broken = "".join(
             f"<li>{esc(explain_violation(violation, text.language))}</li>" for violation in report.violations[:_LISTED]
         )

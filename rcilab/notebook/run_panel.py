@@ -263,10 +263,10 @@ class RunPanel(Part):
             self.limits.take(outcome.error)
         if outcome.what in ("execute", "cell"):
             self.state.take(outcome)
-        said = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
+        sentence = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
         if outcome.what == "cell":
-            said += soft(self.text("run.of_cell"))
-        write(self._outcome, said)
+            sentence += soft(self.text("run.of_cell"))
+        write(self._outcome, sentence)
 
     def _on_plan(self) -> None:
         self._forget_question()

@@ -98,6 +98,6 @@ class SignalFields:
         return "—" if level is None else self._text("signals.on" if level else "signals.off")
 
     def _ask(self, is_asked: bool) -> None:
-        said = verdict("warn", "▲", self._text("reboot.ask", address=self._address)) if is_asked else ""
-        write(self._question, said)
+        sentence = verdict("warn", "▲", self._text("reboot.ask", address=self._address)) if is_asked else ""
+        write(self._question, sentence)
         self._answers.layout.display = None if is_asked else "none"

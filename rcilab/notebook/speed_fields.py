@@ -46,7 +46,7 @@ class SpeedFields:
         self.buttons = [self.pause, self.resume]
         self.fields: list[Any] = [
             lean(ipywidgets.HBox, [self.slider, *self.field.cells], layout={"align_items": "center"}),
-            self.field.said,
+            self.field.sentence,
             self._way,
         ]
         hear_at_once(*self.buttons, self.slider, self.field.box)
@@ -68,8 +68,8 @@ class SpeedFields:
             finally:
                 self._writing = False
         refusal = self._state.now.drive.override_refusal
-        said = "" if not running or status is None else soft(self._describe_way(status, is_held))
-        write(self._way, said + ("" if refusal is None or not running else problem(self._text.render(refusal))))
+        sentence = "" if not running or status is None else soft(self._describe_way(status, is_held))
+        write(self._way, sentence + ("" if refusal is None or not running else problem(self._text.render(refusal))))
 
     def _describe_way(self, status: SupervisorStatus, is_held: bool) -> str:
         speed_override = f"{100.0 * status.speed_override:.0f}"

@@ -50,7 +50,7 @@ class TargetPanel(Part):
         pairs = [
             lean(
                 ipywidgets.VBox,
-                [lean(ipywidgets.HBox, [*first.cells, *second.cells]), first.said, second.said],
+                [lean(ipywidgets.HBox, [*first.cells, *second.cells]), first.sentence, second.sentence],
             )
             for first, second in zip(self.fields[:3], self.fields[3:], strict=True)
         ]
@@ -76,7 +76,7 @@ class TargetPanel(Part):
         side = lean(ipywidgets.VBox, [
             self.psi,
             lean(ipywidgets.HBox, self._psi_field.cells, layout={"align_items": "center"}),
-            self._psi_field.said,
+            self._psi_field.sentence,
             block(soft(text("target.psi_hint"))),
         ], layout={"flex": "1 1 170px", "min_width": "170px"})  # fmt: skip
         row = lean(ipywidgets.HBox, [self._circle, side], layout={"align_items": "center", "flex_flow": "row wrap"})
@@ -114,10 +114,10 @@ class TargetPanel(Part):
             for field, value in zip(self.fields, values, strict=True):
                 field.show(float(value))
             tone = goal.reach.tone
-            said = verdict(tone, text(f"reach.tone.{tone}"), text.render(goal.reach.reason))
+            sentence = verdict(tone, text(f"reach.tone.{tone}"), text.render(goal.reach.reason))
             if goal.reach.short is not None:
-                said += soft(text("target.leads_short", short=text.render(goal.reach.short)))
-            write(self._reach, said)
+                sentence += soft(text("target.leads_short", short=text.render(goal.reach.short)))
+            write(self._reach, sentence)
             if self.psi is not None:
                 self._show_arm_angle()
             self._show_branches()

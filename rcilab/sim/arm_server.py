@@ -106,7 +106,7 @@ class ArmServer:
             self._network,
             self._stalls,
             self._clock,
-            lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.strangers),
+            lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.unknown_senders),
         )
         self._simulation_port = self._open_simulation_port()
 
@@ -365,7 +365,7 @@ class ArmServer:
                 case StrangerDetected(address, client):
                     whose = f"the client is at {client}" if client else "no client is connected"
                     line = f"left out a UDP datagram from {address}, and will all others: {whose}"
-                    self._rare_lines.write("stranger", line, "were left out")
+                    self._rare_lines.write("unknown sender", line, "were left out")
                 case ClientRefused(address, holder):
                     line = f"refused another client from {address}: {holder} is connected"
                     self._rare_lines.write("refused", line, "clients were refused")

@@ -59,7 +59,7 @@ class UdpChannel:
 
     Datagrams count that come from the address of that client, or of the configured one, and from the port that states
     go to. A client that sends from another port is taken at its first datagram's, until one comes from where states go.
-    Others are strangers: they are ignored and counted.
+    Others are unknown senders: they are ignored and counted.
     """
 
     name: str = "udp_port"

@@ -25,7 +25,7 @@ from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpCh
 _LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot hold up the cycle.
 _STRANGERS_AT_ONCE = 64  # The same once the client's come to a socket of their own: the rest fills the kernel's buffer.
-_STRANGERS_TURN = 16  # [polls] From one look at what strangers sent to the next, from then on.
+_UNKNOWN_TURN = 16  # [polls] From one look at what unknown senders sent to the next, from then on.
 _FRAME_BYTES_AT_ONCE = 4096
 _BACKLOG = 8  # [connections] That wait to be accepted.
 _ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
@@ -43,8 +43,8 @@ class Endpoint:
     Attributes:
         host: Address that it listens on.
         port: TCP port of the main channel.
-        strangers: Datagrams that were ignored because they did not come from the client; of a flood, those that were
-            read: the kernel drops what its buffer has no room for.
+        unknown_senders: Datagrams that were ignored because they did not come from the client; of a flood, those that
+            were read: the kernel drops what its buffer has no room for.
 
     Args:
         host: Address to listen on.
@@ -72,14 +72,14 @@ class Endpoint:
         self._sockets: dict[Peer, socket.socket] = {}
         self._owner: Peer | None = None  # The client of the main channel whose datagrams count.
         self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
-        self._has_named_stranger = False
-        self.strangers = 0
+        self._has_named_unknown = False
+        self.unknown_senders = 0
         self._arrivals: deque[Arrival] = deque()
-        self._apart: dict[socket.socket, tuple[str, int]] = {}  # Connected to the client, which strangers cannot fill.
+        self._apart: dict[socket.socket, tuple[str, int]] = {}  # Connected to the client: full of its datagrams only.
         self._is_apart = False  # Whether the client's datagrams are known to come to one of those.
         self._polls = 0
         self._watched: list[socket.socket] = []
-        self._watched_mostly: list[socket.socket] = []  # Without the socket that then has strangers' datagrams only.
+        self._watched_mostly: list[socket.socket] = []  # Without the socket that then has unknown senders only.
         self._separate_client()
 
     @property
@@ -119,8 +119,8 @@ class Endpoint:
             extra_sockets: Sockets of other parts to be watched, too.
         """
         self._polls += 1
-        is_strangers_turn = self._polls % _STRANGERS_TURN == 0 or not self._is_apart
-        watched = [*(self._watched if is_strangers_turn else self._watched_mostly), *extra_sockets]
+        is_unknown_turn = self._polls % _UNKNOWN_TURN == 0 or not self._is_apart
+        watched = [*(self._watched if is_unknown_turn else self._watched_mostly), *extra_sockets]
         readable = select.select(watched, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
         if not (readable or self._arrivals):
             return []
@@ -204,7 +204,7 @@ class Endpoint:
     def _own(self, peer: Peer) -> None:
         """Makes a client the one whose datagrams count."""
         self._owner = peer
-        self._sender, self._has_named_stranger = None, False
+        self._sender, self._has_named_unknown = None, False
         if self._fixed_target is None and self._state_port:
             self._target = (peer.address, self._state_port)
         self._separate_client()
@@ -212,7 +212,7 @@ class Endpoint:
     def _separate_client(self) -> None:
         """Has the client's datagrams come to sockets of their own: where states go, and where it sends from.
 
-        The kernel prefers a connected socket, so that no flood of strangers displaces a command.
+        The kernel prefers a connected socket, so that no flood of unknown senders displaces a command.
         """
         self._is_apart = False
         wanted = {address for address in (self._target, self._sender) if address is not None}
@@ -233,7 +233,7 @@ class Endpoint:
         host, port = shared.getsockname()
         try:
             sock = _bind(socket.SOCK_DGRAM, host, port, channel.option)
-        except (OSError, UsageError):  # No descriptor is left: the client's stay among the strangers'.
+        except (OSError, UsageError):  # No descriptor is left: the client's stay among those of unknown senders.
             return
         try:
             sock.setblocking(False)
@@ -250,7 +250,7 @@ class Endpoint:
             if sender == address:
                 self._arrivals.append(DatagramArrived(datagram))
             else:
-                self.strangers += 1
+                self.unknown_senders += 1
 
     def _watch(self) -> None:
         shared = () if self._datagrams is None else (self._datagrams[0],)
@@ -288,9 +288,9 @@ class Endpoint:
             self._sender = sender
             self._separate_client()
             return True
-        self.strangers += 1
-        if not self._has_named_stranger:
-            self._has_named_stranger = True
+        self.unknown_senders += 1
+        if not self._has_named_unknown:
+            self._has_named_unknown = True
             self._arrivals.append(StrangerDetected("{}:{}".format(*sender), client))
         return False
 

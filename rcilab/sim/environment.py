@@ -50,7 +50,7 @@ class ServerCounters:
 
     missed: int
     bad_datagrams: int
-    strangers: int
+    unknown_senders: int
 
 
 class Environment:
@@ -162,8 +162,8 @@ class Environment:
             lost_in_row=controller.arm.playout.most_in_row,
             success_rate=controller.arm.playout.success_rate,
             missed=counters.missed,
-            misfits=counters.bad_datagrams,
-            strangers=counters.strangers,
+            bad_datagrams=counters.bad_datagrams,
+            unknown_senders=counters.unknown_senders,
             ignored=controller.ignored,
             pushed=self._push.is_on,
             stalls=self._stalls.count,

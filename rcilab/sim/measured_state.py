@@ -110,5 +110,5 @@ class MeasuredStateMonitor:
         beyond = (i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
         joint = max(beyond, key=lambda i: abs(torques[i]) / max(thresholds[i], _LEAST))
         torque, threshold = torques[joint], thresholds[joint]
-        said = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
-        return Remark(said, "collision", joint=joint + 1, value=torque, bound=threshold, unit="N m")
+        sentence = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
+        return Remark(sentence, "collision", joint=joint + 1, value=torque, bound=threshold, unit="N m")

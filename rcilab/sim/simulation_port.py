@@ -1,9 +1,9 @@
-"""The world port: a second listener, on loopback, through which things happen to the virtual robot from outside.
+"""The simulation port: a second listener, on loopback, that controls the environment of the virtual robot.
 
-For the user who started the controller; other accounts of the machine are refused. A guest that says nothing may stay
-until another one needs its place. Lines of JSON, see `rcilab.sim.api`. A client that sends a line that is no
-request gets one line that says why and is cut off, so that a web page's POST gets nowhere: its first line already is
-none, and what follows is not looked at.
+It serves the user who started the controller; other accounts of the machine are refused. An idle client stays connected
+until another one needs its slot. Requests are lines of JSON, see `rcilab.sim.api`. A client whose line is not a valid
+request gets one line with the reason and is disconnected; what follows is not read. So a web page's POST, whose first
+line is not a request, has no effect.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.api import LineReader, Refused, WorldAnswer, WorldRequest, decode_world_request, encode_world_answer
 from rcilab.sim.peer_user import is_ours
 
-MOST_GUESTS = 8  # At once. One script and one page need two.
-IDLE = 60.0  # [s] A connection that has been silent for so long gives its place to the next one.
+MAX_CLIENTS = 8  # At once. A tuning value: one script and one page need two.
+IDLE_TIMEOUT = 60.0  # [s] A connection that has been idle for longer is closed when another one needs its slot.
 _FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
 _BYTES_AT_ONCE = 4096
 
@@ -28,7 +28,7 @@ class SimulationPort:
     """Owns the listener and its connections. Never waits; owned by the thread that runs the controller.
 
     Args:
-        host: Address of the controller; the world port is there, too, if that is a loopback address.
+        host: Address of the controller; the simulation port uses it, too, if it is a loopback address.
         port: TCP port; 0 takes any free one.
         handle: Handles a request.
         clock: Returns the time, [s].
@@ -46,8 +46,8 @@ class SimulationPort:
     ) -> None:
         self._handle, self._clock = handle, clock
         self._listener = _listen(host if ipaddress.ip_address(host).is_loopback else _FALLBACK, port)
-        self._guests: dict[socket.socket, LineReader] = {}
-        self._last_message: dict[socket.socket, float] = {}  # When each guest has said something last, [s].
+        self._clients: dict[socket.socket, LineReader] = {}
+        self._last_message: dict[socket.socket, float] = {}  # Time of the last message of each client, [s].
         self.sockets: Sequence[socket.socket] = (self._listener,)
         """Sockets to poll; another object whenever it changes."""
 
@@ -62,86 +62,86 @@ class SimulationPort:
         for sock in readable:
             if sock is self._listener:
                 self._accept()
-            elif sock in self._guests:
+            elif sock in self._clients:
                 self._read(sock)
 
     def close(self) -> None:
         """Closes every socket."""
-        for sock in (*self._guests, self._listener):
+        for sock in (*self._clients, self._listener):
             sock.close()
-        self._guests.clear()
+        self._clients.clear()
         self.sockets = ()
 
     def _accept(self) -> None:
         try:
-            guest, _ = self._listener.accept()
-        except OSError:  # It was gone before we looked.
+            client, _ = self._listener.accept()
+        except OSError:  # The client has already disconnected.
             return
-        guest.setblocking(False)
-        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if not is_ours(guest):  # Before anything else: a user without access takes no place.
-            _turn_away(guest, Refused("this world port is for the user who started the controller"))
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if not is_ours(client):  # Before anything else: a user without access takes no slot.
+            _refuse(client, Refused("this simulation port is for the user who started the controller"))
             return
-        if len(self._guests) >= MOST_GUESTS:
+        if len(self._clients) >= MAX_CLIENTS:
             self._drop_idle()
-        if len(self._guests) >= MOST_GUESTS:
+        if len(self._clients) >= MAX_CLIENTS:
             full = UsageError(
-                f"all {MOST_GUESTS} places of the world port are taken; close what uses it, or try again later: one "
-                f"that has been silent for {IDLE:g} s gives its place up"
-            ).coded("world_full", most=MOST_GUESTS, seconds=f"{IDLE:g}")
-            _turn_away(guest, Refused(str(full), full.code, full.facts))
+                f"all {MAX_CLIENTS} connections of the simulation port are in use; close one, or try again later: one "
+                f"that has been idle for {IDLE_TIMEOUT:g} s is closed when another is needed"
+            ).coded("world_full", most=MAX_CLIENTS, seconds=f"{IDLE_TIMEOUT:g}")
+            _refuse(client, Refused(str(full), full.code, full.facts))
             return
-        self._guests[guest], self._last_message[guest] = LineReader(), self._clock()
-        self.sockets = (self._listener, *self._guests)
+        self._clients[client], self._last_message[client] = LineReader(), self._clock()
+        self.sockets = (self._listener, *self._clients)
 
-    def _read(self, guest: socket.socket) -> None:
+    def _read(self, client: socket.socket) -> None:
         try:
-            data = guest.recv(_BYTES_AT_ONCE)
+            data = client.recv(_BYTES_AT_ONCE)
         except BlockingIOError:
             return
         except OSError:
             data = b""
         if not data:
-            self._drop(guest)
+            self._drop(client)
             return
-        self._last_message[guest] = self._clock()
+        self._last_message[client] = self._clock()
         try:
-            for line in self._guests[guest].feed(data):
+            for line in self._clients[client].feed(data):
                 request_id, request = decode_world_request(line)
                 answer = request if isinstance(request, Refused) else self._handle(request)
-                if not self._answer(guest, answer, request_id):
+                if not self._answer(client, answer, request_id):
                     return
         except DecodeError as error:
-            if self._answer(guest, Refused(str(error)), 0):
-                self._drop(guest)
+            if self._answer(client, Refused(str(error)), 0):
+                self._drop(client)
 
-    def _answer(self, guest: socket.socket, answer: WorldAnswer, request_id: int) -> bool:
+    def _answer(self, client: socket.socket, answer: WorldAnswer, request_id: int) -> bool:
         """Sends a response; returns whether the client is still connected."""
         line = encode_world_answer(answer, request_id)
         try:
-            is_sent = guest.send(line) == len(line)
+            is_sent = client.send(line) == len(line)
         except OSError:
             is_sent = False
-        if not is_sent:  # It is gone, or does not read its answers.
-            self._drop(guest)
+        if not is_sent:  # It has disconnected, or does not read its answers.
+            self._drop(client)
         return is_sent
 
     def _drop_idle(self) -> None:
-        """Drops the client that has been idle for the longest time, if longer than `IDLE`."""
-        guest = min(self._last_message, key=self._last_message.__getitem__)
-        if self._clock() - self._last_message[guest] > IDLE:
-            self._drop(guest)
+        """Drops the client that has been idle for the longest time, if longer than `IDLE_TIMEOUT`."""
+        client = min(self._last_message, key=self._last_message.__getitem__)
+        if self._clock() - self._last_message[client] > IDLE_TIMEOUT:
+            self._drop(client)
 
-    def _drop(self, guest: socket.socket) -> None:
-        guest.close()
-        del self._guests[guest], self._last_message[guest]
-        self.sockets = (self._listener, *self._guests)
+    def _drop(self, client: socket.socket) -> None:
+        client.close()
+        del self._clients[client], self._last_message[client]
+        self.sockets = (self._listener, *self._clients)
 
 
-def _turn_away(guest: socket.socket, why: Refused) -> None:
-    with suppress(OSError):  # It is gone already.
-        guest.send(encode_world_answer(why, 0))
-    guest.close()
+def _refuse(client: socket.socket, why: Refused) -> None:
+    with suppress(OSError):  # It has already disconnected.
+        client.send(encode_world_answer(why, 0))
+    client.close()
 
 
 def _listen(host: str, port: int) -> socket.socket:
@@ -149,12 +149,12 @@ def _listen(host: str, port: int) -> socket.socket:
     try:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listener.bind((host, port))
-        listener.listen(MOST_GUESTS)
+        listener.listen(MAX_CLIENTS)
         listener.setblocking(False)
     except OSError as error:
         listener.close()
         raise UsageError(
-            f"the world port {port} on {host} cannot be used ({error.strerror}); choose another with --world-port N "
-            "(0 takes any free one), or none with --no-world"
+            f"the simulation port {port} on {host} cannot be used ({error.strerror}); choose another with "
+            "--world-port N (0 takes any free one), or none with --no-world"
         ) from error
     return listener

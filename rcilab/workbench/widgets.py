@@ -130,31 +130,31 @@ class NumberField:
                 self._is_typed, self._shown = True, self.field
             self._ask(TypeField(page=typed[2], field=typed[3], text=self._unit.complete(typed[1])))
             return
-        said = self._unit.convert(text)
-        if problem is not None and not self._is_about(problem, said):
+        sentence = self._unit.convert(text)
+        if problem is not None and not self._is_about(problem, sentence):
             self._ask(DropProblem(field=self.field))
-        elif self._is_typed and (problem is not None or self._stands(said)):
+        elif self._is_typed and (problem is not None or self._stands(sentence)):
             return
         self._is_typed, self._shown = False, self.field
         if problem is None:
             self._problem = None
-        if self._handle.value != said:
-            self._handle.value = said
+        if self._handle.value != sentence:
+            self._handle.value = sentence
 
-    def _is_about(self, problem: Message, said: str) -> bool:
+    def _is_about(self, problem: Message, sentence: str) -> bool:
         """Returns whether a problem came while the field showed this number, or the text typed in its place."""
         if problem != self._problem:
-            self._problem, self._beside = problem, said if self._shown == self.field else None
-        return self._shown == self.field and said == self._beside
+            self._problem, self._beside = problem, sentence if self._shown == self.field else None
+        return self._shown == self.field and sentence == self._beside
 
-    def _stands(self, said: str) -> bool:
+    def _stands(self, sentence: str) -> bool:
         """Returns whether the typed text stays: its answer is on its way, or has not changed since."""
         past = time.monotonic() - self._committed
         if past < _ANSWER:
             return True
         if self._answer is None:
-            self._answer = said
-        return past < self._stands_for and said == self._answer
+            self._answer = sentence
+        return past < self._stands_for and sentence == self._answer
 
 
 class PageText:

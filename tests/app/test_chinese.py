@@ -171,7 +171,7 @@ PROVOKED: dict[str, Callable[[], object]] = {
     "a table that goes back": bad_samples("t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n0,0,0,0,0,0,0\n"),
     "a table without joints": bad_samples("t,x\n0,0\n"),
     "a table of nothing": bad_samples(""),
-    "a refusal of the world port": refused_by_the_world,
+    "a refusal of the simulation port": refused_by_the_world,
     "another arm": other_arm,
     "too heavy a load": lambda: MODEL.with_load(Payload(mass=50.0)),
     "a missing pose": lambda: NamedPoseStore(MODEL, Path("/dev/null/none")).recall("bad"),

@@ -52,7 +52,7 @@ def require_rest(page) -> None:
 
 def require_room(page) -> None:
     """The arm was not stopped by a limit or by what is near, but because nobody holds the button any more."""
-    assert page.state.jog.said is None
+    assert page.state.jog.sentence is None
 
 
 def test_a_held_button_moves_the_robot_until_it_is_let_go_in_any_way(jogging):

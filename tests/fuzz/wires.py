@@ -1,4 +1,4 @@
-"""Spoilt messages over real sockets: the world port, and the websockets of the page."""
+"""Spoilt messages over real sockets: the simulation port, and the websockets of the page."""
 
 from __future__ import annotations
 

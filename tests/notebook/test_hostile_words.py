@@ -1,4 +1,4 @@
-"""Words of strangers in a notebook's parts are shown as words."""
+"""Words of unknown senders in a notebook's parts are shown as words."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ def run_program(plant: str, name: str, seconds: float) -> None:
 
 
 def run_drag(plant: str, name: str, space: int, kind: int, seconds: float) -> None:
-    """Leads the arm by hand at 1 kHz, the hand through the world port of the controller."""
+    """Leads the arm by hand at 1 kHz, the hand through the simulation port of the controller."""
     with (
         Process("--plant", plant) as controller,
         Robot(controller.host, controller.port, **_vendor()) as robot,  # type: ignore[arg-type]

@@ -109,7 +109,7 @@ def hold(jog, axis="joint.1", sign=1, page=1) -> None:
 
 
 def said(store) -> str | None:
-    return None if store.state.jog.said is None else store.state.jog.said.code
+    return None if store.state.jog.sentence is None else store.state.jog.sentence.code
 
 
 def test_no_jog_moves_the_tool_faster_than_the_reduced_speed():
@@ -138,11 +138,11 @@ def test_a_step_to_a_limit_stops_there_and_says_which():
     near[5] = MODEL.limits.joint.upper[5] - math.radians(2.0)
     led = take_step(MODEL, near, JogState(step=5.0), Axis("joint.5", 1))
     assert led.q[5] == pytest.approx(MODEL.limits.joint.upper[5], abs=2e-4)
-    assert (led.said.code, led.said.values["joint"]) == ("jog.at_upper", 6)
+    assert (led.sentence.code, led.sentence.values["joint"]) == ("jog.at_upper", 6)
     again = take_step(MODEL, led.q, JogState(step=5.0), Axis("joint.5", 1))
-    assert (again.q, again.said.code) == (None, "jog.at_upper")
+    assert (again.q, again.sentence.code) == (None, "jog.at_upper")
     back = take_step(MODEL, led.q, JogState(step=5.0), Axis("joint.5", -1))
-    assert back.said is None
+    assert back.sentence is None
 
 
 def test_a_held_button_moves_the_goal_as_the_robot_would_go_and_undo_brings_it_back(jog, store, session):
@@ -379,7 +379,7 @@ def test_a_step_that_would_swing_the_arm_is_refused(store):
     q = np.radians([-134.2, -43.0, 90.4, 21.6, -83.6, 44.7])
     led = take_step(model, q, JogState(step=1.0, frame="base"), Axis("pitch", 1))
     if led.q is None:
-        assert led.said.code in ("jog.far", "jog.no_way")
+        assert led.sentence.code in ("jog.far", "jog.no_way")
     else:
         assert np.abs(led.q - q).max() < np.radians(20.0)
 

@@ -153,14 +153,14 @@ class CheckActions:
         slowed = Slowed(before=state.plan, after=result.plan, speed=state.speed, draft=result.draft)
         if result.draft is not None:
             self._program.exchange(result.draft, result.plan)
-            said = message("check.slowed_program", **facts, scale=f"{100 * result.scale:.1f}")
+            sentence = message("check.slowed_program", **facts, scale=f"{100 * result.scale:.1f}")
         else:
             self._store.update(plan=result.plan, speed=speed, recording=None, place=0.0, playing=False)
-            said = message("check.slowed", **facts, from_=f"{100 * state.speed:.1f}", to=f"{100 * speed:.1f}")
+            sentence = message("check.slowed", **facts, from_=f"{100 * state.speed:.1f}", to=f"{100 * speed:.1f}")
         if result.is_stretched:
-            said = message("check.stretched", **facts)
+            sentence = message("check.stretched", **facts)
         self._set(slowed=slowed)
-        self._answer("good", said)
+        self._answer("good", sentence)
 
     def _undo(self) -> None:
         """Restores the plan before the slow-down."""

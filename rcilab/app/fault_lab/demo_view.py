@@ -61,7 +61,7 @@ def body_html(demo: FaultDemo, text: Text) -> str:
         ),
         *((("learn.manual", escape(text(manual, number=demo.fault.value))),) if text.has(manual) else ()),
         ("learn.way_out", f'<ol class="rl-steps-out">{steps}</ol>{executed}'),
-        ("learn.said", f"<code>{escape(text.render(describe_note(demo.said)))}</code>"),
+        ("learn.said", f"<code>{escape(text.render(describe_note(demo.sentence)))}</code>"),
     )
     table = "".join(f"<tr><th>{escape(text(key))}</th><td>{cell}</td></tr>" for key, cell in rows)
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-demo">{table}</table>'

@@ -41,7 +41,7 @@ class FaultDemo:
     """The limits of the check, with their scaling."""
     reported: tuple[FaultCode, ...]
     """Every error bit that was set in that cycle, in wire order."""
-    said: str
+    sentence: str
     """The controller's own sentence, with its numbers."""
     cycles: NDArray[np.void]
     """Recorded cycles from the first command on (`core.cycle_log.cycle_dtype`); the last one shows the fault."""
@@ -189,7 +189,7 @@ class FaultDemo:
         return self.explain()
 
     def __repr__(self) -> str:
-        return f"<FaultDemo {self.fault.manual_name} at t = {self.time:.3f} s: {self.said}>"
+        return f"<FaultDemo {self.fault.manual_name} at t = {self.time:.3f} s: {self.sentence}>"
 
 
 def script(fault: FaultCode, model: str) -> str:

@@ -77,8 +77,8 @@ class FaultLab(Closeable):
             raise UsageError(f"{self.model.name}: there is no scenario for {known.manual_name}")
         scenario = self.faults[known]
         if scenario.needs_elbow and not self.model.redundancy:
-            said = f"{scenario.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
-            raise UsageError(said).coded("no_psi")
+            sentence = f"{scenario.fault.manual_name} takes an arm of 7 axes; {self.model.name} has no elbow angle"
+            raise UsageError(sentence).coded("no_psi")
         try:
             return self._provoke(scenario, progress)
         except BaseException:
@@ -133,7 +133,7 @@ class FaultLab(Closeable):
             model=self.model,
             limits=scene.limits,
             reported=tuple(bit for bit in fault.faults if isinstance(bit, FaultCode)),
-            said=status.reason,
+            sentence=status.reason,
             cycles=rows,
             after=after,
             signal=signal,

@@ -107,7 +107,7 @@ class JogActions:
             changes["speed"] = min(max(request.speed, SLOWEST), 1.0)
         if request.robot is not None:
             is_asked = request.robot and state.target != "virtual" and not (request.agreed and state.jog.asked)
-            changes |= {"robot": request.robot and not is_asked, "asked": is_asked, "said": None}
+            changes |= {"robot": request.robot and not is_asked, "asked": is_asked, "sentence": None}
         self.release()
         change_jog(self._store, **changes)
 
@@ -164,7 +164,7 @@ class JogActions:
 
     def _begin_preview(self, axis: Axis) -> bool:
         state = self._store.state
-        change_jog(self._store, said=None)
+        change_jog(self._store, sentence=None)
         self._store.remember()
         q = inside(state.model, state.goal.q)
         self._preview = Jog(state.model, q)
@@ -185,12 +185,12 @@ class JogActions:
         if press is None:
             self._preview = None if preview.is_stationary else preview
         elif float(np.abs(preview.dq).max()) < STILL:
-            change_jog(self._store, said=at_limit(state.model, preview.q, press.axis))
+            change_jog(self._store, sentence=at_limit(state.model, preview.q, press.axis))
 
     def _step_goal(self, axis: Axis) -> None:
         state = self._store.state
         led = take_step(state.model, state.goal.q, state.jog, axis)
-        change_jog(self._store, said=led.said)
+        change_jog(self._store, sentence=led.sentence)
         if led.q is not None:
             self._store.remember()
             self._goal.pose(led.q)
@@ -200,4 +200,4 @@ class JogActions:
         self.release()
         self._preview = None
         self._robot.forget()
-        change_jog(self._store, robot=False, asked=False, said=None)
+        change_jog(self._store, robot=False, asked=False, sentence=None)

@@ -93,7 +93,7 @@ class JogState:
     frame: Frame = "base"
     speed: float = 0.3
     """Share of the fastest jog, 0 to 1."""
-    said: Message | None = None
+    sentence: Message | None = None
     """Why the last jog stopped or was refused."""
     poses: tuple[str, ...] = ()
     """Names of the stored poses of this arm."""

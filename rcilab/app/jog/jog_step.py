@@ -28,7 +28,7 @@ class Step:
 
     q: JointVector | None
     """Shape (n,), [rad]; None: no step."""
-    said: Message | None = None
+    sentence: Message | None = None
     """The limit that prevents it, or why there is no step."""
 
 

@@ -59,7 +59,7 @@ class RobotJog:
         """Returns whether a button may move the robot now; shows why not."""
         state = self._store.state
         reason = no_jog(state, self._session.status())
-        change_jog(self._store, said=reason)
+        change_jog(self._store, sentence=reason)
         if reason is not None:
             return False
         if self._request is None or self._request.done:
@@ -84,12 +84,12 @@ class RobotJog:
         room = box_share(state.model, status.q_c, kind, values, state.setup.wanted.box)
         if room < STANDING:
             self.let_go()
-            change_jog(self._store, said=message("jog.box"))
+            change_jog(self._store, sentence=message("jog.box"))
             return False
         if share < STANDING:
             self.let_go()
             first, second = (message(f"link.{link_name(link).split()[0]}", number=link) for link in links)
-            change_jog(self._store, said=message("jog.near", first=first, second=second, distance=ADVISED_DISTANCE))
+            change_jog(self._store, sentence=message("jog.near", first=first, second=second, distance=ADVISED_DISTANCE))
             return False
         try:
             continues = None if request is None or request.done else request
@@ -97,7 +97,7 @@ class RobotJog:
                 kind, min(share, room) * values, continues=continues, stops=stops
             )
         except RcilabError as error:
-            change_jog(self._store, said=explain_error(error, status))
+            change_jog(self._store, sentence=explain_error(error, status))
             return False
         return True
 
@@ -116,10 +116,10 @@ class RobotJog:
         state, status = self._store.state, self._session.status()
         reason = no_jog(state, status) or (message("ready.moving") if is_moving(status) else None)
         if reason is not None or status.q_c is None:
-            change_jog(self._store, said=reason)
+            change_jog(self._store, sentence=reason)
             return
         led = take_step(state.model, status.q_c, state.jog, axis)
-        change_jog(self._store, said=led.said)
+        change_jog(self._store, sentence=led.sentence)
         if led.q is None:
             return
         share = state.jog.speed * FASTEST_JOINT / float(state.model.limits.joint.velocity.max())
@@ -128,17 +128,17 @@ class RobotJog:
         if isinstance(made, Plan) and (fast := fastest_tool(made) / FASTEST_TOOL) > 1.0:
             made = make_plan(state.model, status.q_c, led.q, share / fast, "jerk_limited", box)
         if not isinstance(made, Plan):
-            change_jog(self._store, said=made)
+            change_jog(self._store, sentence=made)
             return
         report = made.completed().report
         if report.certificate is None:
             broken = message(f"condition.{report.violations[0].condition.id}")
-            change_jog(self._store, said=message("jog.unsafe", condition=broken))
+            change_jog(self._store, sentence=message("jog.unsafe", condition=broken))
             return
         try:
             request = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
         except RcilabError as error:
-            change_jog(self._store, said=explain_error(error, status))
+            change_jog(self._store, sentence=explain_error(error, status))
             return
         self._store.remember()
         self._followed, self._request = None, request
@@ -157,8 +157,8 @@ class RobotJog:
             speed = float(np.abs(status.dq).max())
             if axis is not None or speed > STILL:
                 self._follow(status.q_c)
-            if axis is not None and speed < STILL and self._store.state.jog.said is None:
-                change_jog(self._store, said=at_limit(self._store.state.model, status.q_c, axis))
+            if axis is not None and speed < STILL and self._store.state.jog.sentence is None:
+                change_jog(self._store, sentence=at_limit(self._store.state.model, status.q_c, axis))
         if not request.done or is_moving(status):
             return True
         self._end(request, status)
@@ -178,4 +178,6 @@ class RobotJog:
         self._request = self._followed = None
         if request.error is not None:
             is_stopped = status.phase == "idle"
-            change_jog(self._store, said=message("jog.stopped") if is_stopped else explain_error(request.error, status))
+            change_jog(
+                self._store, sentence=message("jog.stopped") if is_stopped else explain_error(request.error, status)
+            )

@@ -228,6 +228,10 @@ def _describe_approach(job: Job, plan: Plan) -> Message:
     return message("program.approach", joint=joint + 1, angle=float(travel[joint]), duration=f"{duration:.2f}")
 
 
-def _together(said: list[Message]) -> Message | None:
+def _together(sentence: list[Message]) -> Message | None:
     """Returns the messages about a plan as one message."""
-    return reduce(lambda first, second: message("program.both", first=first, second=second), said) if said else None
+    return (
+        reduce(lambda first, second: message("program.both", first=first, second=second), sentence)
+        if sentence
+        else None
+    )

@@ -129,8 +129,8 @@ class ExportActions:
             traceback.print_exc(file=sys.stderr)
             self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
-            said = message("export.done" if is_sent else "export.unsent", file=file_name(run, ending), size=size)
-            self._store.say("good" if is_sent else "warn", said)
+            sentence = message("export.done" if is_sent else "export.unsent", file=file_name(run, ending), size=size)
+            self._store.say("good" if is_sent else "warn", sentence)
         finally:
             self._store.update(export=None)
 

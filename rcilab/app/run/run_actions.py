@@ -237,8 +237,8 @@ class RunActions:
                 self._powered = False  # The next virtual controller starts without motor power.
             self._trouble = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
-                said = describe_incident(status.incident.code, status.incident.message, status)
-                self._store.say("bad", said, trouble=ROBOT_TROUBLE)
+                sentence = describe_incident(status.incident.code, status.incident.message, status)
+                self._store.say("bad", sentence, trouble=ROBOT_TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.say("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
@@ -351,7 +351,7 @@ def _unasked(state: UiState) -> dict[str, object]:
     """Returns the changes that drop all questions, confirmations and refusals of the previous robot."""
     return {
         "setup": replace(state.setup, asked=None, refusal=None),
-        "jog": replace(state.jog, robot=False, asked=False, said=None),
+        "jog": replace(state.jog, robot=False, asked=False, sentence=None),
         "drive": replace(state.drive, refusal=None),
         "typed_address": "",
         "world": replace(state.world, status=None),

@@ -129,11 +129,11 @@ class WorldActions:
         error = self._watch.pop_error()
         if error is not None:
             self._store.say("bad", explain_error(error))
-        is_settled, world, said = self._watch.is_settled, self._store.state.world, self._watch.status
-        if said is not world.status:
-            world = replace(world, status=said)
-        if is_settled and said is not None and said.auto_limit not in (None, world.auto_limit):
-            world = replace(world, auto_limit=said.auto_limit)  # Another client or a restart may have changed it.
+        is_settled, world, sentence = self._watch.is_settled, self._store.state.world, self._watch.status
+        if sentence is not world.status:
+            world = replace(world, status=sentence)
+        if is_settled and sentence is not None and sentence.auto_limit not in (None, world.auto_limit):
+            world = replace(world, auto_limit=sentence.auto_limit)  # Another client or a restart may have changed it.
         if world is not self._store.state.world:
             self._store.update(world=world)
 

@@ -56,9 +56,9 @@ class WorldStatus:
     """As the state says it, 0 to 1."""
     missed: int = 0
     """Cycles that the controller's process was too late for and left out."""
-    misfits: int = 0
+    bad_datagrams: int = 0
     """Datagrams that had not the size of a command."""
-    strangers: int = 0
+    unknown_senders: int = 0
     """Datagrams that did not come from the client."""
     ignored: int = 0
     """Commands that arrived while none was expected."""
@@ -76,7 +76,7 @@ class WorldStatus:
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
 
-_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "misfits", "strangers", "ignored", "stalls")
+_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "bad_datagrams", "unknown_senders", "ignored", "stalls")
 _LARGEST_COUNT = 2**63
 
 
@@ -119,9 +119,9 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
     return WorldStatus(**checked)
 
 
-def _reason(said: object, coded: object) -> str:
+def _reason(sentence: object, coded: object) -> str:
     try:
-        return _text(said) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
+        return _text(sentence) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
     except (AttributeError, LookupError, RecursionError) as error:
         raise TypeError(f"{coded!r} is no remark") from error
 

@@ -79,8 +79,8 @@ class CartesianGenerator:
             if error is not None:
                 return _invalid_pose(Remark(error, "no_pose"))
             if self._has_psi and command.has_psi and not abs(command.psi) <= pi + ARM_ANGLE_TOLERANCE:
-                said = f"arm angle: commanded position {command.psi} rad passes +-pi rad"
-                remark = Remark(said, "arm_angle", value=command.psi, bound=pi, unit="rad")
+                sentence = f"arm angle: commanded position {command.psi} rad passes +-pi rad"
+                remark = Remark(sentence, "arm_angle", value=command.psi, bound=pi, unit="rad")
                 return GeneratorOutput(violations=(ArmViolation(ArmCondition.ARM_ANGLE_RANGE, remark),))
             values = self._read(command)
             if is_lost:

@@ -161,12 +161,12 @@ class JointReference:
         for number, (x, y, z, hardest, (lower, upper)) in enumerate(columns, 1):
             ddq = (x - 2.0 * y + z) / h2
             if abs(ddq) > hardest:
-                said = f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
-                return Remark(said, "thrown", joint=number, value=ddq, bound=hardest, unit="rad/s^2")
+                sentence = f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
+                return Remark(sentence, "thrown", joint=number, value=ddq, bound=hardest, unit="rad/s^2")
             if cycles == 0 and not lower < x < upper:
-                said = f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
+                sentence = f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
                 bound = lower if x <= lower else upper
-                return Remark(said, "beyond", joint=number, value=x, bound=bound, unit="rad")
+                return Remark(sentence, "beyond", joint=number, value=x, bound=bound, unit="rad")
         return None
 
     def _check(self, q: list[float], cycles: int) -> GeneratorOutput:

@@ -118,21 +118,21 @@ def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolera
 
 def _jump(begins: float, stands: float, bound: float, joint: int) -> Remark:
     off = abs(begins - stands)
-    said = (
+    sentence = (
         f"joint {joint}: the first command of the motion is {degrees(begins):.4f}° and the arm's reference is "
         f"{degrees(stands):.4f}°, {degrees(off):.3g}° apart, more than {degrees(bound):.3g}°; "
         "begin at the commanded joint angles in the state"
     )
-    return Remark(said, "start_joint", joint=joint, begins=begins, stands=stands, off=off, bound=bound)
+    return Remark(sentence, "start_joint", joint=joint, begins=begins, stands=stands, off=off, bound=bound)
 
 
 def _tool_jump(code: str, what: str, off: float, bound: float) -> Remark:
     scale, unit = (1e3, " mm") if what == "position" else (degrees(1.0), "°")
-    said = (
+    sentence = (
         f"the first commanded {what} of the motion is {scale * off:.4g}{unit} from the arm's reference, more than "
         f"{scale * bound:.3g}{unit}; begin at the commanded pose and arm angle in the state"
     )
-    return Remark(said, code, off=off, bound=bound)
+    return Remark(sentence, code, off=off, bound=bound)
 
 
 class Stepping(Protocol):

@@ -66,11 +66,11 @@ class BranchesPanel:
         sign = "▲ " if least.angle < NEAR_LIMIT else ""
         cells = (f"{number}", f"{sign}{left}", f"J{least.joint}", away)
         angles = " · ".join(f"J{j + 1} {self._text.units.format_angle(float(q[j]), 0)}" for j in joints)
-        said = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
-        said += f": {angles}" if angles else ""
+        sentence = self._text("target.branch_said", number=cells[0], margin=cells[1], joint=cells[2], away=cells[3])
+        sentence += f": {angles}" if angles else ""
         return (
             f'<div class="rl-branch" role="option" tabindex="{0 if chosen or number == 1 else -1}" '
-            f'data-branch="{at}" aria-selected="{str(chosen).lower()}" aria-label="{esc(said)}">'
+            f'data-branch="{at}" aria-selected="{str(chosen).lower()}" aria-label="{esc(sentence)}">'
             + "".join(f"<span>{esc(cell)}</span>" for cell in cells)
             + (f"<small>{esc(angles)}</small></div>" if angles else "</div>")
         )

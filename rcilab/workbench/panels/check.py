@@ -99,8 +99,8 @@ class CheckPanel:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))
         else:
-            said = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
-            headline = ("bad", "", "check.failed", said)
+            sentence = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            headline = ("bad", "", "check.failed", sentence)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
         if aside is not None:
@@ -113,15 +113,15 @@ class CheckPanel:
 
     def _answers(self, state: UiState, plan: Plan) -> str:
         """Returns the result of the slow-down, and the report in sentences, if they are about this plan."""
-        check, said = state.check, ""
+        check, sentence = state.check, ""
         if check.answer is not None and check.about is plan.report:
             answer = esc(self._text.render(check.answer))
             if check.found is not None:
                 answer += f" {esc(check.found.explain(self._text.language))}"
-            said += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'
+            sentence += f'<p class="rl-verdict rl-{check.tone}" role="status">{answer}</p>'
         if check.explained is not None and check.explained[0] is plan.report:
             report, slowed = check.explained
             first, *rest = report.explain(self._text.language, self._text.units, slowed=slowed).splitlines()
             lines = "".join(f"<li>{esc(line.removeprefix('- '))}</li>" for line in rest)
-            said += f'<div class="rl-words"><p>{esc(first)}</p><ul class="rl-list">{lines}</ul></div>'
-        return said
+            sentence += f'<div class="rl-words"><p>{esc(first)}</p><ul class="rl-list">{lines}</ul></div>'
+        return sentence

@@ -60,17 +60,19 @@ class ElbowPanel:
             self._drawn = elbow, is_nearest
             self._ring.show(no_ring_html(state.model.redundancy, self._text) if elbow is None
                             else ring_html(elbow, self._text, is_nearest=is_nearest))  # fmt: skip
-        said = problems_html(state, self._text, [("psi", "ψ")])
+        sentence = problems_html(state, self._text, [("psi", "ψ")])
         if goal.snapped is not None:
-            said += f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
-        self._said.show(said)
+            sentence += (
+                f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
+            )
+        self._said.show(sentence)
 
 
 def no_ring_html(redundancy: Redundancy, text: Text) -> str:
     """Returns why there is no circle: the pose has none, or the arm has none."""
     joint = redundancy.joint
-    said = text("elbow.none") if joint is None else text("elbow.no_circle", joint=joint)
-    return f'<p class="rl-note">{esc(said)}</p>'
+    sentence = text("elbow.none") if joint is None else text("elbow.no_circle", joint=joint)
+    return f'<p class="rl-note">{esc(sentence)}</p>'
 
 
 def ring_html(elbow: Elbow, text: Text, *, is_nearest: bool = False) -> str:

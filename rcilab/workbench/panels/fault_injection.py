@@ -71,9 +71,9 @@ class FaultInjectionPanel:
         for name, button in self._buttons.items():
             button.disabled = not ours or name == pressed
         missing = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
-        said = text(f"safety.{pressed}_is") if ours else missing
+        sentence = text(f"safety.{pressed}_is") if ours else missing
         tone = "good" if ours and pressed == "none" else "warn"
-        self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(said)}</p>')
+        self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(sentence)}</p>')
         for name, slider in self._sliders.items():
             slider.show(round(getattr(world.network, name) * _SCALE[NETWORK_LAB[name][1]], 3))
             slider.handle.disabled = not ours or world.pulled

@@ -102,8 +102,8 @@ class JogPanel:
             ends = float(limits.lower[joint]), float(limits.upper[joint])
             self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
-        said = problems_html(state, self._text, fields) + said_html(state, status, self._text)
-        self._said.show(f'<div class="rl-slot">{said}</div>')
+        sentence = problems_html(state, self._text, fields) + said_html(state, status, self._text)
+        self._said.show(f'<div class="rl-slot">{sentence}</div>')
 
 
 def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:
@@ -129,8 +129,8 @@ def note_html(state: UiState, text: Text) -> str:
 
 def pace_html(speed: float, text: Text) -> str:
     """Returns the speed."""
-    said = text("jog.pace", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
-    return f'<p class="rl-pace">{esc(said)}</p>'
+    sentence = text("jog.pace", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
+    return f'<p class="rl-pace">{esc(sentence)}</p>'
 
 
 def margin_html(angle: float, low: float, high: float, text: Text) -> str:
@@ -138,21 +138,21 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
     left = max(min(angle - low, high - angle), 0.0)
     tone, sign = ("bad", "◆ ") if left < 1e-3 else ("warn", "▲ ") if left < NEAR_LIMIT else ("good", "")
     share = 100.0 * min(left / (0.5 * (high - low)), 1.0)
-    said = sign + text("jog.left", angle=text.units.format_angle(left, 0 if tone == "good" else 1))
+    sentence = sign + text("jog.left", angle=text.units.format_angle(left, 0 if tone == "good" else 1))
     ends = [text.units.format(bound, "rad.0f#") for bound in (low, high)]
     return (
         f'<div class="rl-margin rl-{tone}"><span>{ends[0]}</span><i class="rl-meter"><i style="width:{share:.0f}%">'
-        f"</i></i><b>{esc(said)}</b><span>{ends[1]}</span></div>"
+        f"</i></i><b>{esc(sentence)}</b><span>{ends[1]}</span></div>"
     )
 
 
 def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns why a jog cannot begin, what ended the last one, or else the message on the goal."""
     reason = no_jog(state, status) if state.jog.robot else None
-    said = reason or state.jog.said
-    if said is None:
+    sentence = reason or state.jog.sentence
+    if sentence is None:
         return reach_html(state, text)
-    return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.render(said))}</p>'
+    return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.render(sentence))}</p>'
 
 
 def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> str:

@@ -50,8 +50,8 @@ class LearnPanel:
         note = text("learn.note") if self._faults else text("learn.no_scenarios", model=state.model.name)
         note = f'<p class="rl-note">{esc(note)}</p>'
         if learn.provoking is not None:
-            said = text("learn.provoking", fault=learn.provoking.manual_name)
-            note = f'<p class="rl-verdict rl-warn" role="status">{esc(said)}</p>'
+            sentence = text("learn.provoking", fault=learn.provoking.manual_name)
+            note = f'<p class="rl-verdict rl-warn" role="status">{esc(sentence)}</p>'
         if learn.problem is not None:
             note += f'<p class="rl-problem" role="alert">{esc(text.render(learn.problem))}</p>'
         self._head.show("" if away else note)

@@ -75,8 +75,8 @@ class ModePanel:
         self._mode.show(self._names[drive.mode])
         self._mode.handle.disabled = is_moving(status) or is_only_planned(state.model)
         lack = explain_lack(state.model, drive.mode)
-        said = text(f"mode.{drive.mode}_note") if lack is None else text.render(lack)
-        self._note.show(f'<p class="rl-note">{esc(said)}</p>')
+        sentence = text(f"mode.{drive.mode}_note") if lack is None else text.render(lack)
+        self._note.show(f'<p class="rl-note">{esc(sentence)}</p>')
         for group in self._groups:
             folder, visible = self._folders[group.name], drive.mode in group.modes
             if folder.visible != visible:

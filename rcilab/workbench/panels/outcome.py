@@ -25,13 +25,13 @@ def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         return _bar(state.program.progress)
     if status.code not in ("moving", "moving.held") or status.motion_plan_time is None or not status.motion_duration:
         return ""
-    said = text(
+    sentence = text(
         "run.way", place=f"{status.motion_plan_time:.1f}", speed_override=f"{100.0 * status.speed_override:.0f}"
     )
     if status.code == "moving.held":
-        said = text("run.held", place=f"{status.motion_plan_time:.1f}")
+        sentence = text("run.held", place=f"{status.motion_plan_time:.1f}")
     share = min(max(status.motion_plan_time / status.motion_duration, 0.0), 1.0)
-    return f'<p class="rl-note" role="status">{esc(said)}</p>{_bar(share)}'
+    return f'<p class="rl-note" role="status">{esc(sentence)}</p>{_bar(share)}'
 
 
 def _bar(share: float) -> str:

@@ -109,20 +109,20 @@ class ProgramPanel:
         self._bar.visible = self._cancel.visible = planning and now - self._began > _MOMENT
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
-        said = problems_html(state, text, self._typed(program))
+        sentence = problems_html(state, text, self._typed(program))
         if FILE_FIELD in state.problems:  # The message below is about the program that the file did not replace.
-            said += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
-        elif said:  # A verdict beside it would seem to be about the number that was not taken.
-            said += f'<p class="rl-note">{esc(text("program.untaken"))}</p>'
+            sentence += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
+        elif sentence:  # A verdict beside it would seem to be about the number that was not taken.
+            sentence += f'<p class="rl-note">{esc(text("program.untaken"))}</p>'
         elif plan is not None:
             where = describe_place(plan, t)
-            said += planned_html(state, status, text)
-            said += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.render(where))}</p>'
+            sentence += planned_html(state, status, text)
+            sentence += "" if where is None else f'<p class="rl-note rl-now">▸ {esc(text.render(where))}</p>'
         elif count and not planning and program.answer is None:
-            said += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
-        if program.answer is not None and "rl-problem" not in said:
-            said += f'<p class="rl-verdict rl-{program.tone}">{esc(text.render(program.answer))}</p>'
-        self._answer.show(f'<div class="rl-room">{said}</div>' if count else said)
+            sentence += f'<p class="rl-note">{esc(self._elsewhere(draft, status))}</p>'
+        if program.answer is not None and "rl-problem" not in sentence:
+            sentence += f'<p class="rl-verdict rl-{program.tone}">{esc(text.render(program.answer))}</p>'
+        self._answer.show(f'<div class="rl-room">{sentence}</div>' if count else sentence)
 
         if program.notes is not self._noted:
             self._noted = program.notes

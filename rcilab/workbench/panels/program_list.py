@@ -39,7 +39,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         for name in _HEADS
     )
     notes = state.program.notes
-    noted = {note.key: said for note, said in zip(notes, _sentences(notes, text), strict=True)}
+    noted = {note.key: sentence for note, sentence in zip(notes, _sentences(notes, text), strict=True)}
     rows = [_start_row(draft, arm, running == 0, text)]
     for number, step in enumerate(draft.steps, start=1):
         chosen, failed = step.key == state.program.selected, step.key == state.program.failed
@@ -70,7 +70,7 @@ def notes_html(notes: tuple[Note, ...], text: Text) -> str:
         return f'<p class="rl-note">{_NOTED} {_sentences(notes, text)[0]}</p>'
     codes = {note.code for note in notes}
     code = "program.shortened" if codes == {"blend"} else "program.noted"
-    listed = "".join(f"<li>{said}</li>" for said in _sentences(notes, text))
+    listed = "".join(f"<li>{sentence}</li>" for sentence in _sentences(notes, text))
     return (
         f'<details class="rl-noted"><summary>{_NOTED} {esc(text(code, count=len(notes)))}</summary>'
         f"<ul>{listed}</ul></details>"
@@ -119,5 +119,5 @@ def _where(waypoint: Waypoint, arm: RobotModel, text: Text) -> str:
 
 
 def _lengths(position: tuple[float, ...], text: Text) -> str:
-    said = (text.units.format(number, "m.0f#") for number in position)
-    return " ".join(f"<b>{number}</b>" for number in said)
+    sentence = (text.units.format(number, "m.0f#") for number in position)
+    return " ".join(f"<b>{number}</b>" for number in sentence)

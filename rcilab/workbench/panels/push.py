@@ -100,14 +100,14 @@ class PushPanel:
         self._button.disabled = reason is not None
         soft = gives_way(status)
         if reason is None and state.plant == "ideal" and not soft:
-            said = text("push.ideal")
+            sentence = text("push.ideal")
         elif reason is None and not soft:
-            said = text("push.stiff")
+            sentence = text("push.stiff")
         else:
-            said = text("push.free") if reason is None else text.render(reason)
+            sentence = text("push.free") if reason is None else text.render(reason)
         if can_grab(state, status):
-            said += " " + text("push.drag")
-        self._note.show(f'<p class="rl-note">{esc(said)}</p>')
+            sentence += " " + text("push.drag")
+        self._note.show(f'<p class="rl-note">{esc(sentence)}</p>')
         self._felt.show(felt_html(status, text))
 
 

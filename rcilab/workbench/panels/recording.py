@@ -92,8 +92,10 @@ def summary_html(recording: Recording | None, text: Text) -> str:
 def progress_html(ending: str, share: float, text: Text) -> str:
     """Returns a progress bar, with the progress as text."""
     percent = f"{100.0 * share:.0f}"
-    said = esc(text("export.progress", kind=text(f"export.{ending[1:]}"), percent=percent))
-    return f'<p class="rl-note" role="status">{said}</p><div class="rl-meter"><i style="width:{percent}%"></i></div>'
+    sentence = esc(text("export.progress", kind=text(f"export.{ending[1:]}"), percent=percent))
+    return (
+        f'<p class="rl-note" role="status">{sentence}</p><div class="rl-meter"><i style="width:{percent}%"></i></div>'
+    )
 
 
 def _export(ending: str):  # type: ignore[no-untyped-def]

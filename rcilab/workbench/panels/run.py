@@ -113,8 +113,8 @@ class RunPanel:
         self._planned.show(planned_html(state, status, text) if is_plan_current(state, status) else "")
         self._execute.disabled = reason is not None
         question = None if reason is not None else describe_move(state)
-        said = "" if question is None else esc(text.render(question))
-        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+        sentence = "" if question is None else esc(text.render(question))
+        self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
         is_said = moving or reason in (outdated(state), connection_note(state, status))  # The bar shows that it moves.
@@ -149,8 +149,10 @@ def faults_html(status: SupervisorStatus, text: Text, world: WorldStatus | None)
         status.is_pressed or was_stop or status.code == "fault.released"
     ):  # A safety stop sets one of several bits, whose usual texts would mislead.
         names = esc(name_faults(status.faults))
-        said = f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
-        return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{said}</div>'
+        sentence = (
+            f'<div class="rl-facts">{esc(text("fault.by_stop" if status.is_pressed else "fault.was_stop"))}</div>'
+        )
+        return names and f'<div class="rl-card rl-bad"><div class="rl-line"><b>{names}</b></div>{sentence}</div>'
     return "".join(
         f'<div class="rl-card rl-bad"><div class="rl-line"><b>{esc(fault.manual_name)}</b></div>'
         f'<div class="rl-facts">{esc(text(f"fault.{fault.key}"))}</div>'

@@ -43,10 +43,10 @@ class RunsFolderPanel:
         """Follows the folder."""
         text, folder = self._text, state.folder
         self._keep = folder.keep
-        said = text("runs.none")
+        sentence = text("runs.none")
         if state.runs is not None:
-            said = text("runs.size", count=folder.count, size=megabytes(folder.size), folder=state.runs)
-        self._size.show(f'<p class="rl-note rl-path">{esc(said)}</p>')
+            sentence = text("runs.size", count=folder.count, size=megabytes(folder.size), folder=state.runs)
+        self._size.show(f'<p class="rl-note rl-path">{esc(sentence)}</p>')
         self._choice.show(self._labels[folder.keep])
         self._clear.disabled = state.runs is None or folder.count <= folder.keep
         self._yes.visible = self._no.visible = folder.asked

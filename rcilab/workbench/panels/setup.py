@@ -84,8 +84,8 @@ class SetupPanel:
         differing = differing_tool(state, status)
         if setup.asked is setup.wanted and pending:
             parts = "; ".join(f"{text(f'setup.part.{part}')}: {self._said(setup.wanted, part)}" for part in pending)
-            said = text("setup.ask", model=state.model.name, address=state.target, what=parts)
-            return f'<p class="rl-verdict rl-warn" role="alert">{esc(said)}</p>'
+            sentence = text("setup.ask", model=state.model.name, address=state.target, what=parts)
+            return f'<p class="rl-verdict rl-warn" role="alert">{esc(sentence)}</p>'
         if obstacle is not None:
             tone = "bad" if setup.refusal is not None else "warn"
             word = "setup.refused" if setup.refusal is not None else "setup.pending"

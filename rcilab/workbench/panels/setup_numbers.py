@@ -85,8 +85,8 @@ class SetupNumbersPanel:
             for field, name in zip(self._fields[part], FIELD_NAMES[part], strict=True):
                 field.disable(lack is not None)
                 number = read_field(setup, part, name)
-                said = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
-                field.show(said, state.problems.get(field.field), state.entered)
+                sentence = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
+                field.show(sentence, state.problems.get(field.field), state.entered)
             self._problems[part].show(problems_html(state, self._text, self._named[part]))
 
     def _build_numbers(self, gui: Any, part: str) -> None:

@@ -78,8 +78,8 @@ class SignalsPanel:
         self._reboot.disabled = not is_ready or unable is not None
         self._reboot.visible = not state.reboot_asked
         self._agree.visible = self._cancel.visible = state.reboot_asked
-        said = esc(text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""
-        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+        sentence = esc(text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""
+        self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
 
 
 def levels_html(model: RobotModel, status: SupervisorStatus, text: Text) -> str:

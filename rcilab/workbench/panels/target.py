@@ -54,8 +54,8 @@ class TargetPanel:
         labels.append((wxyz.field, self._text("target.wxyz")))
         problems = problems_html(state, self._text, labels)
         is_broken = state.plan is not None and not state.plan.report.ok  # Shown here, too: the rest is further down.
-        said = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_broken else "")
-        self._reach.show(f'<div class="rl-slot">{problems or said}</div>')  # A fixed height: nothing below moves.
+        sentence = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_broken else "")
+        self._reach.show(f'<div class="rl-slot">{problems or sentence}</div>')  # A fixed height: nothing below moves.
 
 
 def quaternion_text(wxyz: np.ndarray) -> str:
@@ -80,19 +80,19 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
     code = code if plan.program is None else "program.planned"
-    said = text(code, duration=f"{plan.motion.duration:.3f}")
+    sentence = text(code, duration=f"{plan.motion.duration:.3f}")
     if plan.short is not None:
-        said += ". " + text("target.leads_short", short=text.render(plan.short))
+        sentence += ". " + text("target.leads_short", short=text.render(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
         worst, more = report.violations[0].condition.id, report.broken_conditions - 1
-        said += " · " + text("scene.broken", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
+        sentence += " · " + text("scene.broken", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
-        said += " · " + text("target.unheeded", count=unheeded)
+        sentence += " · " + text("target.unheeded", count=unheeded)
     aside = beside_program(state)
     if aside is not None:
-        tone, said = "warn" if report.ok else tone, said + ". " + text.render(aside)
+        tone, sentence = "warn" if report.ok else tone, sentence + ". " + text.render(aside)
     if plan.note is not None:
-        said += (" " if report.ok else ". ") + text.render(plan.note)
-    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(said)}</p>'
+        sentence += (" " if report.ok else ". ") + text.render(plan.note)
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(sentence)}</p>'

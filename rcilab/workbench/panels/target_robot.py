@@ -82,8 +82,8 @@ class TargetRobotPanel:
             self._ask(_choose(None, "address", answer="no"))  # The page that asked has lost the controls.
         self._address.handle.visible = self._connect.visible = is_address
         asked = self._asked = state.typed_address
-        said = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
-        self._question.show(said and f'<p class="rl-verdict rl-warn" role="alert">{said}</p>')
+        sentence = "" if not asked else esc(text("destination.ask", address=asked, model=state.model.name))
+        self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
         self._yes.visible = self._no.visible = bool(asked)
         self._again.visible = where in ("ideal", "mujoco") and status.phase in ("lost", "crashed")
         self._leave.disabled = moving or where == "preview"

@@ -91,12 +91,12 @@ class TimelinePanel:
         if state.plan is None:
             why = state.no_plan
             if status.code == "moving.guided" or (state.jog.robot and is_moving(status)):
-                said = text("timeline.by_hand")
+                sentence = text("timeline.by_hand")
             elif why is None or why.code == "plan.here":
-                said = text("timeline.jog" if state.jog.robot else "timeline.nothing")
+                sentence = text("timeline.jog" if state.jog.robot else "timeline.nothing")
             else:
-                said = text.render(why)
-            return f'<p class="rl-note rl-welcome">{esc(said)}</p>'
+                sentence = text.render(why)
+            return f'<p class="rl-note rl-welcome">{esc(sentence)}</p>'
         duration = state.plan.motion.duration
         t, kinds = min(time_shown(state, status), duration), text("timeline.plan_only")
         if state.recording is not None:
@@ -124,5 +124,5 @@ def _demo_html(state: UiState, text: Text) -> str:
     """Returns the message that the curves are those of a provoked fault, if one is displayed; else ""."""
     if state.learn.show is None:
         return ""
-    said = f"<b>{esc(text('timeline.demo'))}</b> {esc(text('timeline.demo_long'))}"
-    return f'<p class="rl-verdict rl-warn">{said}</p>'
+    sentence = f"<b>{esc(text('timeline.demo'))}</b> {esc(text('timeline.demo_long'))}"
+    return f'<p class="rl-verdict rl-warn">{sentence}</p>'

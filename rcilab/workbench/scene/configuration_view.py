@@ -158,9 +158,9 @@ class ConfigurationSceneView:
         """Shows the name of the part next to its handles."""
         if self._name is None:
             return
-        said = text("setup.handles", part=text(f"setup.part.{self._edited}"))
-        if said != self._name.text:
-            self._name.text = said
+        sentence = text("setup.handles", part=text(f"setup.part.{self._edited}"))
+        if sentence != self._name.text:
+            self._name.text = sentence
         away = 1.2 * _SCALES[self._edited] * (-1.0 if self._edited == "box" else 1.0)  # Down, as the flange looks.
         place = _pose_of(state, self._edited).position + (0.0, 0.0, away)
         if np.abs(np.asarray(self._name.position) - place).max() > 1e-6:
@@ -171,17 +171,17 @@ class ConfigurationSceneView:
             self._label.visible = box is not None
         if box is None:
             return
-        said = text("setup.label_on" if box.active else "setup.label_off")
-        if said != self._label.text:
-            self._label.text = said
+        sentence = text("setup.label_on" if box.active else "setup.label_off")
+        if sentence != self._label.text:
+            self._label.text = sentence
         corners = box.corners()
         self._label.position = corners[int(corners[:, 2].argmax())]
 
     def _show_outside(self, state: UiState, text: Text) -> None:
         """Draws the part of the planned path outside the box in red, with a label."""
-        said = text("setup.outside")
-        if said != self._crossing.text:
-            self._crossing.text = said
+        sentence = text("setup.outside")
+        if sentence != self._crossing.text:
+            self._crossing.text = sentence
         path = None if state.plan is None else state.plan.path
         wanted = (path, state.setup.wanted.box)
         if wanted[0] is self._outside[0] and wanted[1] is self._outside[1]:

@@ -63,10 +63,10 @@ class DragHandle:
         self._arrow.points = np.array([[acting.start, end]], dtype=np.float32)
         self._label.position = end
         where = text("push.tool") if acting.link == TOOL else text("push.link", number=acting.link)
-        said = text("push.label", newtons=f"{float(np.linalg.norm(acting.force)):.0f}", where=where)
-        if said != self._said:
-            self._said = said
-            self._label.text = said
+        sentence = text("push.label", newtons=f"{float(np.linalg.norm(acting.force)):.0f}", where=where)
+        if sentence != self._said:
+            self._said = sentence
+            self._label.text = sentence
 
     def remove(self) -> None:
         """Removes the arrow; the arm's meshes are removed with the arm."""

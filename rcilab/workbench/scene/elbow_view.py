@@ -79,9 +79,9 @@ class ElbowSceneView:
         if self._label.visible != (elbow is not None):
             self._label.visible = elbow is not None
         if elbow is not None:
-            said = "ψ " + text.units.format_angle(elbow.psi, 0) if snapped is None else "▲ " + text.render(snapped)
-            if said != self._label.text:
-                self._label.text = said
+            sentence = "ψ " + text.units.format_angle(elbow.psi, 0) if snapped is None else "▲ " + text.render(snapped)
+            if sentence != self._label.text:
+                self._label.text = sentence
 
     def remove(self) -> None:
         """Removes circle, handle and label."""

@@ -80,7 +80,7 @@ class ExtrasView:
             self._add_frame(f"{node}/axes", pose, f"J{number}")
         self._add_frame(f"{self._arm.tool_node}/axes", Pose(), "TCP")
 
-    def _add_frame(self, name: str, pose: Pose, said: str) -> None:
+    def _add_frame(self, name: str, pose: Pose, sentence: str) -> None:
         scene, at = self._scene, {"wxyz": pose.wxyz, "position": pose.position}
         self._frames.append(
             scene.add_frame(name, axes_length=_AXES, axes_radius=0.004, origin_radius=0.008, **at)  # type: ignore[arg-type]
@@ -88,7 +88,7 @@ class ExtrasView:
         self._frames.append(
             scene.add_label(
                 f"{name}_name",
-                said,
+                sentence,
                 position=pose.position,
                 anchor=_BESIDE[len(self._frames) // 2 % 2],
                 depth_test=False,

@@ -98,11 +98,11 @@ class GoalView:
             self._tone = goal.reach.tone
             self._mark.color = TONE_COLORS[self._tone]
         tone, reason = goal.reach.tone, text.render(goal.reach.reason)
-        said = text("reach.label") if tone == "good" else "".join(with_space(text("reach.tone." + tone), reason))
-        said = text("target.handles", verdict=said)
-        if said != self._said:
-            self._said = said
-            self._label.text = said
+        sentence = text("reach.label") if tone == "good" else "".join(with_space(text("reach.tone." + tone), reason))
+        sentence = text("target.handles", verdict=sentence)
+        if sentence != self._said:
+            self._said = sentence
+            self._label.text = sentence
         self._show_via(state, text)
 
     def remove(self) -> None:
@@ -111,9 +111,9 @@ class GoalView:
             handle.remove()
 
     def _show_via(self, state: UiState, text: Text) -> None:
-        via, said = state.via if state.way == "arc" else None, text("target.via_label")
-        if said != self._via_label.text:
-            self._via_label.text = said
+        via, sentence = state.via if state.way == "arc" else None, text("target.via_label")
+        if sentence != self._via_label.text:
+            self._via_label.text = sentence
         if via is self._via:
             return
         self._via = via

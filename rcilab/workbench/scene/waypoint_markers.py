@@ -62,8 +62,8 @@ class ProgramMarks:
             points.append(target.position)
             colors.append(_FAILED if failed else _CHOSEN if chosen else _PLAIN)
             numbers.append((number, f"{number} !" if failed else f"[{number}]" if chosen else ""))
-        for place, (group, said) in enumerate(labels_of(points, numbers)):
-            self._handles.append(self._label(place, said, points[group[0]]))
+        for place, (group, sentence) in enumerate(labels_of(points, numbers)):
+            self._handles.append(self._label(place, sentence, points[group[0]]))
         if points:
             self._handles.append(
                 self._scene.add_point_cloud(
@@ -76,10 +76,10 @@ class ProgramMarks:
                 )
             )
 
-    def _label(self, number: int, said: str, position: np.ndarray) -> Any:
+    def _label(self, number: int, sentence: str, position: np.ndarray) -> Any:
         x, y, z = (float(value) for value in position)
         return self._scene.add_label(
-            f"/program/{number}", said, position=(x, y, z + _ABOVE), anchor="bottom-center", depth_test=False,
+            f"/program/{number}", sentence, position=(x, y, z + _ABOVE), anchor="bottom-center", depth_test=False,
             font_screen_scale=0.8,
         )  # fmt: skip
 
@@ -95,15 +95,18 @@ def labels_of(points: list[Array], numbers: list[tuple[int, str]]) -> list[tuple
     while True:
         groups = neighbours(points, near)
         labels = [(group, label_of([numbers[at] for at in group])) for group in groups[:_MOST]]
-        if not _overlap([points[group[0]] for group, _ in labels], [said for _, said in labels]) or len(groups) == 1:
+        if (
+            not _overlap([points[group[0]] for group, _ in labels], [sentence for _, sentence in labels])
+            or len(groups) == 1
+        ):
             return labels
         near *= 2.0
 
 
-def _overlap(places: list[Array], said: list[str]) -> bool:
+def _overlap(places: list[Array], sentence: list[str]) -> bool:
     if len(places) < 2:
         return False
-    half = 0.5 * _CHARACTER * np.array([len(words) for words in said])
+    half = 0.5 * _CHARACTER * np.array([len(words) for words in sentence])
     apart = np.array(places)[:, None] - np.array(places)[None]
     beside = np.linalg.norm(apart[..., :2], axis=-1) < half[:, None] + half[None]
     return bool((np.triu(beside, 1) & (np.abs(apart[..., 2]) < _LINE)).any())
@@ -138,6 +141,6 @@ def label_of(numbers: list[tuple[int, str]]) -> str:
             ranges[-1][1] = number
         else:
             ranges.append([number, number])
-    said = [f"{low}" if low == high else f"{low}\N{EN DASH}{high}" for low, high in ranges]
-    listed = ", ".join(said if len(said) <= _RANGES else [*said[:_RANGES], "\N{HORIZONTAL ELLIPSIS}"])
+    sentence = [f"{low}" if low == high else f"{low}\N{EN DASH}{high}" for low, high in ranges]
+    listed = ", ".join(sentence if len(sentence) <= _RANGES else [*sentence[:_RANGES], "\N{HORIZONTAL ELLIPSIS}"])
     return " · ".join([listed, *filter(None, (own for _, own in numbers))])

@@ -42,7 +42,7 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.Fau
     inside = demo.signal.values[:-1]
     assert ((demo.signal.lower < inside) & (inside < demo.signal.upper)).all(), "the first one past its bound"
     if fault is not Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME:
-        numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", demo.said)]
+        numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", demo.sentence)]
         assert np.isclose(numbers, demo.value, rtol=5e-3).any(), "the controller's own number"  # It rounds to 3 digits.
     assert demo.way_out[-1] == "move"
     assert np.isfinite(demo.moved.q).all()

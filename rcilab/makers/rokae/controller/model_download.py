@@ -31,7 +31,7 @@ _SERVED = (
     *(("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "mx", "mz"),) * 5,
     ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my"),
 )
-"""The parameters of each link that are not determined by those of others (wire notes, section 8)."""
+"""The parameters of each link that are not determined by those of others: those that the vendor's controller sends."""
 _COLUMNS = tuple(9 * link + _ENTRIES.index(name) for link, names in enumerate(_SERVED) for name in names)
 
 

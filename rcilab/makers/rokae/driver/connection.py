@@ -268,7 +268,7 @@ class SocketTransport:
             states.append(datagram)
             if self._other_port is None:
                 self._other_port = port
-                udp.connect((host, port))  # From here on its buffer, too, accepts no strangers' datagrams.
+                udp.connect((host, port))  # From here on its buffer, too, accepts no datagrams of unknown senders.
         return states
 
     def send_command(self, datagram: bytes) -> None:

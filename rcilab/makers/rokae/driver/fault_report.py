@@ -80,13 +80,13 @@ def describe_faults(
     measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
     followed = _describe_followed(faults, record, model, limits)
     passed = describe_passed_face(faults, record, box)
-    found = [said for said in (commanded, followed, *measured, passed) if said]
+    found = [part for part in (commanded, followed, *measured, passed) if part]
     parts += found
     if faults:
         parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
     clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
     parts.append(f"{clears}error.run holds the motion")
-    finding = Remark.all(said for said in found if isinstance(said, Remark))
+    finding = Remark.all(part for part in found if isinstance(part, Remark))
     return FaultReport("; ".join(parts), finding)
 
 

@@ -61,7 +61,7 @@ def describe_measured(
     if not len(record):
         return
     measured = _judge(record, model, limits, mode)
-    said = {violation.condition.fault: violation.remark for violation in measured.violations}
+    remarks = {violation.condition.fault: violation.remark for violation in measured.violations}
     joint = limits.joint
     for fault, condition, values, bounds, unit in (
         (
@@ -79,10 +79,10 @@ def describe_measured(
             "rad/s^2",
         ),
     ):
-        if fault in faults and fault not in said:
+        if fault in faults and fault not in remarks:
             place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
             number, value, bound = int(place[1]) + 1, float(values[place]), float(bounds[place[1]])
-            said[fault] = Remark(
+            remarks[fault] = Remark(
                 f"joint {number} was measured at {value:.3g} {unit} (commands: {bound:g} {unit})",
                 "nearest",
                 condition=condition,
@@ -91,7 +91,7 @@ def describe_measured(
                 bound=bound,
                 unit=unit,
             )
-    yield from (text for fault, text in said.items() if fault in faults and fault not in RANGE_FAULTS)
+    yield from (text for fault, text in remarks.items() if fault in faults and fault not in RANGE_FAULTS)
     if RANGE_FAULTS & faults:
         yield _describe_range(faults, record, limits)
     if Fault.COLLISION in faults and np.isfinite(record["tau_ext_in_base"][-1]).all():

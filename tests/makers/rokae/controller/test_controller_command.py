@@ -68,7 +68,7 @@ def test_it_says_where_it_is_when_it_is_ready_and_ends_cleanly(number: signal.Si
 
 
 def status_of(process: subprocess.Popen[str]) -> WorldStatus:
-    """What the controller says over the world port that its second line names."""
+    """What the controller says over the simulation port that its second line names."""
     first_line(process)
     assert process.stdout is not None
     host, _, port = process.stdout.readline().removeprefix("world ").strip().partition(":")

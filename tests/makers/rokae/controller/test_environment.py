@@ -94,7 +94,7 @@ def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.cycle.auto_limit
     assert place.status.auto_limit
     assert place.cycle.settings.inputs == (False, False, True, False, False, False)
-    assert (place.status.missed, place.status.misfits, place.status.strangers) == (3, 4, 5)
+    assert (place.status.missed, place.status.bad_datagrams, place.status.unknown_senders) == (3, 4, 5)
     assert place.status.phase == "idle"
     place.handle(world.Press("gstop"))
     place.step()

@@ -1,4 +1,4 @@
-"""The world port on real sockets: who gets through, what it does to a controller that runs, and what faults do."""
+"""The simulation port on real sockets: who gets through, what it does to a controller that runs, and what faults do."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae import wire as rci
 from rcilab.sim.api import LONGEST_LINE, NetworkFaults, Stall
 from rcilab.sim.peer_user import is_ours
-from rcilab.sim.simulation_port import MOST_GUESTS
+from rcilab.sim.simulation_port import MAX_CLIENTS
 from tests.makers.rokae.controller.test_server import MODEL, MOTION, PATIENCE, Peer, Running, bind_udp, closes, running
 
 
 class Guest:
-    """A raw connection to the world port."""
+    """A raw connection to the simulation port."""
 
     def __init__(self, found: Running) -> None:
         assert found.server.world_address is not None
@@ -121,7 +121,7 @@ def test_eight_guests_are_welcome_and_the_ninth_is_not(lockstep: Running) -> Non
         with Guest(lockstep) as ninth:
             answer = json.loads(ninth.stream.readline())
             assert answer["ok"] is False
-            assert "all 8 places of the world port are taken" in answer["error"]
+            assert "all 8 connections of the simulation port are in use" in answer["error"]
             assert "60 s" in answer["error"]
             assert ninth.is_cut_off()
         guests.pop().__exit__()
@@ -136,15 +136,15 @@ def test_eight_guests_are_welcome_and_the_ninth_is_not(lockstep: Running) -> Non
 def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
     lockstep: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rcilab.sim.simulation_port.IDLE", 0.05)
+    monkeypatch.setattr("rcilab.sim.simulation_port.IDLE_TIMEOUT", 0.05)
     assert lockstep.server.world_address is not None
     host, _, port = lockstep.server.world_address.partition(":")
     with SimulationControl(host, int(port)) as world, ExitStack() as stack:
         assert world.status().phase == "off"
-        idle = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS - 1)]
+        idle = [stack.enter_context(Guest(lockstep)) for _ in range(MAX_CLIENTS - 1)]
         assert all(guest.ask(request="status")["ok"] for guest in idle)
         time.sleep(0.1)
-        for _ in range(2 * MOST_GUESTS):
+        for _ in range(2 * MAX_CLIENTS):
             with Guest(lockstep) as guest:
                 assert guest.ask(request="status")["ok"]
         assert world.status().phase == "off", "it has connected again by itself"
@@ -178,11 +178,11 @@ def test_who_finds_all_places_taken_is_told_so_in_words_and_comes_in_later(locks
     assert lockstep.server.world_address is not None
     host, _, port = lockstep.server.world_address.partition(":")
     with SimulationControl(host, int(port)) as world, ExitStack() as stack:
-        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MAX_CLIENTS)]
         assert all(guest.ask(request="status")["ok"] for guest in guests)
         for _ in range(3):
             with pytest.raises(
-                UsageError, match=r"all 8 places of the world port are taken.* silent for 60 s"
+                UsageError, match=r"all 8 connections of the simulation port are in use.* idle for 60 s"
             ) as caught:
                 world.status()
             assert caught.value.code == "world_full"
@@ -195,9 +195,9 @@ def test_who_finds_all_places_taken_is_told_so_in_words_and_comes_in_later(locks
 def test_another_account_takes_no_place_from_a_guest_that_is_silent(
     lockstep: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rcilab.sim.simulation_port.IDLE", 0.05)
+    monkeypatch.setattr("rcilab.sim.simulation_port.IDLE_TIMEOUT", 0.05)
     with ExitStack() as stack:
-        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MOST_GUESTS)]
+        guests = [stack.enter_context(Guest(lockstep)) for _ in range(MAX_CLIENTS)]
         assert all(guest.ask(request="status")["ok"] for guest in guests)
         time.sleep(0.1)
         answer = ask_as_stranger(lockstep)
@@ -266,7 +266,7 @@ def test_without_a_world_port_there_is_none() -> None:
 def test_a_world_port_in_use_says_so_and_frees_the_others(lockstep: Running) -> None:
     assert lockstep.server.world_address is not None
     port = int(lockstep.server.world_address.partition(":")[2])
-    with pytest.raises(UsageError, match=rf"world port {port} on 127\.0\.0\.2 .*--world-port N"):
+    with pytest.raises(UsageError, match=rf"simulation port {port} on 127\.0\.0\.2 .*--world-port N"):
         Running(lockstep=True, world_port=port)
     with pytest.raises(InvalidValueError, match="world_port"):
         Running(world_port=70000)

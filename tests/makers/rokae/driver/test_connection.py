@@ -1,4 +1,4 @@
-"""Datagrams of strangers at the client: they neither count as states nor keep it from those of the robot."""
+"""Datagrams of unknown senders at the client: they neither count as states nor keep it from those of the robot."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ def sender(host: str) -> socket.socket:
 
 def test_a_flood_from_another_address_leaves_room_for_a_state(wire: Wire):
     with sender("127.0.0.9") as stranger:
-        wire.send(stranger, b"stranger", 5000)
+        wire.send(stranger, b"unknown sender", 5000)
     wire.send(wire.robot, b"state")
     assert wire.received() == [b"state"]
 
 
 def test_a_flood_from_the_robots_address_leaves_room_for_a_state(wire: Wire):
     with sender(HOST) as stranger:
-        wire.send(stranger, b"stranger", 5000)
+        wire.send(stranger, b"unknown sender", 5000)
         wire.send(wire.robot, b"state")
-        wire.send(stranger, b"stranger", 5000)
+        wire.send(stranger, b"unknown sender", 5000)
         wire.send(wire.robot, b"next")
     assert wire.received() == [b"state", b"next"]
 
@@ -67,7 +67,7 @@ def test_a_flood_leaves_room_for_a_robot_that_sends_from_another_port(wire: Wire
         assert wire.received() == [b"state"]
         for host in (stranger, sender("127.0.0.9")):
             with host:
-                wire.send(host, b"stranger", 5000)
+                wire.send(host, b"unknown sender", 5000)
         wire.send(robot, b"next")
         assert wire.received() == [b"next"]
 
@@ -103,10 +103,10 @@ def test_the_robots_port_counts_and_no_other_once_a_state_came_from_there(wire: 
         wire.send(stranger, b"first")
         assert wire.received() == [b"first"], "nothing has come from where commands go"
         wire.send(wire.robot, b"state")
-        wire.send(stranger, b"stranger")
+        wire.send(stranger, b"unknown sender")
         wire.send(wire.robot, b"next")
         assert wire.received() == [b"state", b"next"]
-        wire.send(stranger, b"stranger")
+        wire.send(stranger, b"unknown sender")
         assert wire.received() == []
 
 

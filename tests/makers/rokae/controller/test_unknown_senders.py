@@ -52,7 +52,7 @@ def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
         assert run.faults == ()
         assert np.array_equal(robot.state.q_c, motion.goal)
         assert sent
-        assert 1 <= robot.world.status().strangers <= len(sent)
+        assert 1 <= robot.world.status().unknown_senders <= len(sent)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
@@ -72,16 +72,16 @@ def test_a_flood_of_a_stranger_leaves_room_for_commands(host):
         robot._driver.connection._transport.send_command = flood_and_send
         run = robot.execute(plan_joint(MODEL, MODEL.home, MODEL.home + 0.01))
         assert run.faults == ()
-        assert robot.world.status().strangers > 0
+        assert robot.world.status().unknown_senders > 0
 
 
 class FloodedPeer(Peer):
-    """Sends its commands from a socket of choice, each after more of strangers' datagrams than a buffer holds."""
+    """Sends its commands from a socket of choice, each after more of unknown senders than a buffer holds."""
 
-    def __init__(self, found: Running, strangers: list[socket.socket]) -> None:
+    def __init__(self, found: Running, unknown_senders: list[socket.socket]) -> None:
         super().__init__(found, udp=bind_udp(0, "127.0.0.1"))
         self.sender = self.udp
-        self.strangers = strangers
+        self.unknown_senders = unknown_senders
 
     def direct_states_to(self, udp: socket.socket) -> None:
         assert self.ask(rci.Connect(udp.getsockname()[1])) == 0
@@ -90,7 +90,7 @@ class FloodedPeer(Peer):
 
     def send(self, message_id: int, q: np.ndarray) -> None:
         for _ in range(1000):
-            for stranger in self.strangers:
+            for stranger in self.unknown_senders:
                 stranger.sendto(bytes(290), self.controller)
         self.sender.sendto(rci.encode_command(rci.CommandPacket(message_id, tuple(q.tolist()))), self.controller)
 
@@ -108,7 +108,7 @@ def test_a_client_is_heard_in_a_flood_wherever_it_sends_from_and_when_its_port_c
         peer.direct_states_to(bind_udp(0, "127.0.0.1"))
         peer.sender = other_port
         peer.hold(1)
-        peer.strangers = [stranger, neighbour]
+        peer.unknown_senders = [stranger, neighbour]
         peer.hold(20)
         peer.sender = peer.udp
         peer.hold(20)
@@ -145,21 +145,21 @@ def test_strangers_in_the_moment_before_a_socket_is_connected_are_left_out(monke
         monkeypatch.setattr(socket.socket, "connect", connect_late)
         with Peer(found, udp=bind_udp(found.port, "127.0.0.1")) as peer:
             peer.receive_state()
-            assert found.server._endpoint.strangers == 1
+            assert found.server._endpoint.unknown_senders == 1
             assert found.server.bad_datagrams == 0
 
 
 def test_a_flood_does_not_keep_the_controller_from_its_cycles() -> None:
-    """Once the client's commands have a socket of their own, few of the strangers' are read at a time."""
+    """Once the client's commands have a socket of their own, few of the unknown senders' are read at a time."""
     with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as stranger, FloodedPeer(found, []) as peer:
         peer.direct_states_to(bind_udp(0, "127.0.0.1"))
         peer.sender = peer.udp
         peer.hold(1)
-        before = found.server._endpoint.strangers
-        peer.strangers = [stranger]
+        before = found.server._endpoint.unknown_senders
+        peer.unknown_senders = [stranger]
         peer.hold(20)
         cycles = found.server.controller.playout
-        assert 0 < found.server._endpoint.strangers - before < 64 * 20, cycles
+        assert 0 < found.server._endpoint.unknown_senders - before < 64 * 20, cycles
 
 
 def test_strangers_are_counted_again_for_the_next_client():
@@ -169,14 +169,14 @@ def test_strangers_are_counted_again_for_the_next_client():
         for _ in range(2):
             with socket.create_connection((found.host, found.port)):
                 wait_for(lambda: endpoint.has_client, 30.0, "a client")
-                wanted = endpoint.strangers + 1000
+                wanted = endpoint.unknown_senders + 1000
 
                 def is_counted(wanted: int = wanted) -> bool:
                     for _ in range(100):
                         udp.sendto(b"x", (found.host, found.port))
-                    return endpoint.strangers >= wanted
+                    return endpoint.unknown_senders >= wanted
 
-                wait_for(is_counted, 30.0, "strangers to be counted")
+                wait_for(is_counted, 30.0, "unknown senders to be counted")
             wait_for(lambda: not endpoint.has_client, 30.0, "the client to leave")
 
 
