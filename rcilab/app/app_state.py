@@ -8,8 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from rcilab.app.goal.goal import Goal
-from rcilab.app.goal.target_status import Tone
+from rcilab.app.goal.goal import Goal, Tone
 from rcilab.app.planning import PathKind, Plan
 from rcilab.app.run.drive_state import DriveState
 from rcilab.app.run.world_state import WorldState

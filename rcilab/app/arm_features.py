@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import Message
-from rcilab.makers.maker import Feature, capabilities_of, find_lack
+from rcilab.makers.maker import Feature, capabilities_of, find_missing_feature
 
 if TYPE_CHECKING:
     from rcilab.app.run.plan_readiness import ArmStatus
@@ -15,27 +15,27 @@ if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
 
-def explain_lack(model: RobotModel, feature: Feature) -> Message | None:
+def explain_missing_feature(model: RobotModel, feature: Feature) -> Message | None:
     """Returns what an arm lacks for a feature and why; None if it has the feature."""
-    lack = find_lack(model, feature)
-    if lack is None:
+    missing = find_missing_feature(model, feature)
+    if missing is None:
         return None
-    sentence = describe_error(lack)
+    sentence = describe_error(missing)
     assert isinstance(sentence, Message)  # Every lack has a code.
     return sentence
 
 
-def explain_lack_of_part(model: RobotModel, part: SetupPart) -> Message | None:
+def explain_missing_part(model: RobotModel, part: SetupPart) -> Message | None:
     """Returns why a part of the configuration cannot be changed; None if it can.
 
     An arm for which motions are only planned has all parts: its plans and checks use them.
     """
-    return None if is_only_planned(model) else explain_lack(model, part)
+    return None if is_only_planned(model) else explain_missing_feature(model, part)
 
 
-def explain_lack_to_run(model: RobotModel, *, is_virtual: bool) -> Message | None:
+def explain_missing_robot(model: RobotModel, *, is_virtual: bool) -> Message | None:
     """Returns why no motion of an arm can run at the virtual controller, or at an address; None if one can."""
-    return explain_lack(model, "simulation" if is_virtual else "driving")
+    return explain_missing_feature(model, "simulation" if is_virtual else "driving")
 
 
 def is_only_planned(model: RobotModel) -> bool:

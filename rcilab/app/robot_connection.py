@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from rcilab.app.arm_features import explain_lack_to_run
+from rcilab.app.arm_features import explain_missing_robot
 from rcilab.app.status_text import StartingError
 from rcilab.control_process import Supervisor, SupervisorStatus
 from rcilab.core.errors import RcilabError, UsageError
@@ -42,12 +42,12 @@ class RobotConnection:
     ) -> None:
         """Closes the open supervisor and starts one for this arm, destination and plant; returns at once.
 
-        For an arm that cannot run there, nothing is started: see `explain_lack_to_run`.
+        For an arm that cannot run there, nothing is started: see `explain_missing_robot`.
 
         Raises:
             UsageError: Memory is short.
         """
-        if explain_lack_to_run(model, is_virtual=target == "virtual") is not None:
+        if explain_missing_robot(model, is_virtual=target == "virtual") is not None:
             self.disconnect()
             self.name = target
             return

@@ -8,8 +8,7 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from rcilab.app.app_state import AppState, Toast
-from rcilab.app.goal.goal import Goal
-from rcilab.app.goal.target_status import Tone
+from rcilab.app.goal.goal import Goal, Tone
 from rcilab.i18n.translator import Message
 
 ROBOT_TROUBLE = "robot"

@@ -45,7 +45,14 @@ from rcilab.makers.driver import (
     require_signal,
     require_timeout,
 )
-from rcilab.makers.maker import capabilities_of, find_lack, require_driver, require_feature, require_parts, timing_of
+from rcilab.makers.maker import (
+    capabilities_of,
+    find_missing_feature,
+    require_driver,
+    require_feature,
+    require_parts,
+    timing_of,
+)
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
@@ -636,7 +643,7 @@ class RobotSession(Closeable):
     ) -> Run:
         """Streams a path after checking its joint motion: its poses, to an arm that cannot take them its angles."""
         motion = follow_path(self.model, state.q_c, path, speed)
-        if find_lack(self.model, "cartesian_position") is not None:
+        if find_missing_feature(self.model, "cartesian_position") is not None:
             self._require_allowed(motion, state)
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)

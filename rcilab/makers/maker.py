@@ -78,7 +78,7 @@ class Timing:
 
 
 Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals", "reboot"]
-"""Features that an arm may lack; their texts are `feature.NAME`."""
+"""Features that an arm may missing; their texts are `feature.NAME`."""
 
 
 class Maker(Protocol):
@@ -228,7 +228,7 @@ def driven_robots() -> tuple[str, ...]:
     return _robots_of(maker for maker in all_makers() if maker.capabilities.drives)
 
 
-def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
+def find_missing_feature(model: RobotModel, feature: Feature) -> ModelError | None:
     """Returns why an arm lacks a feature, as the error of a call that needs it; None if it has the feature."""
     capabilities = capabilities_of(model)
     simulates, drives = capabilities.simulates, capabilities.drives
@@ -237,7 +237,7 @@ def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
     if feature == "driving" and drives:
         return None
     if not (simulates or drives):
-        return _lack_of_everything(model)
+        return _plan_only_error(model)
     if feature == "simulation":
         sentence = f"{model.name} has no virtual controller in rcilab: connect to a real one"
         return ModelError(sentence).coded("no_simulation", model=model.name)
@@ -255,7 +255,7 @@ def find_lack(model: RobotModel, feature: Feature) -> ModelError | None:
     return ModelError(sentence).coded("no_feature", model=model.name, feature=feature)
 
 
-def _lack_of_everything(model: RobotModel) -> ModelError:
+def _plan_only_error(model: RobotModel) -> ModelError:
     maker, possible = maker_of(model), ", ".join(simulated_robots())
     name = "its maker" if maker is None else maker.title
     return ModelError(
@@ -270,9 +270,9 @@ def require_feature(model: RobotModel, feature: Feature) -> RobotModel:
     Raises:
         ModelError: It lacks the feature; the message says why, and what is possible.
     """
-    lack = find_lack(model, feature)
-    if lack is not None:
-        raise lack
+    missing = find_missing_feature(model, feature)
+    if missing is not None:
+        raise missing
     return model
 
 
@@ -300,7 +300,7 @@ def require_driver(model: RobotModel) -> RobotModel:
     Raises:
         ModelError: It cannot; the message says what is possible.
     """
-    return model if find_lack(model, "simulation") is None else require_feature(model, "driving")
+    return model if find_missing_feature(model, "simulation") is None else require_feature(model, "driving")
 
 
 def _robots_of(makers: Iterable[Maker]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.app.arm_features import explain_lack
+from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.run.world_actions import SetWiring, WorldActions
 from rcilab.app.setup.setup_fields import exact_end, joint_limits_between
 from rcilab.control_process import SupervisorStatus
@@ -59,11 +59,11 @@ class LimitFields:
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
         self._inside: Any = lean(ipywidgets.VBox, [])
-        self.sentence, self._lack = block(), block()
+        self.sentence, self._missing = block(), block()
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         rows = [
             block(soft(text("softlimits.hint"))),
-            self._lack,
+            self._missing,
             self._inside,
             lean(ipywidgets.HBox, [self.send, self.whole]),
             self.sentence,
@@ -78,11 +78,11 @@ class LimitFields:
 
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller and the limits of the arm."""
-        lack = explain_lack(self._state.model, "joints")
-        write(self._lack, why_html(self._text, lack))
+        missing = explain_missing_feature(self._state.model, "joints")
+        write(self._missing, why_html(self._text, missing))
         for field in chain.from_iterable(self.fields):
-            field.box.disabled = lack is not None
-        is_ready = status is not None and status.phase in ("idle", "fault") and lack is None
+            field.box.disabled = missing is not None
+        is_ready = status is not None and status.phase in ("idle", "fault") and missing is None
         self.send.disabled = not is_ready or not self.fields
         self.whole.disabled = not is_ready
         if not is_ready:

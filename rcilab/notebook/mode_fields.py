@@ -7,7 +7,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import explain_lack, is_only_planned
+from rcilab.app.arm_features import explain_missing_feature, is_only_planned
 from rcilab.app.run.mode_actions import ModeActions, PressControl, SetControl
 from rcilab.app.run.mode_parameters import held_rows, is_control_pending, name_group, shown_numbers
 from rcilab.control_process import SupervisorStatus
@@ -41,7 +41,7 @@ class ModeFields:
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
             value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
-        self._note, self._lack, self._held, self._said = block(), block(), block(), block()
+        self._note, self._missing, self._held, self._said = block(), block(), block(), block()
         self.fields: dict[str, list[NumberField]] = {}
         """Fields by group, of the groups that were opened."""
         self.folders: dict[str, Any] = {group.name: self._folder(group) for group in self._groups}
@@ -51,7 +51,7 @@ class ModeFields:
         self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
         self.parameters = lean(ipywidgets.VBox, [
             block(head(text("control.title"))),
-            self._lack,
+            self._missing,
             *self.folders.values(),
             lean(ipywidgets.HBox, [self.send, self.reset]),
             self._said,
@@ -65,8 +65,8 @@ class ModeFields:
         self.mode.value = state.now.drive.mode
         is_moving = status is not None and status.phase in ("moving", "stopping")
         self.mode.disabled = is_moving or is_only_planned(state.model)
-        lack = explain_lack(state.model, state.now.drive.mode)
-        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if lack is None else text.render(lack)))
+        missing = explain_missing_feature(state.model, state.now.drive.mode)
+        write(self._note, soft(text(f"mode.{state.now.drive.mode}_note") if missing is None else text.render(missing)))
         for group in self._groups:
             folder, shown = self.folders[group.name], None if state.now.drive.mode in group.modes else "none"
             if folder.layout.display != shown:
@@ -77,9 +77,9 @@ class ModeFields:
             for group in self._groups:
                 if group.name in self.fields:
                     self._fill(group)
-        control_lack = explain_lack(state.model, "control")
-        write(self._lack, why_html(text, control_lack))
-        self.reset.disabled = control_lack is not None
+        missing = explain_missing_feature(state.model, "control")
+        write(self._missing, why_html(text, missing))
+        self.reset.disabled = missing is not None
         pending = status is not None and is_control_pending(state.now.drive.control, status.setup.control)
         self.send.layout.display = "none" if state.robot is None or state.now.is_virtual else None
         self.send.disabled = not pending or status is None or status.phase != "idle"

@@ -8,11 +8,9 @@ from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.session_connection import BusyError
 from rcilab.app.status_text import describe_status, describe_success, explain_error, phase_code
 from rcilab.control_process import SupervisorStatus
-from rcilab.core.errors import SAFETY_STOP, ControlError, ModelError, RcilabError
+from rcilab.core.errors import SAFETY_STOP, ControlError, RcilabError
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import Message, Text, message
-from rcilab.makers.maker import driven_robots
-from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import head, table, verdict
 from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.recording.run import describe_end
@@ -30,12 +28,10 @@ def describe_trouble(status: SupervisorStatus | None, text: Text) -> str:
     return "" if status is None or status.phase not in ("lost", "crashed") else text.render(describe_status(status))
 
 
-def describe_refusal(error: RcilabError, model: RobotModel, status: SupervisorStatus | None = None) -> Message:
+def describe_refusal(error: RcilabError, status: SupervisorStatus | None = None) -> Message:
     """Returns why a request failed."""
     if isinstance(error, BusyError):
         return message("robot.busy", what=message(f"what.{error.in_progress}"))
-    if isinstance(error, ModelError) and model.name not in driven_robots():
-        return message("robot.no_rci", model=model.name)
     return explain_error(error, status)
 
 
@@ -58,14 +54,11 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
     return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
 
 
-def outcome_html(
-    outcome: Outcome, model: RobotModel, status: SupervisorStatus | None, text: Text, *, is_left_alone: bool = False
-) -> str:
+def outcome_html(outcome: Outcome, status: SupervisorStatus | None, text: Text, *, is_left_alone: bool = False) -> str:
     """Returns the result of a request.
 
     Args:
         outcome: The result.
-        model: The arm.
         status: Status of the robot.
         text: The catalogue.
         is_left_alone: Whether the motion was stopped because the page is closed.
@@ -83,9 +76,7 @@ def outcome_html(
             return verdict("bad", "✗", text("run.faulted", faults=faults) + found)
         if outcome.what == "execute":
             return stopped
-        why = message(
-            "notice.failed", what=message(f"what.{outcome.what}"), error=describe_refusal(error, model, status)
-        )
+        why = message("notice.failed", what=message(f"what.{outcome.what}"), error=describe_refusal(error, status))
         return verdict("bad", "✗", text.render(why))
     if run is not None and run.stopped:
         return stopped

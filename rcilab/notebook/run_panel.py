@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import explain_lack, is_only_planned
+from rcilab.app.arm_features import explain_missing_feature, is_only_planned
 from rcilab.app.connection import Robot
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import parameter_obstacle
@@ -263,7 +263,7 @@ class RunPanel(Part):
             self.limits.take(outcome.error)
         if outcome.what in ("execute", "cell"):
             self.state.take(outcome)
-        sentence = outcome_html(outcome, self.model, self.state.status, self.text, is_left_alone=self._heart.is_gone)
+        sentence = outcome_html(outcome, self.state.status, self.text, is_left_alone=self._heart.is_gone)
         if outcome.what == "cell":
             sentence += soft(self.text("run.of_cell"))
         write(self._outcome, sentence)
@@ -300,7 +300,7 @@ class RunPanel(Part):
             except PlanningError as error:
                 write(
                     self._outcome,
-                    problem(self.text.render(describe_refusal(error, self.state.model, self.state.status))),
+                    problem(self.text.render(describe_refusal(error, self.state.status))),
                 )
 
     def _forget_question(self) -> None:
@@ -380,7 +380,7 @@ class RunPanel(Part):
             try:
                 act()
             except RcilabError as error:
-                write(self._outcome, problem(self.text.render(describe_refusal(error, self.model, self.state.status))))
+                write(self._outcome, problem(self.text.render(describe_refusal(error, self.state.status))))
 
         button.on_click(press)
         return button
@@ -389,9 +389,11 @@ class RunPanel(Part):
 def _obstacle(state: LabState) -> Message | None:
     """Returns what prevents Execute, or None if it may be pressed."""
     status = state.status
-    lack = explain_lack(state.model, "simulation" if is_only_planned(state.model) else state.now.drive.mode)
-    if lack is not None:
-        return lack
+    missing = explain_missing_feature(
+        state.model, "simulation" if is_only_planned(state.model) else state.now.drive.mode
+    )
+    if missing is not None:
+        return missing
     if status is None:
         return message("ready.closed")
     if status.phase == "closed" and state.session is not None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import explain_lack
+from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.connection import Robot
 from rcilab.app.run.signal_actions import signal_rows
 from rcilab.control_process import PendingRequest, SupervisorStatus
@@ -45,16 +45,16 @@ class SignalFields:
         self.reboot = button("reboot.press", lambda: self._ask(True))
         self.yes = button("reboot.confirm", self._restart, style="danger")
         self.no = button("run.cancel", lambda: self._ask(False))
-        self._lack, self._reboot_lack, self._levels, self._question = block(), block(), block(), block()
+        self._missing, self._reboot_missing, self._levels, self._question = block(), block(), block(), block()
         self._address = ""
         self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
         rows = [
-            self._lack,
+            self._missing,
             lean(ipywidgets.HBox, [self.output, self.on, self.off, self.read]),
             self._levels,
             block(soft(text("signals.note"))),
             block(head(text("reboot.title"))),
-            self._reboot_lack,
+            self._reboot_missing,
             self.reboot,
             self._question,
             self._answers,
@@ -66,12 +66,13 @@ class SignalFields:
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller."""
         is_ready = status is not None and status.phase in ("idle", "fault")
-        lack, unable = explain_lack(self._model, "signals"), explain_lack(self._model, "reboot")
-        write(self._lack, why_html(self._text, lack))
-        write(self._reboot_lack, why_html(self._text, unable))
-        self.output.disabled = lack is not None
+        missing = explain_missing_feature(self._model, "signals")
+        unable = explain_missing_feature(self._model, "reboot")
+        write(self._missing, why_html(self._text, missing))
+        write(self._reboot_missing, why_html(self._text, unable))
+        self.output.disabled = missing is not None
         for button in (self.on, self.off, self.read):
-            button.disabled = not is_ready or lack is not None
+            button.disabled = not is_ready or missing is not None
         self.reboot.disabled = not is_ready or unable is not None
         if not is_ready:
             self._ask(False)

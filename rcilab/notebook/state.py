@@ -17,9 +17,8 @@ from numpy.typing import ArrayLike
 
 from rcilab.app.app_state import AppState
 from rcilab.app.displayed_motion import display_run
-from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal import evaluate_joints, goal_at
 from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
-from rcilab.app.goal.target_status import evaluate_joints
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.request import Handlers, Request
 from rcilab.app.run.drive_state import choose_mode

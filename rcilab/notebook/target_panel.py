@@ -8,8 +8,8 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
+from rcilab.app.goal.goal import distinguishing_joints, margin
 from rcilab.app.goal.goal_actions import ChooseBranch, SetArmAngle
-from rcilab.app.goal.target_status import distinguishing_joints, margin
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.notebook.arc_circle import draw_circle

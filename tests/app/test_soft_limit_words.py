@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.app.goal.target_status import evaluate_joints
+from rcilab.app.goal.goal import evaluate_joints
 from rcilab.app.jog.jog_state import Axis, at_limit
 from rcilab.app.planning import make_plan
 from rcilab.app.text import Text

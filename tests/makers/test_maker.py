@@ -12,7 +12,7 @@ from typing import get_args
 import pytest
 
 import rcilab
-from rcilab.app.arm_features import explain_lack
+from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.text import Text
 from rcilab.core.errors import InvalidValueError, ModelError
 from rcilab.core.fault import FaultCode
@@ -22,7 +22,7 @@ from rcilab.makers.maker import (
     Maker,
     all_makers,
     driven_robots,
-    find_lack,
+    find_missing_feature,
     maker_of,
     require_driver,
     require_feature,
@@ -118,9 +118,9 @@ def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: 
     there |= {"signals"} if has.outputs else set()
     there |= {"reboot"} if has.reboots else set()
     model = load_model(next(iter(maker.robots)))
-    assert {feature for feature in FEATURES if find_lack(model, feature) is None} == there
+    assert {feature for feature in FEATURES if find_missing_feature(model, feature) is None} == there
     for feature in set(FEATURES) - there:
-        said = explain_lack(model, feature)
+        said = explain_missing_feature(model, feature)
         assert said is not None
         assert model.name in Text("zh").render(said)
         assert Text("en").render(said) != Text("zh").render(said)
@@ -147,7 +147,7 @@ def test_a_controller_without_a_feature_is_named_with_it(monkeypatch: pytest.Mon
     for feature, name in names.items():
         with pytest.raises(ModelError, match=f"the controller of xMate3 has no {name}"):
             require_feature(model, feature)
-        said = explain_lack(model, feature)
+        said = explain_missing_feature(model, feature)
         assert said is not None
         assert name in Text("en").render(said)
     assert require_feature(model, "joint_position") is model

@@ -154,7 +154,7 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
     for language in LANGUAGES:
         text = Text(language, "rcilab.notebook")
         for error in errors:
-            said = text.render(robot_words.describe_refusal(error, PRO7))
+            said = text.render(robot_words.describe_refusal(error))
             assert str(error) not in said
             assert not re.search(r"\b(status|what|error|robot)\.[a-zA-Z_]+", said), said
     panda = rcilab.load_model("Panda")

@@ -18,7 +18,7 @@ from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.run_html import run_html
 from rcilab.recording.tracking_text import tracking_notes
 from rcilab.workbench.panels.recording import summary_html
-from tests.recording.runs import MODEL, OFFSET, SETUP, export_run, some_ideal_run, some_run, some_stopped_run
+from tests.recording.runs import OFFSET, SETUP, export_run, some_ideal_run, some_run, some_stopped_run
 
 
 def notes(run, language: str = "en") -> list[str]:
@@ -57,7 +57,7 @@ def test_an_arm_that_yields_says_how_far_from_its_goal_it_ended():
     status = SupervisorStatus(phase="closed", code="closed")
     assert said in run_html(run)
     assert said in fact_rows(run, Text("en", "rcilab.recording"))[3][1]
-    assert said in notebook_outcome(Outcome(what="execute", run=run), MODEL, status, Text("en", "rcilab.notebook"))
+    assert said in notebook_outcome(Outcome(what="execute", run=run), status, Text("en", "rcilab.notebook"))
     exact = some_ideal_run()
     assert exact.missed_goal is None
     assert "goal" not in repr(exact)

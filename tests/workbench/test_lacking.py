@@ -11,7 +11,7 @@ from unittest.mock import MagicMock
 import ipywidgets
 import pytest
 
-from rcilab.app.arm_features import explain_lack, explain_lack_of_part
+from rcilab.app.arm_features import explain_missing_feature, explain_missing_part
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.request import TypeField
 from rcilab.app.setup.configuration_state import pending_parts
@@ -74,8 +74,8 @@ def test_the_parts_that_are_lacking_are_off_on_the_setup_tab_and_the_others_are_
     for part, is_off in {"box": True, "force": True, "tool": False, "load": False}.items():
         assert {disabled(field._handle) for field in panel._fields[part]} == {is_off}
         assert disabled(panel._seen[part].handle) is is_off
-        lack = explain_lack_of_part(MODEL, part)
-        assert panel._lacks[part]._shown == (
+        lack = explain_missing_part(MODEL, part)
+        assert panel._missing[part]._shown == (
             "" if lack is None else f'<p class="rl-note rl-why">{text.render(lack)}</p>'
         )
     assert disabled(panel._active.handle)
@@ -102,9 +102,9 @@ def test_soft_limits_mode_parameters_and_signals_are_off_one_by_one(lacking, sto
     assert disabled(limits._auto.handle)
     assert disabled(mode._reset)
     assert all(disabled(control) for control in (*signals._buttons, signals._output, signals._reboot))
-    shown = [limits._lack, mode._lack, signals._lack, signals._reboot_lack]
+    shown = [limits._missing, mode._missing, signals._missing, signals._reboot_missing]
     for html, feature in zip(shown, ("joints", "control", "signals", "reboot"), strict=True):
-        lack = explain_lack(MODEL, feature)  # type: ignore[arg-type]
+        lack = explain_missing_feature(MODEL, feature)  # type: ignore[arg-type]
         assert lack is not None
         assert text.render(lack) in html._shown
 
@@ -143,7 +143,7 @@ def test_a_part_that_is_lacking_cannot_be_edited_restored_or_sent(lacking, store
 def test_an_arm_that_is_only_planned_for_keeps_its_setup(store) -> None:
     panda = load_model("Panda")
     for part in ("box", "tool", "load", "joints"):
-        assert explain_lack_of_part(panda, part) is None
+        assert explain_missing_part(panda, part) is None
 
 
 def test_in_the_notebook_signals_restart_and_soft_limits_are_off(lacking) -> None:
@@ -152,12 +152,12 @@ def test_in_the_notebook_signals_restart_and_soft_limits_are_off(lacking) -> Non
     signals = SignalFields(MODEL, text, MagicMock(), lambda *_, **__: ipywidgets.Button())
     signals.show(READY)
     assert all(control.disabled for control in (signals.on, signals.off, signals.read, signals.output, signals.reboot))
-    assert "The controller of xMate3 has no digital signals." in signals._lack.value
-    assert "The controller of xMate3 has no restart on request." in signals._reboot_lack.value
+    assert "The controller of xMate3 has no digital signals." in signals._missing.value
+    assert "The controller of xMate3 has no restart on request." in signals._reboot_missing.value
     state = SimpleNamespace(model=MODEL, status=READY, robot=None, now=SimpleNamespace(is_virtual=True))
     limits = LimitFields(state, text, MagicMock(), MagicMock(), lambda *_, **__: ipywidgets.Button())
     limits.folder.selected_index = 0
     assert limits.fields
     assert all(field.box.disabled for ends in limits.fields for field in ends)
     assert limits.send.disabled
-    assert "The controller of xMate3 has no soft joint limits." in limits._lack.value
+    assert "The controller of xMate3 has no soft joint limits." in limits._missing.value

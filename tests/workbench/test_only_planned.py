@@ -7,7 +7,7 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from rcilab.app.arm_features import explain_lack_to_run
+from rcilab.app.arm_features import explain_missing_robot
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
 from rcilab.app.run.readiness import connection_note, obstacle
@@ -35,7 +35,7 @@ def test_it_is_planned_and_checked_in_preview_and_not_executed():
         status = bench.session.status()
         assert (status.phase, bench.session.is_ready) == ("closed", False)
         reason = obstacle(bench.store.state, status)
-        assert reason == explain_lack_to_run(model, is_virtual=True)
+        assert reason == explain_missing_robot(model, is_virtual=True)
         assert reason is not None
         assert reason.code == "error.only_planned"
         assert bench.dispatcher.errors == bench.renderer.errors == []

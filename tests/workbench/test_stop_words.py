@@ -83,7 +83,5 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     assert run.stopped is not None
     chinese = describe_stop(run.stopped, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese
-    told = notebook_outcome(
-        Outcome(what="execute", error=error), load_model("xMatePro7"), None, translator.Text("en", "rcilab.notebook")
-    )
+    told = notebook_outcome(Outcome(what="execute", error=error), None, translator.Text("en", "rcilab.notebook"))
     assert name in told

@@ -1,15 +1,40 @@
-"""The goal of the operator: a configuration of the arm, and the target pose that it was chosen for."""
+"""The goal of the operator: joint angles, the target pose that they were chosen for, and whether it is reachable."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Literal
 
-from rcilab.app.goal.target_status import TargetStatus, evaluate_joints, evaluate_pose
+import numpy as np
+
 from rcilab.core.arrays import JointVector
-from rcilab.core.errors import KinematicsError
+from rcilab.core.errors import KinematicsError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.i18n.translator import Message
+from rcilab.i18n.translator import Message, message
+from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.robot_model import RobotModel
+
+Tone = Literal["good", "warn", "bad"]
+
+NEAR_LIMIT = math.radians(5.0)  # [rad] A smaller distance to a limit is reported.
+NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm counts as singular.
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TargetStatus:
+    """Result of the inverse kinematics for a target."""
+
+    tone: Tone
+    """good: reachable; warn: reachable, near a limit or a singularity; bad: not reachable."""
+    reason: Message
+    """The reason."""
+    q: JointVector
+    """The joint angles at the nearest reachable pose, shape (n,), [rad]."""
+    solutions: Solutions | None
+    """All branches at that pose; None if it cannot be reached."""
+    short: Message | None = None
+    """Distance of that pose from the target, as a message; None if the target is reached."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -50,6 +75,120 @@ def goal_toward(
     """
     reach = evaluate_pose(model, target, near, psi)
     return Goal(q=reach.q, target=target, reach=reach, psi=_arm_angle(model, reach.q), snapped=snapped)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimitMargin:
+    """Distance of joint angles to the nearest joint limit."""
+
+    angle: float
+    """[rad]."""
+    joint: int
+    """Joint, from 1."""
+
+
+def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
+    """Returns the smallest distance to a joint limit and the joint it belongs to."""
+    distances = np.minimum(q - model.limits.joint.lower, model.limits.joint.upper - q)
+    worst = int(np.argmin(distances))
+    return JointLimitMargin(float(distances[worst]), worst + 1)
+
+
+def distinguishing_joints(solutions: np.ndarray) -> tuple[int, ...]:
+    """Returns the joints, from 0, whose angles in whole degrees distinguish the solutions; none if there is only one.
+
+    Args:
+        solutions: Joint angles, shape (N, n), [rad].
+    """
+    angles = np.degrees(solutions).round()
+    named: list[int] = []
+    for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
+        if len(np.unique(angles[:, named], axis=0)) == len(np.unique(angles, axis=0)):
+            break
+        named.append(joint)
+    return tuple(sorted(named))
+
+
+def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> TargetStatus:
+    """Returns the branch nearest to `near` at a target, or at the reachable pose nearest to it.
+
+    Args:
+        model: The arm.
+        target: Pose of the tool in base.
+        near: Current joint angles, or the last solution, shape (n,), [rad]; they decide the branch.
+        psi: Arm angle to keep, [rad]; None keeps that of `near`.
+    """
+    found = model.closest(target, near, psi)
+    if found.refusal is not None:
+        missed, turned = _miss(target, found.pose)
+        return TargetStatus(
+            tone="bad",
+            reason=why_not(found.refusal, missed),
+            q=found.q,
+            solutions=None,
+            short=_how_short(missed, turned),
+        )
+    return _evaluate_configuration(model, found.q, found.solutions)
+
+
+def evaluate_joints(model: RobotModel, q: JointVector) -> TargetStatus:
+    """Returns the message on joint angles that were set joint by joint."""
+    try:
+        solutions = model.inverse(model.forward(q), near=q)
+    except KinematicsError:
+        solutions = None
+    return _evaluate_configuration(model, q, solutions)
+
+
+def why_not(refusal: UnreachableError, missed: float) -> Message:
+    """Returns why a pose is not reachable.
+
+    Args:
+        refusal: Error of the inverse kinematics.
+        missed: Distance of the pose that the arm takes instead, [m]: the only distance that is shown.
+    """
+    if refusal.distance > 0.0:
+        return message("reach.far", distance=missed)
+    if refusal.joint is not None:
+        return message("reach.joint", joint=refusal.joint, excess=refusal.excess)
+    return message("reach.no")
+
+
+def _at_limit(model: RobotModel, q: JointVector, least: JointLimitMargin) -> Message:
+    limits, joint, angle = model.limits.joint, least.joint, float(q[least.joint - 1])
+    soft = limits.exceeded_soft_limit(joint, angle)
+    if soft is not None:
+        return message("reach.at_soft", joint=joint, angle=angle, limit=soft)
+    if least.angle == 0.0:
+        return message("reach.at_limit", joint=joint)
+    low, high = (float(bound[joint - 1]) for bound in (limits.lower, limits.upper))
+    return message("reach.beyond_limit", joint=joint, angle=angle, low=low, high=high)
+
+
+def _evaluate_configuration(model: RobotModel, q: JointVector, solutions: Solutions | None) -> TargetStatus:
+    least = margin(model, q)
+    if least.angle <= 0.0:
+        return TargetStatus(tone="warn", reason=_at_limit(model, q, least), q=q, solutions=solutions)
+    if model.dexterity(q).smallest < NEAR_SINGULAR:
+        return TargetStatus(tone="warn", reason=message("reach.singular"), q=q, solutions=solutions)
+    if least.angle < NEAR_LIMIT:
+        reason = message("reach.limit", joint=least.joint, margin=least.angle)
+        return TargetStatus(tone="warn", reason=reason, q=q, solutions=solutions)
+    return TargetStatus(tone="good", reason=message("reach.good"), q=q, solutions=solutions)
+
+
+def _miss(target: Pose, reached: Pose) -> tuple[float, float]:
+    """Returns the distance of a pose from its target, [m], and the angle between them, [rad]."""
+    turned = 2.0 * math.acos(min(1.0, abs(float(np.asarray(target.wxyz) @ np.asarray(reached.wxyz)))))
+    return float(np.linalg.norm(target.position - reached.position)), turned
+
+
+def _how_short(missed: float, turned: float) -> Message:
+    if round(math.degrees(turned), 1) == 0.0:
+        return message("reach.short_mm", distance=missed)
+    if round(1000.0 * missed) == 0:
+        return message("reach.short_deg", turn=turned)
+    return message("reach.short", distance=missed, turn=turned)
 
 
 def _arm_angle(model: RobotModel, q: JointVector) -> float | None:

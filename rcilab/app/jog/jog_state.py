@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rcilab.app.arm_features import explain_lack_to_run
+from rcilab.app.arm_features import explain_missing_robot
 from rcilab.app.request import Moving
 from rcilab.app.setup.configuration_state import setup_obstacle
 from rcilab.app.status_text import describe_status
@@ -222,9 +222,9 @@ def _rates(model: RobotModel, q: JointVector, kind: JogKind, values: Array) -> A
 
 def no_jog(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns why the buttons cannot move the robot now, or None when they can."""
-    lack = explain_lack_to_run(state.model, is_virtual=state.target == "virtual")
-    if lack is not None:
-        return lack
+    missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
+    if missing is not None:
+        return missing
     if status.code == "moving.guided":
         return message("ready.guided")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):

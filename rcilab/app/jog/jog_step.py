@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rcilab.app.goal.target_status import evaluate_pose
+from rcilab.app.goal.goal import evaluate_pose
 from rcilab.app.jog.jog_state import AXES, Axis, Frame, JogState, at_limit
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.spatial import Pose

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.makers.maker import find_lack, maker_of
+from rcilab.makers.maker import find_missing_feature, maker_of
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -122,7 +122,7 @@ def lessons_of(model: RobotModel) -> tuple[str, ...]:
     maker = maker_of(model)
     possible = {
         "elbow": bool(model.redundancy),
-        "push": find_lack(model, "guiding") is None,
+        "push": find_missing_feature(model, "guiding") is None,
         "network": maker is not None and any(scenario.cuts_network for scenario in maker.scenarios()),
     }
     return tuple(name for name in LESSONS if possible.get(name, True))

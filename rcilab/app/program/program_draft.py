@@ -7,7 +7,7 @@ from itertools import count
 
 import numpy as np
 
-from rcilab.app.goal.target_status import Tone
+from rcilab.app.goal.goal import Tone
 from rcilab.app.planning import Plan
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, Remark, message

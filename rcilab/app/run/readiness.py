@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rcilab.app.arm_features import explain_lack, explain_lack_to_run, is_only_planned
+from rcilab.app.arm_features import explain_missing_feature, explain_missing_robot, is_only_planned
 from rcilab.app.check.freshness import outdated
 from rcilab.app.planning import find_outside
 from rcilab.app.run.drive_state import destination, parameter_obstacle
@@ -24,10 +24,10 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what prevents Execute, or None if it may be pressed."""
     if state.busy is not None:
         return message("ready.busy")
-    lack = explain_lack_to_run(state.model, is_virtual=state.target == "virtual")
-    lack = explain_lack(state.model, state.drive.mode) if lack is None else lack
-    if lack is not None:
-        return lack
+    missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
+    missing = explain_missing_feature(state.model, state.drive.mode) if missing is None else missing
+    if missing is not None:
+        return missing
     if status.code == "moving.guided":
         return message("ready.guided")
     if status.code == "moving.held":
@@ -101,7 +101,7 @@ def is_plan_current(state: UiState, status: SupervisorStatus) -> bool:
 
 def connection_note(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns the message next to the destination, at the top of Run: why no motion can run there; None: none."""
-    lack = explain_lack_to_run(state.model, is_virtual=state.target == "virtual")
+    missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
     if status.phase in ("fault", "lost", "crashed"):
         return describe_status(status)
-    return message("destination.note") if lack is None and destination(state, status) == "preview" else lack
+    return message("destination.note") if missing is None and destination(state, status) == "preview" else missing

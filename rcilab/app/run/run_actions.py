@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
-from rcilab.app.goal.goal import Goal, goal_at
-from rcilab.app.goal.target_status import Tone
+from rcilab.app.goal.goal import Goal, Tone, goal_at
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import TOOL, is_guided

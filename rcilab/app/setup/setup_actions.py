@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 
 import numpy as np
 
-from rcilab.app.arm_features import explain_lack_of_part
-from rcilab.app.goal.goal import Goal
-from rcilab.app.goal.target_status import evaluate_joints, evaluate_pose
+from rcilab.app.arm_features import explain_missing_part
+from rcilab.app.goal.goal import Goal, evaluate_joints, evaluate_pose
 from rcilab.app.planning import Plan, tool_path
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
@@ -146,9 +145,9 @@ class SetupActions:
         _, _, place = request.field.partition(".")
         part, _, name = place.partition(".")
         state = self._store.state
-        lack = explain_lack_of_part(state.model, cast("SetupPart", part)) if part in LISTED else None
-        if lack is not None:
-            self._store.complain(request.field, lack)
+        missing = explain_missing_part(state.model, cast("SetupPart", part)) if part in LISTED else None
+        if missing is not None:
+            self._store.complain(request.field, missing)
             return
         if part == "joints":
             self._type_joint_limit(request, name)
@@ -253,11 +252,11 @@ class SetupActions:
         assert force is not None
         model = self._store.state.model
         if request.name == "edited" and value in ("", *SETUP_PARTS):
-            shown = {part for part in SETUP_PARTS if part == value and explain_lack_of_part(model, part) is None}
+            shown = {part for part in SETUP_PARTS if part == value and explain_missing_part(model, part) is None}
             self._store.update(setup=replace(setup, edited=value, seen=setup.seen | shown))
         elif request.name in SETUP_PARTS and isinstance(value, bool):
             seen = setup.seen | {request.name} if value else setup.seen - {request.name}
-            if explain_lack_of_part(model, request.name) is None:
+            if explain_missing_part(model, request.name) is None:
                 self._store.update(setup=replace(setup, seen=seen))
         elif request.name == "active" and isinstance(value, bool):
             switched = SafetyBox(size=box.size, T_base_box=box.T_base_box, active=value)
@@ -295,7 +294,7 @@ class SetupActions:
         """Restores and draws an edited configuration; a real robot gets it only after a question."""
         now = self._store.state.setup
         model = self._store.state.model
-        parts: set[SetupPart] = {part for part in setup.parts if explain_lack_of_part(model, part) is None}
+        parts: set[SetupPart] = {part for part in setup.parts if explain_missing_part(model, part) is None}
         if parts:
             self._is_back = True
             wanted, touched = now.wanted.updated(setup.only(parts)), now.touched | parts
@@ -338,9 +337,9 @@ class SetupActions:
 
     def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
         """Applies an edit, unless the arm lacks the part; a drag is one step for undo."""
-        lack = explain_lack_of_part(self._store.state.model, part)
-        if lack is not None:
-            self._store.say("warn", lack)
+        missing = explain_missing_part(self._store.state.model, part)
+        if missing is not None:
+            self._store.say("warn", missing)
             return
         if drag is None or drag != self._drag:
             now = self._store.state.setup

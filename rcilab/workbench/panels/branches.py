@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.target_status import NEAR_LIMIT, distinguishing_joints, margin
+from rcilab.app.goal.goal import NEAR_LIMIT, distinguishing_joints, margin
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rcilab.app.goal.goal import NEAR_LIMIT
 from rcilab.app.goal.goal_actions import MoveJoint
-from rcilab.app.goal.target_status import NEAR_LIMIT
 from rcilab.app.jog.jog_actions import SetJog
 from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, STEPS, HoldJog, PressJog, no_jog
 from rcilab.app.request import Request

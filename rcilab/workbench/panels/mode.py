@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack, explain_lack_of_part, is_only_planned
+from rcilab.app.arm_features import explain_missing_feature, explain_missing_part, is_only_planned
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
@@ -41,7 +41,7 @@ class ModePanel:
             self._note = Html(gui)
             self._build_parts(gui, state)
             with gui.add_folder(text("control.title"), expand_by_default=False):
-                self._lack, self._held = Html(gui), Html(gui)
+                self._missing, self._held = Html(gui), Html(gui)
                 send = gui.add_button(text("control.send"), icon="send", color="blue", hint=text("control.send_hint"))
                 on_press(send, ask, lambda page: PressControl(page=page, what="send"))
                 self._send = send
@@ -74,8 +74,8 @@ class ModePanel:
         text, drive = self._text, state.drive
         self._mode.show(self._names[drive.mode])
         self._mode.handle.disabled = is_moving(status) or is_only_planned(state.model)
-        lack = explain_lack(state.model, drive.mode)
-        sentence = text(f"mode.{drive.mode}_note") if lack is None else text.render(lack)
+        missing = explain_missing_feature(state.model, drive.mode)
+        sentence = text(f"mode.{drive.mode}_note") if missing is None else text.render(missing)
         self._note.show(f'<p class="rl-note">{esc(sentence)}</p>')
         for group in self._groups:
             folder, visible = self._folders[group.name], drive.mode in group.modes
@@ -86,9 +86,9 @@ class ModePanel:
             self._problems[group.name].show(problems_html(state, text, self._labels[group.name]))
         self._send.visible = state.target != "virtual"
         self._send.disabled = not is_pending(state, status) or status.phase != "idle"
-        lack = explain_lack_of_part(state.model, "control")
-        self._reset.disabled = lack is not None
-        self._lack.show(why_html(text, lack))
+        missing = explain_missing_part(state.model, "control")
+        self._reset.disabled = missing is not None
+        self._missing.show(why_html(text, missing))
         self._held.show(held_html(state, status, text))
 
     def _build_field(self, gui: Any, group: ParameterGroup, index: int, label: str) -> NumberField:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack
+from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.run.active_force import (
     DIRECTIONS,
     SPRING,
@@ -55,7 +55,7 @@ class PushPanel:
         on_press(self._guide, ask, lambda page: RobotCommand(page=page, what="guide"))
         self._unguide = gui.add_button(text("drive.unguide"), icon="hand-stop", color="gray")
         on_press(self._unguide, ask, lambda page: RobotCommand(page=page, what="unguide"))
-        self._lack = Html(gui)
+        self._missing = Html(gui)
 
     def _build_push(self, gui: Any, state: UiState) -> None:
         text, ask, push = self._text, self._ask, state.push
@@ -89,13 +89,13 @@ class PushPanel:
         self._direction.show(push.direction)
         self._force.show(push.newtons)
         self._grab.show(push.grab)
-        unsimulated = explain_lack(state.model, "simulation") if state.target == "virtual" else None
+        unsimulated = explain_missing_feature(state.model, "simulation") if state.target == "virtual" else None
         guided, reason = is_guided(status), unsimulated or no_push(status)
-        lack = explain_lack(state.model, "guiding")
-        self._lack.show(why_html(text, lack))
-        self._way.handle.disabled = lack is not None
+        missing = explain_missing_feature(state.model, "guiding")
+        self._missing.show(why_html(text, missing))
+        self._way.handle.disabled = missing is not None
         is_ready = status.phase == "idle" and bool(status.powered)
-        self._guide.disabled = is_moving(status) or not is_ready or lack is not None
+        self._guide.disabled = is_moving(status) or not is_ready or missing is not None
         self._unguide.disabled = not guided
         self._button.disabled = reason is not None
         soft = gives_way(status)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack_of_part
+from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
 from rcilab.app.setup.configuration_state import (
@@ -110,10 +110,12 @@ class SetupPanel:
         text, pending = self._text, pending_parts(state, status)
         rows = []
         for part in LISTED:
-            lack = explain_lack_of_part(state.model, part)
-            here = self._said(state.setup.wanted, part) if lack is None else "—"
+            missing = explain_missing_part(state.model, part)
+            here = self._said(state.setup.wanted, part) if missing is None else "—"
             held = (
-                text("setup.held", held=text.render(describe_held(status, part))) if lack is None else text.render(lack)
+                text("setup.held", held=text.render(describe_held(status, part)))
+                if missing is None
+                else text.render(missing)
             )
             mark = ' class="rl-differs"' if part in pending else ""
             rows.append(

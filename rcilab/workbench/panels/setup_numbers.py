@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack_of_part
+from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.setup.configuration_state import FORCE_AXES
 from rcilab.app.setup.setup_actions import SetSetup
 from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
@@ -42,7 +42,7 @@ class SetupNumbersPanel:
         self._folders: dict[str, Any] = {}
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
-        self._lacks: dict[str, Html] = {}
+        self._missing: dict[str, Html] = {}
         self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and its name in problems.
         self._seen: dict[str, BoundControl] = {}
         self._switches: dict[str, tuple[BoundControl, ...]] = {}
@@ -51,7 +51,7 @@ class SetupNumbersPanel:
             title = title[:1].upper() + title[1:]
             folder = gui.add_folder(title, visible=state.setup.edited == part, order=0.5)  # After the choice.
             with folder:
-                self._lacks[part] = Html(gui)
+                self._missing[part] = Html(gui)
                 gui.add_html('<i class="rl-triples"></i>')
                 if part == "box":
                     active = gui.add_checkbox(text("setup.active"), False, hint=text("setup.active_hint"))
@@ -77,13 +77,13 @@ class SetupNumbersPanel:
         self._active.show(box.active)
         self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
         for part in SETUP_PARTS:
-            lack = explain_lack_of_part(state.model, part)
-            self._lacks[part].show(why_html(self._text, lack))
+            missing = explain_missing_part(state.model, part)
+            self._missing[part].show(why_html(self._text, missing))
             self._seen[part].show(part in setup.seen)
             for control in (self._seen[part], *self._switches.get(part, ())):
-                control.handle.disabled = lack is not None
+                control.handle.disabled = missing is not None
             for field, name in zip(self._fields[part], FIELD_NAMES[part], strict=True):
-                field.disable(lack is not None)
+                field.disable(missing is not None)
                 number = read_field(setup, part, name)
                 sentence = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
                 field.show(sentence, state.problems.get(field.field), state.entered)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack
+from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
 from rcilab.app.run.world_actions import SetWiring
@@ -45,12 +45,12 @@ class SignalsPanel:
             read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
             on_press(read, ask, lambda page: PressSignals(page=page, what="read"))
             self._buttons.append(read)
-            self._levels, self._lack = Html(gui), Html(gui)
+            self._levels, self._missing = Html(gui), Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
             self._wired = BoundControl(wired, ask, lambda v, p: SetWiring(page=p, name="loop_back", on=bool(v)))
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
-            self._reboot_lack = Html(gui)
+            self._reboot_missing = Html(gui)
             gui.add_html('<i class="rl-buttons"></i>')
             self._reboot = gui.add_button(
                 text("reboot.press"), icon="rotate-clockwise", color="orange", hint=text("reboot.hint")
@@ -65,16 +65,16 @@ class SignalsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the controller."""
         text, is_ready = self._text, status.phase in ("idle", "fault")
-        lack = explain_lack(state.model, "signals")
-        self._lack.show(why_html(text, lack))
-        self._output.disabled = lack is not None
+        missing = explain_missing_feature(state.model, "signals")
+        self._missing.show(why_html(text, missing))
+        self._output.disabled = missing is not None
         for button in self._buttons:
-            button.disabled = not is_ready or lack is not None
+            button.disabled = not is_ready or missing is not None
         self._levels.show(levels_html(state.model, status, text))
         self._wired.show(state.world.loop_back)
-        self._wired.handle.disabled = not is_ours(status) or lack is not None
-        unable = explain_lack(state.model, "reboot")
-        self._reboot_lack.show(why_html(text, unable))
+        self._wired.handle.disabled = not is_ours(status) or missing is not None
+        unable = explain_missing_feature(state.model, "reboot")
+        self._reboot_missing.show(why_html(text, unable))
         self._reboot.disabled = not is_ready or unable is not None
         self._reboot.visible = not state.reboot_asked
         self._agree.visible = self._cancel.visible = state.reboot_asked

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_lack_of_part
+from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.setup.configuration_state import own_limits, soft_limits
@@ -40,7 +40,7 @@ class SoftLimitsPanel:
                     self._fields.append((end, joint, NumberField(box, ask, field, text.unit("deg"))))
                     self._named.append((field, label))
             self._problems = Html(gui)
-            self._lack = Html(gui)
+            self._missing = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
@@ -51,13 +51,13 @@ class SoftLimitsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the configuration."""
         limits = soft_limits(state)
-        lack = explain_lack_of_part(state.model, "joints")
+        missing = explain_missing_part(state.model, "joints")
         for end, joint, field in self._fields:
-            field.disable(lack is not None)
+            field.disable(missing is not None)
             number = shown(math.degrees(getattr(limits, end)[joint]))
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
-        self._lack.show(why_html(self._text, lack))
-        self._whole.disabled = limits == own_limits(state) or lack is not None
+        self._missing.show(why_html(self._text, missing))
+        self._whole.disabled = limits == own_limits(state) or missing is not None
         self._auto.show(state.world.auto_limit)
-        self._auto.handle.disabled = not is_ours(status) or lack is not None
+        self._auto.handle.disabled = not is_ours(status) or missing is not None

@@ -114,7 +114,7 @@ def test_page_and_notebook_say_joint_value_and_bound_of_a_fault(change, fault, s
     state = UiState(model=MODEL, goal=goal_at(MODEL, MODEL.home), recording=whole_recording(run, finding=error.finding))
     page = outcome_html(state, SupervisorStatus(phase="fault", code="fault", faults=(fault,)), Text("en"))
     text = translator.Text("en", "rcilab.notebook")
-    notebook = notebook_outcome(Outcome(what="execute", error=error), MODEL, None, text)
+    notebook = notebook_outcome(Outcome(what="execute", error=error), None, text)
     finding = text.render(describe_note(error.finding))
     assert said.replace("'", "&#x27;") in page
     assert finding.replace("'", "&#x27;") in notebook

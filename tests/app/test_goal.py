@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rcilab.app.goal.target_status import NEAR_LIMIT, evaluate_joints, evaluate_pose, margin
+from rcilab.app.goal.goal import NEAR_LIMIT, evaluate_joints, evaluate_pose, margin
 from rcilab.core.spatial import Pose
 from rcilab.makers.rokae.robots import ROBOTS
 from rcilab.model.robot_model import load_model
