@@ -9,8 +9,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from rcilab.core.errors import UsageError
+from rcilab.core.optional_deps import require_installed
 from rcilab.notebook.lessons import INDEX
-from rcilab.notebook.optional_deps import require_installed
 
 _CONFIG_PATH = "JUPYTER_CONFIG_PATH"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.goal.goal_actions import SetLaw, SetPathType, SetSpeed
+from rcilab.app.goal.goal_actions import SLOWEST, SetLaw, SetPathType, SetSpeed
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
@@ -24,7 +24,6 @@ from rcilab.notebook.state import WAYS
 from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
-_SLOWEST = 1.0  # [%]
 _UNSEEN = 0.3  # [s] Quicker plans, which most are, show no progress bar.
 
 
@@ -51,11 +50,11 @@ class PlanPanel(Part):
             tooltip=text("target.law_hint"), layout=wide,
         )  # fmt: skip
         self.speed = lean(
-            ipywidgets.FloatSlider, description=text("target.speed"), min=_SLOWEST, max=100.0, step=1.0,
+            ipywidgets.FloatSlider, description=text("target.speed"), min=100.0 * SLOWEST, max=100.0, step=1.0,
             value=100.0 * state.now.speed,
             readout=False, tooltip=text("target.speed_hint"), layout={"width": "19em"},
         )  # fmt: skip
-        self._speed_field = NumberField(text, "", "%", _SLOWEST, 100.0, self._set_speed)
+        self._speed_field = NumberField(text, "", "%", 100.0 * SLOWEST, 100.0, self._set_speed)
         self.plan = lean(
             ipywidgets.Button,
             description=text("target.plan"),

@@ -16,12 +16,12 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
+from rcilab.core.optional_deps import require_installed
 from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.fonts import writing
-from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.recording.run import Run
 from rcilab.views.plots import QUANTITIES, recorded_curves

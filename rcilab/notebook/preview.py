@@ -15,12 +15,12 @@ from rcilab.core.arrays import Array, as_vector
 from rcilab.core.atomic_file import replacing
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.optional_deps import require_installed
 from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion
 from rcilab.notebook.kernel_reachability import find_place
-from rcilab.notebook.optional_deps import require_installed
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
 

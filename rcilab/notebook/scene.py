@@ -11,8 +11,8 @@ import numpy as np
 from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.optional_deps import require_installed
 from rcilab.notebook.kernel_reachability import KernelReachability, find_place
-from rcilab.notebook.optional_deps import require_installed
 from rcilab.notebook.part import Part
 from rcilab.notebook.preview import Preview, aim_camera
 from rcilab.notebook.style import block, soft, write

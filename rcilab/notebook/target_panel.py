@@ -8,8 +8,8 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from rcilab.app.goal.goal import distinguishing_joints, margin
-from rcilab.app.goal.goal_actions import ChooseBranch, SetArmAngle
+from rcilab.app.goal.goal import POSE_FIELDS, distinguishing_joints, margin
+from rcilab.app.goal.goal_actions import FURTHEST, ChooseBranch, SetArmAngle
 from rcilab.core.errors import KinematicsError
 from rcilab.core.spatial import Pose
 from rcilab.notebook.arc_circle import draw_circle
@@ -19,8 +19,7 @@ from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.style import block, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import lean
 
-_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
-_FURTHEST = 3000.0  # [mm] More than twice the reach of any arm.
+_FURTHEST = 1000.0 * FURTHEST  # [mm]
 _WHOLE_TURN = 360.0  # [deg]
 
 
@@ -40,7 +39,7 @@ class TargetPanel(Part):
                 text, text(f"target.{name}"), "mm" if index < 3 else "deg",
                 *((-_FURTHEST, _FURTHEST) if index < 3 else (-_WHOLE_TURN, _WHOLE_TURN)), self._taker(index),
             )
-            for index, name in enumerate(_NAMES)
+            for index, name in enumerate(POSE_FIELDS)
         ]  # fmt: skip
         self._reach, self._table, self._circle = block(), block(), block()
         self.branches = lean(ipywidgets.Dropdown, description=text("target.branch"), tooltip=text("target.branch_hint"),

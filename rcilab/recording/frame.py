@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import IO, TYPE_CHECKING, Any
 
+from rcilab.core.optional_deps import require_library
 from rcilab.recording.columns import facts_text, run_columns, run_facts
-from rcilab.recording.optional_deps import require_library
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run

@@ -15,9 +15,9 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS
+from rcilab.core.optional_deps import require_library
 from rcilab.core.spatial import Pose
 from rcilab.recording.columns import run_facts
-from rcilab.recording.optional_deps import require_library
 
 if TYPE_CHECKING:
     from rcilab.core.arrays import Array

@@ -20,6 +20,7 @@ from rcilab.control_process import SupervisorStatus
 from rcilab.control_process.motion_upload import require_ready
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
+from rcilab.core.optional_deps import MissingExtraError
 from rcilab.core.spatial import Pose
 from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.i18n.error_messages import describe_note
@@ -36,7 +37,6 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.named_poses import NamedPoseStore
 from rcilab.recording.chunks import MAGIC
-from rcilab.recording.optional_deps import MissingExtraError
 from rcilab.recording.run import decode_run, load_run
 from rcilab.recording.run_file import RunFile
 from rcilab.robots import ROBOT_NAMES

@@ -13,8 +13,8 @@ import pytest
 from rcilab import check, load_model, load_run, plan_joint, simulate
 from rcilab.core.atomic_file import read_own_text, replacing
 from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.optional_deps import MissingExtraError
 from rcilab.motion import Motion, Program, Waypoint
-from rcilab.recording.optional_deps import MissingExtraError
 from rcilab.workbench.access import find_token
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from rcilab.app.goal.goal_actions import SLOWEST
 from rcilab.app.planning import Plan, build_plan_view, make_plan
 from rcilab.app.program.program_draft import Draft
 from rcilab.app.program.program_planning import PROGRAM_LAW
@@ -21,7 +22,6 @@ _TRIES = 2
 _FURTHER = 0.9
 """Steps by which the next try is slower if the speed for the factor is not slow enough. Tuning values."""
 _FOUND = 0.5  # Share of the progress at which the factor is known; about as measured.
-SLOWEST = 0.01
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -17,6 +17,8 @@ from rcilab.model.robot_model import RobotModel
 
 Tone = Literal["good", "warn", "bad"]
 
+POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Names of the fields of a pose."""
 NEAR_LIMIT = math.radians(5.0)  # [rad] A smaller distance to a limit is reported.
 NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm counts as singular.
 

@@ -13,7 +13,7 @@ import numpy as np
 from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.elbow import in_branch, nearest_free
-from rcilab.app.goal.goal import Goal, goal_at, goal_toward
+from rcilab.app.goal.goal import POSE_FIELDS, Goal, goal_at, goal_toward
 from rcilab.app.planning import PATH_KINDS, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
@@ -24,11 +24,10 @@ from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Message, message
 from rcilab.motion.joint import JOINT_LAWS
 
-POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 QUATERNION = "wxyz"
 """Name of the field that takes all four numbers of the orientation."""
 FURTHEST = 3.0  # [m] More than twice the reach of any arm, and the gizmo stays visible.
-SLOWEST = 0.01
+SLOWEST = 0.01  # Lowest speed of plans, as a share of the limits.
 SETTLED = 0.15  # [s] A goal that has not changed for this time is taken as final.
 _FIELDS = ("joint.", "pose.", "psi")  # Beginnings of the names of the fields that a goal is typed into.
 _ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use of a slider's keys.

@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcilab.app.goal.goal_actions import FURTHEST, POSE_FIELDS
+from rcilab.app.goal.goal import POSE_FIELDS
+from rcilab.app.goal.goal_actions import FURTHEST
 from rcilab.app.program.program_draft import Draft, target_of
 from rcilab.core.arrays import Array
 from rcilab.core.errors import KinematicsError

@@ -14,9 +14,9 @@ from typing import IO, TYPE_CHECKING, TypeAlias
 from rcilab.app.request import Handlers, Request
 from rcilab.app.status_text import explain_error
 from rcilab.core.errors import RcilabError
+from rcilab.core.optional_deps import MissingExtraError
 from rcilab.i18n.translator import message
 from rcilab.recording.export import write_export
-from rcilab.recording.optional_deps import MissingExtraError
 
 if TYPE_CHECKING:
     from rcilab.app.store import Store

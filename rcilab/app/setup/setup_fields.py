@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
@@ -17,14 +18,13 @@ from rcilab.i18n.translator import Message, message
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.model.dynamics.payload import LARGEST_INERTIA, Payload
 
-POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 FACE_NAMES = ("xmin", "ymin", "zmin", "xmax", "ymax", "zmax")
 INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 FIELD_NAMES = {
-    "box": (*FACE_NAMES, *POSE_NAMES[3:]),
-    "tool": POSE_NAMES,
-    "load": ("mass", *POSE_NAMES[:3], *INERTIA_NAMES),
-    "force": POSE_NAMES,
+    "box": (*FACE_NAMES, *POSE_FIELDS[3:]),
+    "tool": POSE_FIELDS,
+    "load": ("mass", *POSE_FIELDS[:3], *INERTIA_NAMES),
+    "force": POSE_FIELDS,
 }
 JOINT_ENDS = ("lower", "upper")
 """In addition to FIELD_NAMES: setup.joints.lower.0 and so on."""
@@ -53,7 +53,7 @@ def field_range(part: str, name: str, rated_payload: float, longest_tool: float)
         rated_payload: Payload of the arm, [kg].
         longest_tool: See `Capabilities.longest_tool`, [m].
     """
-    if name in POSE_NAMES[3:]:
+    if name in POSE_FIELDS[3:]:
         return Range(-360.0, 360.0, "deg")
     if name == "mass":
         return Range(0.0, rated_payload, "kg")
@@ -77,9 +77,9 @@ def read_field(setup: SetupState, part: str, name: str) -> float:
     if name in INERTIA_NAMES:
         return moments(setup)[INERTIA_NAMES.index(name)]
     if part == "load":
-        return 1000.0 * float(wanted.load.center_of_mass[POSE_NAMES.index(name)])
+        return 1000.0 * float(wanted.load.center_of_mass[POSE_FIELDS.index(name)])
     pose = {"box": wanted.box.T_base_box, "tool": wanted.tool, "force": wanted.force.T_flange_force}[part]
-    index = POSE_NAMES.index(name)
+    index = POSE_FIELDS.index(name)
     return 1000.0 * float(pose.position[index]) if index < 3 else math.degrees(float(pose.rpy[index - 3]))
 
 
@@ -169,7 +169,7 @@ def _with_load_field(setup: SetupState, load: Payload, name: str, value: float) 
         typed[INERTIA_NAMES.index(name)] = value
         return replace(setup, inertia=tuple(typed))
     center = np.array(load.center_of_mass)
-    center[POSE_NAMES.index(name)] = value / 1000.0
+    center[POSE_FIELDS.index(name)] = value / 1000.0
     return _with(setup, load=replace(load, center_of_mass=center))
 
 
@@ -198,7 +198,7 @@ def _with(setup: SetupState, **parts: object) -> SetupState:
 
 def _turned(pose: Pose, name: str, value: float) -> Pose:
     position, rpy = pose.position, pose.rpy
-    index = POSE_NAMES.index(name)
+    index = POSE_FIELDS.index(name)
     if index < 3:
         position[index] = value / 1000.0
     else:

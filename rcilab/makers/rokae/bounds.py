@@ -5,6 +5,7 @@ A greater length is a mistake of units: no xMate reaches farther than 1 m from i
 
 from __future__ import annotations
 
+DEFAULT_PORT = 1337  # By convention of the manual (2.5); the teach pendant's RCI page shows the one in force.
 FILTER_OFF = 1000.0  # [Hz] Largest cut-off frequency; there it means "no filter" (measured).
 REPORT_FREQUENCY = 100.0  # [Hz] Cut-off frequency of the reported torques after the controller's start.
 LOWEST_FREQUENCY = 0.1  # [Hz] Smallest cut-off frequency: a motion arrives some 20 s late. At 0 Hz nothing would pass.

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.arm_features import explain_missing_part
+from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.setup.configuration_state import FORCE_AXES
 from rcilab.app.setup.setup_actions import SetSetup
-from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, POSE_NAMES, read_field
+from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, read_field
 from rcilab.app.text import Text
 from rcilab.makers.configuration import SETUP_PARTS
 from rcilab.workbench.panels.jog import problems_html
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _ROWS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "box": (("low", FIELD_NAMES["box"][:3]), ("high", FIELD_NAMES["box"][3:6]), ("turned", POSE_NAMES[3:])),
-    "tool": (("place", POSE_NAMES[:3]), ("turned", POSE_NAMES[3:])),
+    "box": (("low", FIELD_NAMES["box"][:3]), ("high", FIELD_NAMES["box"][3:6]), ("turned", POSE_FIELDS[3:])),
+    "tool": (("place", POSE_FIELDS[:3]), ("turned", POSE_FIELDS[3:])),
     "load": (
         ("mass", ("mass",)),
-        ("center", POSE_NAMES[:3]),
+        ("center", POSE_FIELDS[:3]),
         ("moments", INERTIA_NAMES[:3]),
         ("products", INERTIA_NAMES[3:]),
     ),
-    "force": (("place", POSE_NAMES[:3]), ("turned", POSE_NAMES[3:])),
+    "force": (("place", POSE_FIELDS[:3]), ("turned", POSE_FIELDS[3:])),
 }
 
 
@@ -97,7 +98,7 @@ class SetupNumbersPanel:
             gui.add_html(f'<p class="rl-rowname">{esc(text(f"setup.row.{row}"))}</p>')
             for name in names:
                 box = gui.add_text(self._label(name), "", hint=text("target.type_hint"))
-                unit = None if name == "mass" or name in INERTIA_NAMES else "deg" if name in POSE_NAMES[3:] else "mm"
+                unit = None if name == "mass" or name in INERTIA_NAMES else "deg" if name in POSE_FIELDS[3:] else "mm"
                 field = f"setup.{part}.{name}"
                 self._fields[part].append(NumberField(box, self._ask, field, text.unit(unit) if unit else None))
                 self._named[part].append((field, f"{text(f'setup.row.{row}')}: {self._label(name)}"))

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.app.check.freshness import beside_program, outdated
-from rcilab.app.goal.goal_actions import POSE_FIELDS, QUATERNION
+from rcilab.app.goal.goal import POSE_FIELDS
+from rcilab.app.goal.goal_actions import QUATERNION
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import format_fixed

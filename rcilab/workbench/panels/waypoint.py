@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.goal.goal_actions import POSE_FIELDS
+from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_draft import TYPES, target_of
 from rcilab.app.program.waypoint_fields import VIA_FIELDS, arm_angle_of

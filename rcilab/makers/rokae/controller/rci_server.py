@@ -9,6 +9,7 @@ from collections import deque
 
 from rcilab.core.errors import DecodeError
 from rcilab.i18n.translator import Remark
+from rcilab.makers.rokae.bounds import DEFAULT_PORT
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_handlers import Reply
 from rcilab.makers.rokae.controller.state_machine import Event, Phase, When
@@ -26,7 +27,6 @@ from rcilab.sim.channels import Link, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
-DEFAULT_PORT = 1337  # By convention of the manual (2.5).
 SHUTDOWN_NOTICE = 20  # [cycles] During which the states of an ended motion are still sent, with the error bit.
 _PROTOCOL = "RCI"
 _QUIET = (Phase.OFF, Phase.IDLE)

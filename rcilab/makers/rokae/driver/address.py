@@ -9,8 +9,8 @@ from urllib.parse import parse_qsl, urlsplit
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.network import find_route
+from rcilab.makers.rokae.bounds import DEFAULT_PORT
 
-DEFAULT_PORT = 1337  # By convention of the manual; the teach pendant's RCI page shows the one in force.
 SPARE_LOOPBACK = "127.0.0.3"
 """Our address if the robot has the one that we would have used; any other in 127/8 would do."""
 

@@ -6,7 +6,7 @@ import pytest
 
 import rcilab
 from rcilab.core.errors import UsageError
-from rcilab.notebook.optional_deps import require_installed
+from rcilab.core.optional_deps import require_installed
 
 
 def test_an_installed_package_is_no_matter_for_words() -> None:
@@ -14,7 +14,7 @@ def test_an_installed_package_is_no_matter_for_words() -> None:
 
 
 def test_a_missing_package_is_named_with_the_way_to_get_it() -> None:
-    with pytest.raises(UsageError, match=r"plot needs no_such_package.*pip install -e '\.\[lab\]'"):
+    with pytest.raises(UsageError, match=r"plot needs no_such_package.*pip install 'rcilab\[lab\]'"):
         require_installed("no_such_package", "plot")
 
 

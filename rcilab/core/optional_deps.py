@@ -1,0 +1,50 @@
+"""Libraries of the extras: the error for a missing one says how to install it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, Literal, TypeAlias
+
+from rcilab.core.errors import UsageError
+
+Extra: TypeAlias = Literal["export", "lab"]
+
+
+class MissingExtraError(UsageError):
+    """A library of an extra is not installed.
+
+    Attributes:
+        library: Name of the library.
+
+    Args:
+        library: Name of the library.
+        purpose: The feature that needs it, such as "plot".
+        extra: The extra that contains it.
+    """
+
+    def __init__(self, library: str, purpose: str, extra: Extra = "export") -> None:
+        super().__init__(f"{purpose} needs {library}, which is not installed: pip install 'rcilab[{extra}]'")
+        self.library = library
+
+
+def require_installed(library: str, purpose: str) -> None:
+    """Checks that a library of the extra `lab` is installed, without importing it.
+
+    Raises:
+        MissingExtraError: It is not.
+    """
+    if find_spec(library) is None:
+        raise MissingExtraError(library, purpose, "lab")
+
+
+def require_library(name: str, purpose: str) -> Any:
+    """Returns a library of the extra `export`.
+
+    Raises:
+        MissingExtraError: It is not installed.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtraError(name.split(".")[0], purpose) from error
