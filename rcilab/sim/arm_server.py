@@ -311,7 +311,9 @@ class ArmServer:
         if not self.controller.wants_commands:
             return
         playout = self.controller.arm.playout
-        extra = len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.work_off())
+        extra = (
+            len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.pop_extra_cycle())
+        )
         for _ in range(extra):
             if self.controller.wants_commands:
                 self._advance(is_seen=False)

@@ -6,18 +6,18 @@
   client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) simply fills the
   queue; its old message ids do not matter.
 * Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
-  it comes after all, is dropped as it comes: the arm has passed that place already.
-* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go elsewhere.
+  it arrives after all, is dropped: the arm has already passed that position.
+* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go to another address.
 * A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
-  datagram that is the same in every number is the network's copy and dropped; it only shows that the client lives.
+  datagram that is the same in every number is a duplicate and dropped; it only shows that the client still runs.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
   itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap. A repeated
   id right before the gap speaks for the lost state.
-* A command that was overtaken on its way fills the gap. Where states overtake each other, it is the ids of their
-  answers that are out of order: then the command behind the gap continues the motion, and those with the ids of the
-  gap come after it, in the order of their arrival.
-* Clearly more commands than the prefill in stock for a long time mean a client that made more of them than there are
-  cycles; the loop then runs some extra cycles, or their delay would only ever grow.
+* A command that arrives out of order fills the gap. Where states are reordered, the ids of their answers are out of
+  order: then the command after the gap continues the motion, and those with the ids of the gap follow it, in the
+  order of their arrival.
+* Many more commands than the prefill in stock for a long time mean that the client sent more commands than there were
+  cycles; the loop then runs some extra cycles, because their delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
 * A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
 """
@@ -30,10 +30,10 @@ from typing import NamedTuple
 
 from rcilab.sim.arm_command import ArmCommand
 
-CAPACITY = 256  # Commands in the queue; then the oldest gives way. 2.5 of the vendor client's worst bursts (about 92).
+CAPACITY = 256  # Commands in the queue; then the oldest is dropped. 2.5 of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate looks back over, 1 s.
-STOCK_WINDOW = 100  # Cycles in which the lowest stock is looked for; longer than any jitter.
-SLACK = 5  # Cycles of delay more than wanted that are left alone: a client may be late with its first answer.
+STOCK_WINDOW = 100  # Cycles over which the lowest stock is measured; longer than any jitter.
+SLACK = 5  # Cycles of additional delay that are tolerated: a client may be late with its first answer.
 FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
 
@@ -76,25 +76,25 @@ class JitterBuffer:
         self.begin()
 
     def begin(self, *, most: int | None = None) -> None:
-        """Forgets everything, ready for the first command of a motion.
+        """Resets everything for the first command of a motion.
 
         Args:
-            most: Commands that may be in stock beside the one that is played: another prefill, and what is older is
-                skipped. None is as many as fit.
+            most: Largest stock next to the command that is played: it replaces the prefill, and older commands are
+                skipped. None: as many as fit.
         """
         self._queue.clear()
-        self._stock = most
-        self._countdown = self._prefill if self._stock is None else self._stock
+        self._max_stock = most
+        self._countdown = self._prefill if self._max_stock is None else self._max_stock
         self._newest: ArmCommand | None = None
-        self._lives = False
-        self._lowest, self._looked, self._excess = CAPACITY, 0, 0
+        self._is_repeating = False
+        self._lowest, self._observed, self._excess = CAPACITY, 0, 0
         self._outcomes: deque[bool] = deque(maxlen=WINDOW)
         self._played_in_window = 0
         self._last_id = 0
-        self._was_lost = False  # The cycle `_last_id` had no command.
+        self._is_last_lost = False  # The cycle `_last_id` had no command.
         self._surplus = 0  # Commands that had an id again, right before the next one in the queue.
-        self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still come.
-        self._waited = 0
+        self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still arrive.
+        self._cycles_waited = 0
         self.is_playing = False
         self.is_finished = False
         self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
@@ -108,8 +108,8 @@ class JitterBuffer:
 
     @property
     def is_starved(self) -> bool:
-        """Whether the next cycle would lose its command, for all that is known now."""
-        return self.is_playing and not (self.is_finished or self._queue or self._lives)
+        """Whether the next cycle is lost unless a command arrives."""
+        return self.is_playing and not (self.is_finished or self._queue or self._is_repeating)
 
     @property
     def success_rate(self) -> float:
@@ -121,14 +121,14 @@ class JitterBuffer:
         queue, newest = self._queue, self._newest
         if command == newest:
             self.copies += 1
-            self._lives = True
+            self._is_repeating = True
             return
-        is_overtaken = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
-        if not is_overtaken:
+        is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
+        if not is_reordered:
             self._newest = command
         if self._is_late(command):
             self.late += 1
-        elif is_overtaken and command in queue:
+        elif is_reordered and command in queue:
             self.copies += 1
         else:
             if len(queue) >= CAPACITY:
@@ -136,10 +136,10 @@ class JitterBuffer:
                 self.dropped += 1
             queue.append(command)
 
-    def work_off(self) -> bool:
-        """Returns whether a cycle more is due now: many more commands than the prefill waited through the last window.
+    def pop_extra_cycle(self) -> bool:
+        """Returns whether an extra cycle is due: many more commands than the prefill were in stock in the last window.
 
-        That is no jitter; the client has made more commands than there were cycles.
+        That is not jitter; the client has sent more commands than there were cycles.
         """
         if self._excess == 0:
             return False
@@ -158,8 +158,8 @@ class JitterBuffer:
             return _WAITING
         if not self.is_playing:
             if not self._queue:
-                self._waited += 1
-                return _WAITING if self._waited <= FIRST_COMMAND_TIMEOUT else self._lose(_EMPTY)
+                self._cycles_waited += 1
+                return _WAITING if self._cycles_waited <= FIRST_COMMAND_TIMEOUT else self._lose(_EMPTY)
             if self._countdown > 0:
                 self._countdown -= 1
                 return _WAITING
@@ -167,14 +167,14 @@ class JitterBuffer:
             self._skip_old()
             first = self._queue[0].number
             self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
-        self._look_for_excess()
-        skipped = 0 if self._stock is None else self._skip_old()
-        lives, self._lives = self._lives, False
+        self._find_excess()
+        skipped = 0 if self._max_stock is None else self._skip_old()
+        is_repeating, self._is_repeating = self._is_repeating, False
         if not self._queue:
-            return self._wait_alive() if lives else self._lose(_EMPTY)
+            return self._bridge_repeat() if is_repeating else self._lose(_EMPTY)
         command = self._queue[0]
         steps = 1 if command.number == self._last_id + 1 else self._steps_to(command, is_next)
-        if steps > 1:  # Unless a command that was overtaken fills the gap, its cycles are lost.
+        if steps > 1:  # Unless a reordered command fills the gap, its cycles are lost.
             between = (other for other in self._queue if self._last_id < other.number < command.number)
             command = min(between, key=lambda other: other.number, default=command)
             steps = self._steps_to(command, is_next)
@@ -200,36 +200,36 @@ class JitterBuffer:
         behind = self._last_id - command.number
         if command.number in self._passed_over:
             return False
-        return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._was_lost) and self.is_playing
+        return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._is_last_lost) and self.is_playing
 
-    def _look_for_excess(self) -> None:
+    def _find_excess(self) -> None:
         stock = len(self._queue) - 1
         if stock < self._lowest:
             self._lowest = stock
-        self._looked += 1
-        if self._looked >= STOCK_WINDOW:
+        self._observed += 1
+        if self._observed >= STOCK_WINDOW:
             excess = self._lowest - self._prefill
             self._excess = excess if excess > SLACK else 0
-            self._looked, self._lowest = 0, CAPACITY
+            self._observed, self._lowest = 0, CAPACITY
 
     def _skip_old(self) -> int:
-        """Skips commands beyond the stock that is wanted; returns how many."""
-        if self._stock is None:
+        """Skips commands beyond the largest stock; returns how many."""
+        if self._max_stock is None:
             return 0
-        skipped = max(0, len(self._queue) - self._stock - 1)
+        skipped = max(0, len(self._queue) - self._max_stock - 1)
         for _ in range(skipped):
             self._advance_to(self._queue.popleft().number)
         return skipped
 
-    def _wait_alive(self) -> Playback:
-        """Bridges a cycle in which the client had nothing new to say: it answered a state again, word by word."""
+    def _bridge_repeat(self) -> Playback:
+        """Bridges a cycle without a new command: the client repeated its last one unchanged."""
         self._surplus += 1
         self.lost_in_row = 0
         self._count(True)
         return _EMPTY
 
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
-        self._queue.remove(command)  # The first one but for an overtaken command.
+        self._queue.remove(command)  # The first one, except for a reordered command.
         self._advance_to(command.number)
         self.lost_in_row = 0
         self.is_finished = command.finished
@@ -238,7 +238,7 @@ class JitterBuffer:
 
     def _advance_to(self, played: int) -> None:
         """Stores the id that is played now."""
-        last, self._was_lost = self._last_id, False
+        last, self._is_last_lost = self._last_id, False
         if played in self._passed_over:
             self._passed_over.remove(played)
             return
@@ -251,7 +251,7 @@ class JitterBuffer:
         self._last_id = played
 
     def _lose(self, playback: Playback) -> Playback:
-        self._last_id, self._was_lost = self._last_id + 1, True
+        self._last_id, self._is_last_lost = self._last_id + 1, True
         self.lost += 1
         self.lost_in_row += 1
         self.most_in_row = max(self.most_in_row, self.lost_in_row)

@@ -220,7 +220,7 @@ def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
             for _ in range(count):
                 playout.push(command(next(ids)))
             playout.take(by_whole_gap)
-            if playout.work_off():
+            if playout.pop_extra_cycle():
                 playout.take(by_whole_gap)
                 extra += 1
         return extra

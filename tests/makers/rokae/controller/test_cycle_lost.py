@@ -151,7 +151,7 @@ def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
     extra = 0
     for row in rows[8:]:
         hand.cycle.receive(rci.CommandPacket(hand.state.message_id, tuple(row)))
-        if hand.cycle.playout.work_off():
+        if hand.cycle.playout.pop_extra_cycle():
             hand.cycle.step(is_seen=False)
             extra += 1
         assert hand.step().faults == ()
