@@ -24,7 +24,7 @@ from rcilab.makers.maker import timing_of
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.realtime.scheduling import realtime_section
 from rcilab.recording.run import Run, build_run, describe_end
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.motion import Motion

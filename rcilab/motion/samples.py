@@ -18,7 +18,7 @@ from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
-from rcilab.motion.archive import Shapes, contains_numbers, read_arrays
+from rcilab.motion.npy_reader import Shapes, contains_numbers, read_arrays
 from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
 

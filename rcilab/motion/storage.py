@@ -16,7 +16,7 @@ from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.cycle_log import Column, write_csv
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.core.file_bounds import ROW_BYTES, require_bytes, require_max_rows, require_rows
-from rcilab.motion.archive import Shapes, contains_numbers, read_arrays
+from rcilab.motion.npy_reader import Shapes, contains_numbers, read_arrays
 from rcilab.motion.piecewise import PiecewisePolynomial, require_piece_shapes
 
 M = TypeVar("M", bound=Sized)

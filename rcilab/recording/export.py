@@ -15,7 +15,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Text
 from rcilab.i18n.units import USUAL, Units
 from rcilab.recording.columns import run_columns
-from rcilab.recording.frame import write_parquet
+from rcilab.recording.data_frame import write_parquet
 from rcilab.recording.html_file import write_html
 from rcilab.recording.mcap_file import write_mcap
 from rcilab.recording.run_file import write_run

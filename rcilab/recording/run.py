@@ -22,11 +22,11 @@ from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark
 from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
+from rcilab.recording.data_frame import to_pandas
 from rcilab.recording.export import save_run
-from rcilab.recording.frame import to_pandas
 from rcilab.recording.run_file import decode_content, read_run
 from rcilab.recording.run_html import run_html
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 from rcilab.recording.tracking import Tracking, compute_tracking, count_compared, find_stop_time
 from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
 

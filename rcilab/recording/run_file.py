@@ -47,7 +47,7 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion.motion import Motion
 from rcilab.recording.chunks import Chunk, decode_chunks, encode_chunk, encode_header
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report

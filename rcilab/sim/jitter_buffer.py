@@ -7,7 +7,7 @@
   queue; its old message ids do not matter.
 * Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
   it arrives after all, is dropped: the arm has already passed that position.
-* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost: the commands go to another address.
+* Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost.
 * A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
   datagram that is the same in every number is a duplicate and dropped; it only shows that the client still runs.
 * A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command

@@ -14,7 +14,7 @@ from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.view_actions import SetView
 from rcilab.model.robot_model import RobotModel
 from rcilab.recording.run import build_run
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 from tests.recording.runs import MODEL, PLAN, export_run, some_cycles, some_ideal_run, some_long_run, some_run
 
 

@@ -6,7 +6,7 @@ import ipywidgets
 
 from rcilab import load_model, notebook
 from rcilab.recording.run import build_run
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 from tests.recording.runs import MODEL, PLAN, some_cycles
 
 HOSTILE = "<img src=x onerror=alert(1)>&\"'</style><script>alert(2)</script>"

@@ -16,7 +16,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_stop
 from rcilab.recording.export import write_export
 from rcilab.recording.run import Run, build_run
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 MODEL = load_model("xMatePro7", tool=Pose((0.0, 0.01, 0.12), (0.9, 0.1, 0.2, 0.3)), load=Payload(mass=1.5))
 PLAN = plan_joint(MODEL, MODEL.home, MODEL.home + 0.2, speed=0.3)

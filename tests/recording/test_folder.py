@@ -10,9 +10,9 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError
 from rcilab.model.robot_model import load_model
 from rcilab.recording.folder import FolderStats, keep_newest, stored_runs
-from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.live_recording import LiveRecording, RunFacts
 from rcilab.recording.run_file import RunFile
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchErr
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, decode_chunks, encode_chunk, encode_header
-from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.live_recording import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run
 from rcilab.recording.run_file import CHUNK_CYCLES, RunFile, RunWriter, write_run
 from rcilab.recording.run_html import run_html

@@ -27,7 +27,7 @@ from rcilab.core.errors import UsageError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.recording.run import decode_run
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.outcome import outcome_html, replay_html
 from rcilab.workbench.panels.recording import progress_html, summary_html

@@ -14,10 +14,10 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.error_messages import describe_error
 from rcilab.i18n.translator import message
-from rcilab.recording.live import LiveRecording, RunFacts
+from rcilab.recording.live_recording import LiveRecording, RunFacts
 from rcilab.recording.run import Run
 from rcilab.recording.run_file import ENDING, RunFile
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.app.app_state import AppState

@@ -12,7 +12,7 @@ from importlib.metadata import version
 import numpy as np
 
 from rcilab.core.errors import ConnectionLostError
-from rcilab.diagnostics.bench.bare import bare_page
+from rcilab.diagnostics.bench.empty_page import bare_page
 from rcilab.diagnostics.bench.measure import Measurement, summarise
 from rcilab.model.robot_model import load_model
 from rcilab.views.arm_view import ArmView

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rcilab.core.errors import DeadlineError
-from rcilab.diagnostics.bench.bare import bare_page
 from rcilab.diagnostics.bench.browser import open_page, wait_on_page, why_no_page
+from rcilab.diagnostics.bench.empty_page import bare_page
 from rcilab.diagnostics.bench.loop import wait_for
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.model.robot_model import load_model

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import statistics
 
-from rcilab.diagnostics.bench.bare import bare_page
 from rcilab.diagnostics.bench.browser import open_page, wait_on_page, why_no_page
+from rcilab.diagnostics.bench.empty_page import bare_page
 from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.diagnostics.host import find_chromium
 from rcilab.workbench.app import Workbench, WorkbenchConfig

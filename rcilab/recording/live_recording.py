@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.recording.run import Run, build_run, find_delay
-from rcilab.recording.setup import Setup
+from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
