@@ -33,7 +33,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.plan_to(1, -50.0 if page.status.q_c[0] > 0 else 50.0)
     page.open_tab("Run")
     page.unfold("Mode")
-    choose(page, "Follow", "joint impedance")
+    choose(page, "Control mode", "joint impedance")
     page.wait(lambda: page.state.drive.mode == "joint_impedance", "the mode")
     field = page.tab.get_by_text("Joint stiffness").first
     assert "N·m/rad" in field.inner_text()
