@@ -27,7 +27,7 @@ from rcilab.notebook.widget_sharing import lean
 class FaultPanel(Part):
     """All faults, those that are set now, and the last milliseconds before a stop.
 
-    "Provoke" provokes the chosen fault on a private virtual controller, which has no other client and ends with this
+    "Trigger" triggers the chosen fault on a private virtual controller, which has no other client and ends with this
     panel; the robot of the notebook is not touched. `Scene`, `Timeline` and `MotionPlot` of the same arm show the
     moment of the fault, until the next plan, goal or execution.
 

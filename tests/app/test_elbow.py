@@ -89,5 +89,5 @@ def test_an_arm_angle_that_only_a_singularity_forbids_is_taken_as_it_is():
 
 
 def test_an_arm_whose_elbow_follows_no_circle_is_not_called_stretched():
-    for name, said in (("xMatePro7", "stretched"), ("Panda", "follows no circle: ψ is the angle of joint 3")):
+    for name, said in (("xMatePro7", "stretched"), ("Panda", "does not move on a circle: ψ is the angle of joint 3")):
         assert said in no_ring_html(load_model(name).redundancy, EN)

@@ -40,8 +40,8 @@ def test_sentences_are_said_in_the_units_of_the_page():
 
 
 def test_numbers_of_the_text_itself_are_said_in_the_units_of_the_page():
-    assert Text("en")("program.hint.psi").startswith("Arm angle there, -180° to 180°.")
-    assert Text("en", SI)("program.hint.psi").startswith("Arm angle there, -3.14 rad to 3.14 rad.")
+    assert Text("en")("program.hint.psi").startswith("Arm angle at the waypoint, -180° to 180°.")
+    assert Text("en", SI)("program.hint.psi").startswith("Arm angle at the waypoint, -3.14 rad to 3.14 rad.")
     assert "0.250 m/s and 0.79 rad/s for the tool" in Text("en", SI)("jog.speed_hint")
 
 

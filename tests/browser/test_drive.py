@@ -33,7 +33,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.plan_to(1, -50.0 if page.status.q_c[0] > 0 else 50.0)
     page.open_tab("Run")
     page.unfold("Mode")
-    choose(page, "Follow", "joint impedance")
+    choose(page, "Control mode", "joint impedance")
     page.wait(lambda: page.state.drive.mode == "joint_impedance", "the mode")
     field = page.tab.get_by_text("Joint stiffness").first
     assert "N·m/rad" in field.inner_text()
@@ -61,7 +61,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
 
 def test_the_question_about_an_address_goes_when_another_one_is_typed(page):
     page.open_tab("Run")
-    choose(page, "Connect to", "a controller at an address")
+    choose(page, "Destination", "a controller at an address")
     field = page.tab.locator("label:visible", has_text="Address").locator(
         "xpath=ancestor::div[contains(@class,'Flex-root')][1]"
     )
@@ -77,5 +77,5 @@ def test_the_question_about_an_address_goes_when_another_one_is_typed(page):
     page.wait(lambda: "999.1.1.1" in page.toast(), "the refusal")
     assert page.button("Yes, connect").count() == 0
     assert page.state.target == "virtual"
-    choose(page, "Connect to", "virtual controller, ideal arm")
+    choose(page, "Destination", "virtual controller, ideal arm")
     page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "the virtual controller", 30.0)

@@ -57,7 +57,7 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
     field(page, "Blend").fill("-5")
     page.wait(lambda: any("-5 is outside" in text for text in page.alerts()), "why it is not taken")
     assert page.tab.locator(".rl-problem").is_visible()
-    assert page.tab.get_by_text("The number was not taken").is_visible()
+    assert page.tab.get_by_text("The number was not accepted").is_visible()
     assert page.tab.locator("[role=tabpanel]").get_by_text("Passed").locator("visible=true").count() == 0
     field(page, "Blend").fill("0")
     page.wait(lambda: page.alerts() == [], "the verdict again")

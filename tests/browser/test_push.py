@@ -16,7 +16,7 @@ def physics(page):
     """The page with MuJoCo behind it, chosen by hand; the ideal arm comes back afterwards."""
     page.open_tab("Run")
     pid = page.status.controller_pid
-    choose(page, "Connect to", "virtual controller, MuJoCo (physics)")
+    choose(page, "Destination", "virtual controller, MuJoCo (physics)")
     page.wait(lambda: page.status.controller_pid not in (None, pid), "another controller", 30.0)
     page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a powered, idle arm", 30.0)
     page.wait(lambda: "MuJoCo" in page.chip("where"), "the status line to name the plant")

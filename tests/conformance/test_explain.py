@@ -165,7 +165,7 @@ def test_a_sentence_in_full_in_both_languages():
     )
     assert explain_violation(violation, "zh") == (
         "关节 4：指令速度 -2.31 rad/s，超过限值 -2.175 rad/s，超出 0.135 rad/s，为限值的 106.2 %，t = 0.400 s。"
-        "控制器会报 kCommandJointVelocityLimitsViolation：关节指令速度过高。处理办法：将 speed 降到 0.36 或更低。"
+        "控制器会触发 kCommandJointVelocityLimitsViolation：关节指令速度过高。处理办法：将 speed 降到 0.36 或更低。"
     )
 
 
@@ -187,7 +187,7 @@ def test_an_accepted_motion_is_told_with_what_is_nearest_to_its_bound():
     report = check(MOTION, MODEL)
     worst = report.worst
     assert report.explain().startswith(
-        "The robot would accept this motion: it keeps every necessary condition. Nearest"
+        "The robot would accept this motion: it meets every necessary condition. Nearest"
     )
     assert f"joint {worst.joint}, {worst.condition.quantity}" in report.explain()
     assert f"{100 * worst.ratio:.1f} % of the bound" in report.explain()

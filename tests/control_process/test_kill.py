@@ -91,7 +91,7 @@ def test_a_controller_killed_while_the_arm_rests_is_named_and_the_control_proces
         status = wait_for_phase(supervisor, "idle")
         assert (status.incident.number, status.incident.code) == (1, "crashed.controller")
         assert "virtual controller has ended unexpectedly (signal 9" in status.incident.message
-        assert "wake-up pose" in status.incident.message
+        assert "initial pose" in status.incident.message
         assert "motor power off" in status.incident.message
         assert status.worker_pid == before.worker_pid
         assert status.powered is False

@@ -393,7 +393,7 @@ def test_from_outside_its_box_the_tool_may_only_be_led_in(way):
             )
 
         play(lead_in)
-        with pytest.raises(ControlError, match="a motion that starts outside it may only lead into it"):
+        with pytest.raises(ControlError, match="a motion that starts outside it may only move inwards"):
             play(plan_joint(model, robot.state.q_c, q))
 
 

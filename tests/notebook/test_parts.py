@@ -262,7 +262,7 @@ def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.plan.click()
     fresh.jog.sliders[0].value = 1.0
-    assert "has been moved" in text_of(fresh.plan._said)
+    assert "has moved" in text_of(fresh.plan._said)
 
 
 def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: Lab) -> None:
@@ -379,7 +379,7 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
 
 def test_a_film_advises_nothing_that_does_not_help() -> None:
     with notebook.Scene(XMATE3, place=KernelReachability(way="static", proxy_helps=False)) as scene:
-        assert "a film of the plan" in text_of(scene._note)
+        assert "an animation of the plan" in text_of(scene._note)
         assert "jupyter-server-proxy" not in text_of(scene._note)
 
 

@@ -144,7 +144,7 @@ def test_one_jump_of_all_joints_is_one_place_in_the_title() -> None:
     q = MOTION.q.copy()
     q[len(q) // 2 :] += 0.05
     assert len(rcilab.check(rcilab.Motion.from_cycles(q), PRO7).violations) == 21
-    assert "beyond a limit at 1 place," in plot(rcilab.Motion.from_cycles(q), PRO7).get_suptitle()
+    assert "limit exceeded once," in plot(rcilab.Motion.from_cycles(q), PRO7).get_suptitle()
 
 
 @pytest.mark.parametrize(
@@ -188,4 +188,4 @@ def test_the_headline_names_the_advice_that_is_not_kept():
     assert report.ok
     assert [warning.condition.id for warning in report.warnings] == ["joint.torque_rate"]
     title = plot(motion, model, language="en")._suptitle.get_text()
-    assert "keeps every limit, not the advice on joint.torque_rate" in title
+    assert "meets every limit, but not the recommendations for joint.torque_rate" in title

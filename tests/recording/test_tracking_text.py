@@ -64,13 +64,13 @@ def test_an_arm_that_yields_says_how_far_from_its_goal_it_ended():
     assert some_stopped_run().goal_error is None
 
 
-@pytest.mark.parametrize(("language", "words"), [("en", "until the stop at 0.300 s"), ("zh", "只比较到 0.300 秒")])
+@pytest.mark.parametrize(("language", "words"), [("en", "until the stop at 0.300 s"), ("zh", "只比较到 0.300 s")])
 def test_a_stopped_run_says_until_when_it_is_compared(language, words):
     (note,) = notes(some_stopped_run(), language)
     assert words in note
 
 
-@pytest.mark.parametrize(("language", "word"), [("en", "speed override"), ("zh", "运行速度")])
+@pytest.mark.parametrize(("language", "word"), [("en", "speed override"), ("zh", "速度倍率")])
 def test_a_run_at_another_pace_says_that_its_plan_has_other_times(language, word):
     (note,) = notes(some_run(has_speed_override=True), language)
     assert word in note

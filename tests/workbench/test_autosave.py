@@ -108,7 +108,10 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         wait_for(lambda: is_kept(file), what="the goal and the program to be written down")
         left = file.read_text()
     with Workbench(WorkbenchConfig(port=port)) as bench:
-        assert Text("en").render(bench.store.state.notice.text) == f"Back with the {MODEL.name}: program, tool."
+        assert (
+            Text("en").render(bench.store.state.notice.text)
+            == f"Configuration of the {MODEL.name} restored: program, tool."
+        )
         assert bench.store.state.setup.seen == {"tool"}  # What was set is drawn.
         assert len(bench.store.state.program.draft.steps) == 2
         assert not np.allclose(bench.store.state.goal.q, GOAL, atol=1e-3)
@@ -117,7 +120,7 @@ def test_the_next_workbench_at_the_port_has_goal_plan_and_program():
         bench.dispatcher.ask(EditProgram(what="clear"))
         wait_for(lambda: not bench.store.state.program.draft.steps, what="an empty program")
     with Workbench(WorkbenchConfig(port=port)) as bench:
-        assert Text("en").render(bench.store.state.notice.text) == f"Back with the {MODEL.name}: tool."
+        assert Text("en").render(bench.store.state.notice.text) == f"Configuration of the {MODEL.name} restored: tool."
     file.write_text(left)  # As if it had been killed.
     with Workbench(WorkbenchConfig(port=port)) as bench:
         assert np.allclose(bench.store.state.goal.q, GOAL, atol=1e-12)

@@ -178,8 +178,8 @@ def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.store.update(last_run=run_that(None))
     assert bench.step() == 5
     assert bench.state.notice is not None
-    assert Text("en").render(bench.state.notice.text) == "✓ Done. That was it."
-    assert "That was it" in steps_html(bench.state.learn.lesson, Text("en"))
+    assert Text("en").render(bench.state.notice.text) == "✓ Done. Lesson complete."
+    assert "Lesson complete" in steps_html(bench.state.learn.lesson, Text("en"))
     bench.press("leave")
     assert bench.state.learn.lesson is None
 

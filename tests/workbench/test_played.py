@@ -68,7 +68,7 @@ def test_the_cursor_stands_where_the_plan_was_when_it_was_run_and_a_click_finds_
 
 
 def test_the_legend_says_so_in_both_languages(slowed):
-    for language, word in (("en", "as it was run"), ("zh", "按实际执行的时间")):
+    for language, word in (("en", "as executed"), ("zh", "按实际执行的时间")):
         text = Text(language)
         assert word in legend_html(0, 7, text, "light", has_actual=True, is_paced=True)
         assert word not in legend_html(0, 7, text, "light", has_actual=True)

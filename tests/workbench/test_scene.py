@@ -214,9 +214,9 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert bench.state.notice.tone == "bad"
     for language in LANGUAGES:
         assert "condition." not in bead_words(bead, Text(language))
-    assert bead_words(bead, Text("en")).startswith("◆ broken: Tool inside the safety box · ")
+    assert bead_words(bead, Text("en")).startswith("◆ violated: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
-    assert "broken: Tool inside the safety box</p>" in planned_html(bench.state, STANDING, Text("en"))
+    assert "violated: Tool inside the safety box</p>" in planned_html(bench.state, STANDING, Text("en"))
     bench.scene.show_bead(ShowViolation(number=99))
     bench.goal.pose_goal(PoseGoal(name="home"))
     bench.scene.tick()

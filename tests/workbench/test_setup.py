@@ -134,7 +134,7 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert obstacle(state, bench.session.status()).code == "ready.violations"
     assert "on, 120 × 120 × 120 mm" == Text("en").render(describe_held(bench.session.status(), "box"))
     target = next(panel for panel in bench.renderer._panels if isinstance(panel, TargetPanel))
-    wait(lambda: "broken: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
+    wait(lambda: "violated: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
     wait(lambda: bench.renderer._stage._ribbon._beads > 0, "a bead where it is broken")
     ask(SetSetup(name="active", value=False))
     wait(lambda: bench.renderer._stage._ribbon._beads == 0, "the bead to go")
@@ -401,4 +401,4 @@ def test_what_belongs_to_an_arm_comes_back_with_it(bench, ask):
     wait(lambda: settled(bench), "the controller to have it again")
     wait(lambda: told(bench) == "setup.sent_again", "the page to say so")
     said = Text("en").render(bench.store.state.notice.text)
-    assert said == "The controller was connected again and sent the configuration again: safety box, tool, load."
+    assert said == "The controller was reconnected, and the configuration was sent again: safety box, tool, load."

@@ -87,8 +87,8 @@ def test_states_and_incidents_are_told_from_the_catalogues(code):
 @pytest.mark.parametrize(
     ("code", "english", "chinese"),
     [
-        ("crashed.controller", "virtual controller died", "虚拟控制器已退出"),
-        ("crashed.worker", "control process died", "控制进程已退出"),
+        ("crashed.controller", "virtual controller stopped unexpectedly", "虚拟控制器意外退出"),
+        ("crashed.worker", "control process stopped unexpectedly", "控制进程意外退出"),
     ],
 )
 def test_the_chip_names_what_died(code, english, chinese):
@@ -115,9 +115,9 @@ def test_a_request_that_failed_with_its_controller_does_not_ask_for_a_cable():
 @pytest.mark.parametrize(
     ("phase", "is_restarted", "english"),
     [
-        ("starting", True, "it is being started again"),  # It has no process id yet.
+        ("starting", True, "it is being restarted"),  # It has no process id yet.
         ("crashed", False, "press Start it again"),
-        ("closed", False, "choose once more what to connect to"),  # Where nothing is open there is no such button.
+        ("closed", False, "choose the destination again"),  # Where nothing is open there is no such button.
     ],
 )
 def test_what_to_do_about_a_process_that_died_can_be_done(phase, is_restarted, english):
@@ -188,7 +188,7 @@ def test_health_says_how_many_commands_were_lost_in_a_row():
     world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
     state = initial_state()
     spoiled = replace(state, world=replace(state.world, status=world))
-    assert "<th>Commands lost in a row, at most</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
+    assert "<th>Commands lost in a row (maximum)</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
     assert "<td>—<br>" in health_html(state, status(), Text("en")), "another controller does not tell"
 
 
@@ -197,8 +197,8 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
     reason = obstacle(state, died)
     assert reason is not None
     bar = status_values(state, died, Text("en"), 1.0)
-    assert any(chip["value"] == "virtual controller died" for chip in bar["chips"])
-    assert Text("en").render(reason).startswith("The virtual controller has died")
+    assert any(chip["value"] == "virtual controller stopped unexpectedly" for chip in bar["chips"])
+    assert Text("en").render(reason).startswith("The virtual controller stopped unexpectedly")
 
 
 def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():

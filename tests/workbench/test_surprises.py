@@ -98,7 +98,7 @@ def test_a_controller_killed_while_the_arm_rests_is_named_on_the_page_with_what_
     os.kill(before.controller_pid, signal.SIGKILL)
     wait(lambda: told(bench) == "incident.over.crashed.controller", "to be told that the trouble is over")
     for language, words in (
-        ("en", ("virtual controller", "wake-up pose", "motor power")),
+        ("en", ("virtual controller", "initial pose", "motor power")),
         ("zh", ("虚拟控制器", "开机位姿", "电机")),
     ):
         said = Text(language).render(bench.store.state.notice.text)

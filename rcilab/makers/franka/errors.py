@@ -73,17 +73,19 @@ class FrankaError(FaultCode):
 
 _CAUSES = {
     FrankaError.JOINT_POSITION_LIMITS_VIOLATION: "a measured joint angle left its range",
-    FrankaError.CARTESIAN_POSITION_LIMITS_VIOLATION: "the tool left the space it may be in",
-    FrankaError.SELF_COLLISION_AVOIDANCE_VIOLATION: "the arm came close to touching itself",
+    FrankaError.CARTESIAN_POSITION_LIMITS_VIOLATION: "the tool left its allowed space",
+    FrankaError.SELF_COLLISION_AVOIDANCE_VIOLATION: "the arm came close to a self-collision",
     FrankaError.JOINT_VELOCITY_VIOLATION: "a measured joint velocity was too high",
     FrankaError.CARTESIAN_VELOCITY_VIOLATION: "the measured tool velocity was too high",
     FrankaError.FORCE_CONTROL_SAFETY_VIOLATION: "force control left its safe range",
-    FrankaError.JOINT_REFLEX: "an estimated external torque passed its threshold",
-    FrankaError.CARTESIAN_REFLEX: "the estimated external force passed its threshold",
+    FrankaError.JOINT_REFLEX: "an estimated external torque exceeded its threshold",
+    FrankaError.CARTESIAN_REFLEX: "the estimated external force exceeded its threshold",
     FrankaError.MAX_GOAL_POSE_DEVIATION_VIOLATION: "the arm ended too far from its goal",
-    FrankaError.MAX_PATH_POSE_DEVIATION_VIOLATION: "the arm strayed too far from its path",
+    FrankaError.MAX_PATH_POSE_DEVIATION_VIOLATION: "the arm deviated too far from its path",
     FrankaError.CARTESIAN_VELOCITY_PROFILE_SAFETY_VIOLATION: "a Cartesian velocity profile left its safe range",
-    FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID: "the first commanded angles are not the arm's",
+    FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID: (
+        "the first commanded joint angles do not match the arm"
+    ),
     FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
     FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
     FrankaError.JOINT_MOTION_GENERATOR_VELOCITY_DISCONTINUITY: (
@@ -92,7 +94,9 @@ _CAUSES = {
     FrankaError.JOINT_MOTION_GENERATOR_ACCELERATION_DISCONTINUITY: (
         "a commanded joint acceleration jumps (jerk too high)"
     ),
-    FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID: "the first commanded pose is not the arm's",
+    FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID: (
+        "the first commanded pose does not match the arm"
+    ),
     FrankaError.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: "the commanded elbow leaves its range or is too fast",
     FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION: "the commanded tool velocity is too high",
     FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_DISCONTINUITY: (
@@ -102,33 +106,35 @@ _CAUSES = {
         "the commanded tool acceleration jumps (jerk too high)"
     ),
     FrankaError.CARTESIAN_MOTION_GENERATOR_ELBOW_SIGN_INCONSISTENT: "the commanded elbow is flipped to the other side",
-    FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID: "the first commanded elbow is not the arm's",
-    FrankaError.FORCE_CONTROLLER_DESIRED_FORCE_TOLERANCE_VIOLATION: "the wanted force was not held",
+    FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID: "the first commanded elbow does not match the arm",
+    FrankaError.FORCE_CONTROLLER_DESIRED_FORCE_TOLERANCE_VIOLATION: "the desired force was not held",
     FrankaError.START_ELBOW_SIGN_INCONSISTENT: "the elbow is flipped to the other side at the start",
     FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION: "too many commands in a row were lost",
-    FrankaError.POWER_LIMIT_VIOLATION: "the arm reached its highest power",
+    FrankaError.POWER_LIMIT_VIOLATION: "the arm reached its maximum power",
     FrankaError.CARTESIAN_MOTION_GENERATOR_JOINT_POSITION_LIMITS_VIOLATION: (
-        "a commanded pose asks for a joint angle outside its range"
+        "a commanded pose requires a joint angle outside its range"
     ),
     FrankaError.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_LIMITS_VIOLATION: (
-        "commanded poses ask for a joint velocity that is too high"
+        "commanded poses require a joint velocity that is too high"
     ),
     FrankaError.CARTESIAN_MOTION_GENERATOR_JOINT_VELOCITY_DISCONTINUITY: (
-        "commanded poses let a joint velocity jump (acceleration too high)"
+        "commanded poses make a joint velocity jump (acceleration too high)"
     ),
     FrankaError.CARTESIAN_MOTION_GENERATOR_JOINT_ACCELERATION_DISCONTINUITY: (
-        "commanded poses let a joint acceleration jump (jerk too high)"
+        "commanded poses make a joint acceleration jump (jerk too high)"
     ),
-    FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG: "the commanded pose is no proper transform",
+    FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG: "the commanded pose is not a valid transform",
     FrankaError.CONTROLLER_TORQUE_DISCONTINUITY: "a commanded torque jumps (torque rate too high)",
-    FrankaError.JOINT_P2P_INSUFFICIENT_TORQUE_FOR_PLANNING: "a planned joint motion needs more torque than there is",
+    FrankaError.JOINT_P2P_INSUFFICIENT_TORQUE_FOR_PLANNING: (
+        "a planned joint motion needs more torque than is available"
+    ),
     FrankaError.TAU_J_RANGE_VIOLATION: "a torque sensor reached the end of its range",
     FrankaError.INSTABILITY_DETECTED: "the control loop is not stable",
-    FrankaError.JOINT_MOVE_IN_WRONG_DIRECTION: "a joint outside its range moves further out",
-    FrankaError.CARTESIAN_SPLINE_MOTION_GENERATOR_VIOLATION: "a Cartesian spline broke its limits",
+    FrankaError.JOINT_MOVE_IN_WRONG_DIRECTION: "a joint outside its range moves farther out",
+    FrankaError.CARTESIAN_SPLINE_MOTION_GENERATOR_VIOLATION: "a Cartesian spline exceeded its limits",
     FrankaError.JOINT_VIA_MOTION_GENERATOR_PLANNING_JOINT_LIMIT_VIOLATION: (
         "a motion planned through joint angles leaves their range"
     ),
-    FrankaError.BASE_ACCELERATION_INITIALIZATION_TIMEOUT: "the base's acceleration was not known in time",
-    FrankaError.BASE_ACCELERATION_INVALID_READING: "the base's acceleration could not be read",
+    FrankaError.BASE_ACCELERATION_INITIALIZATION_TIMEOUT: "the acceleration of the base was not known in time",
+    FrankaError.BASE_ACCELERATION_INVALID_READING: "the acceleration of the base could not be read",
 }

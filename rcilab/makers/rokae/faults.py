@@ -83,31 +83,31 @@ _CAUSES = {
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: "a commanded joint angle is outside its range",
     Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: "the commanded tool pose is outside the safety box",
     Fault.COMMAND_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: (
-        "the commanded arm angle broke one of its bounds (angle, velocity, acceleration or jerk)"
+        "the commanded arm angle exceeded one of its bounds (angle, velocity, acceleration or jerk)"
     ),
     Fault.COMMAND_JOINT_VELOCITY_LIMITS_VIOLATION: "a commanded joint velocity is too high",
     Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION: "the commanded tool velocity is too high",
     Fault.COMMAND_JOINT_ACCELERATION_LIMITS_VIOLATION: "a commanded joint acceleration is too high",
     Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: "the commanded tool acceleration is too high",
     Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY: "a commanded joint acceleration jumps (jerk too high)",
-    Fault.COLLISION: "an external torque passed its collision threshold",
-    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "the arm is at a singularity or the pose is no pose",
+    Fault.COLLISION: "an external torque exceeded its collision threshold",
+    Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "the arm is at a singularity or the pose is not valid",
     Fault.COMMAND_TORQUE_DISCONTINUITY: "a commanded torque jumps (torque rate too high)",
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: "a commanded torque is too high",
     Fault.INSTABILITY_DETECTION: (
-        "too many commands in a row were lost, or those that were could not be bridged smoothly"
+        "too many commands in a row were lost, or the lost ones could not be bridged smoothly"
     ),
 }
 
 _SMOOTHNESS = (
     "check that the planned motion is continuous up to its acceleration and inside the limits of section 4.4; "
-    "lower the speed or filter it where it is not"
+    "otherwise lower the speed or filter the motion"
 )
 
 _GAINS = (
-    "let torques grow gradually and keep them inside the limits of section 4.4; where a control law of yours rings, "
-    "lower its damping first: above the inertia that a joint feels while the others are free, divided by the delay of "
-    "the loop, it is unstable, and the wrist is light"
+    "let torques grow gradually and keep them inside the limits of section 4.4; if your own control law oscillates, "
+    "lower its damping first: a joint is unstable with a damping above its inertia, with the other joints free, "
+    "divided by the delay of the loop, and the wrist has little inertia"
 )
 
 _YIELDED = (
@@ -131,15 +131,15 @@ _MEASURED_RATES = frozenset(
 )
 
 _BOX = (
-    "keep the tool inside the safety box; a motion that starts outside it may only lead into it: recover, or "
-    "switch the power off and on where that is refused (in Python, execute(plan_recovery(robot.model, "
-    "robot.state.q_c, robot.safety_box)) then leads it back)"
+    "keep the tool inside the safety box; a motion that starts outside it may only move inwards: recover, or "
+    "switch the power off and on if that is refused (in Python, execute(plan_recovery(robot.model, "
+    "robot.state.q_c, robot.safety_box)) then moves it back)"
 )
 
 _RANGE = (
-    "the joint is beyond its range or its soft limit: recover, or switch the power off and on where that is refused; "
-    "switch the power on if it is off, as a joint limit does without auto_limit; then lead the joint back inside "
-    "(“Lead back inside” on the Run tab; in Python: execute(plan_recovery(robot.model, robot.state.q_c)))"
+    "the joint is beyond its range or its soft limit: recover, or switch the power off and on if that is refused; "
+    "switch the power on if it is off, as after a joint limit without auto_limit; then move the joint back inside "
+    "(“Move back inside” on the Run tab; in Python: execute(plan_recovery(robot.model, robot.state.q_c)))"
 )
 RANGE_FAULTS = frozenset({Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION, Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION})
 """Faults after which `recover()` may be refused: the arm can be too far outside."""
@@ -153,12 +153,12 @@ _REMEDIES = {
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: _RANGE,
     Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
     Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: _BOX,
-    Fault.COLLISION: "look for contact; if it fires without contact, raise the collision thresholds "
+    Fault.COLLISION: "check for contact; if the fault is raised without contact, raise the collision thresholds "
     "(an emergency stop can also raise this bit)",
     Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME: "keep Cartesian motions away from singular poses",
     Fault.COMMAND_TORQUE_DISCONTINUITY: _GAINS,
     Fault.COMMAND_TORQUE_RANGE_VIOLATION: _GAINS,
-    Fault.INSTABILITY_DETECTION: "look at the network and the real-time configuration, and let the controller play "
-    "commands later (a virtual one: --prefill 50); only where ever so many in a row were lost does a higher "
-    "packet-loss threshold help (usually 10 to 20); an emergency stop can also raise this bit",
+    Fault.INSTABILITY_DETECTION: "check the network and the real-time configuration, and let the controller play "
+    "commands later (a virtual one: --prefill 50); a higher packet-loss threshold (usually 10 to 20) helps only if "
+    "many commands in a row were lost; an emergency stop can also raise this bit",
 }
