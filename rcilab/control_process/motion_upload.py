@@ -83,7 +83,7 @@ def require_ready(status: SupervisorStatus, *, is_operator_overdue: bool) -> Joi
         raise UsageError(f"no motion is possible now: {status.message}").coded("not_ready")
     if is_operator_overdue:
         raise UsageError(f"the operator's page does not respond: no heartbeat for {OPERATOR_TIMEOUT:g} s").coded(
-            "nobody", seconds=f"{OPERATOR_TIMEOUT:g}"
+            "no_operator", seconds=f"{OPERATOR_TIMEOUT:g}"
         )
     return status.q_c
 

@@ -32,6 +32,6 @@ class Finding:
 
 
 def summary(findings: Iterable[Finding]) -> str:
-    """Returns the last line of the report: the failed checks, or that there are none."""
+    """Returns the last line of the report: the failed checks, or that all passed."""
     bad = [finding.name for finding in findings if finding.verdict == "bad"]
     return f"{len(bad)} to fix: {', '.join(bad)}" if bad else "ready: no problem found"

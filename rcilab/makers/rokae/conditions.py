@@ -59,7 +59,7 @@ def _tool_row(row: Condition) -> Condition:
     else:
         fault, source = Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, "4.2 and 4.4 (norm: ours)"
     if row.order == 3 and row.signal != "arm_angle":
-        source += ": the acceleration's bit, there is none of its own for a Cartesian jerk"
+        source += ": the acceleration's bit, because a Cartesian jerk has no bit of its own"
     return replace(row, fault=fault, source=f"{MANUAL}, {source}")
 
 

@@ -70,7 +70,9 @@ class FaultInjectionPanel:
         pressed = "none" if world.status is None else world.status.button
         for name, button in self._buttons.items():
             button.disabled = not ours or name == pressed
-        missing = text("world.nobody") if status.phase == "closed" else text("world.not_ours", address=status.target)
+        missing = (
+            text("world.disconnected") if status.phase == "closed" else text("world.not_ours", address=status.target)
+        )
         sentence = text(f"safety.{pressed}_is") if ours else missing
         tone = "good" if ours and pressed == "none" else "warn"
         self._button.show(f'<p class="rl-verdict rl-{tone}">{esc(sentence)}</p>')

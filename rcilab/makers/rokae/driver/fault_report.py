@@ -35,7 +35,7 @@ _OF_JOINTS = (
     "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
     "acceleration there, and stay away from singular poses"
 )
-_INVERTED = 100  # The last poses, whose joint angles are computed: more than a command is under way.
+_INVERTED = 100  # Number of last poses whose joint angles are computed: more than there are on the wire.
 _FOLLOWED = 10  # Cycles before the fault in which the joint nearest to a bound is searched.
 _HISTORY = 3  # Commands before a command that its third difference uses.
 
