@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rcilab.app.goal.goal import Goal, Tone
-from rcilab.app.planning import PathKind, Plan
+from rcilab.app.planning import PathType, Plan
 from rcilab.app.run.drive_state import DriveState
 from rcilab.app.run.world_state import WorldState
 from rcilab.core.safety_box import SafetyBox
@@ -64,7 +64,7 @@ class AppState:
     """Folder of these files; None: no file is written."""
     speed: float = 0.5
     law: JointLaw = "torque_rate_limited"
-    way: PathKind = "joint"
+    path_type: PathType = "joint"
     """How the tool moves to the goal."""
     via: Pose | None = None
     """Via point of an arc."""

@@ -57,7 +57,7 @@ class Robot(Protocol):
         """Pauses the motion in progress."""
         ...
 
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+    def configure(self, setup: RobotConfiguration) -> PendingRequest:
         """Sends tool, load, limits or parameters; the status has the acknowledged values."""
         ...
 
@@ -85,7 +85,7 @@ class Connection(Protocol):
         """Returns its status."""
         ...
 
-    def supervisor(self) -> Robot:
+    def robot(self) -> Robot:
         """Returns the object that takes requests.
 
         Raises:

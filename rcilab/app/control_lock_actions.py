@@ -60,12 +60,12 @@ class ControlLockActions:
 
     Args:
         store: Has the lock.
-        session: The robot; it reports whether the arm moves.
+        connection: The robot; it reports whether the arm moves.
         presence: When each page last sent a heartbeat.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, presence: ClientHeartbeat) -> None:
-        self._store, self._session, self._presence = store, session, presence
+    def __init__(self, store: Store, connection: RobotConnection, presence: ClientHeartbeat) -> None:
+        self._store, self._connection, self._presence = store, connection, presence
 
     @property
     def handlers(self) -> Handlers:
@@ -100,11 +100,11 @@ class ControlLockActions:
         if after.holder == page:
             self._announce(page)
         elif after.asking == page:
-            self._store.say(
+            self._store.notify(
                 "good", message("control_lock.asked", page=lock.number(page), holder=lock.number(lock.holder))
             )
         else:
-            self._store.say("warn", message("control_lock.busy", page=lock.number(lock.asking)), page=page)
+            self._store.notify("warn", message("control_lock.busy", page=lock.number(lock.asking)), page=page)
 
     def answer(self, request: AnswerControls) -> None:
         """Takes the answer of the holder."""
@@ -115,7 +115,7 @@ class ControlLockActions:
         if request.yes:
             self._announce(lock.asking)
         else:
-            self._store.say("warn", message("control_lock.kept", page=lock.number(lock.asking)))
+            self._store.notify("warn", message("control_lock.kept", page=lock.number(lock.asking)))
 
     def tick(self) -> None:
         """Handles timeouts: a silent holder loses the controls, a request without an answer is granted."""
@@ -124,11 +124,11 @@ class ControlLockActions:
             silent = lock.number(lock.holder)
             lock = self._store.update(control_lock=lock.fall_silent(now)).control_lock
             if len(lock.pages) > 1:
-                self._store.say("warn", message("control_lock.silent", page=silent))
-        if lock.holder is not None and lock.is_overdue(now) and not is_moving(self._session.status()):
+                self._store.notify("warn", message("control_lock.silent", page=silent))
+        if lock.holder is not None and lock.is_overdue(now) and not is_moving(self._connection.status()):
             taken = lock.number(lock.asking)
             lock = self._store.update(control_lock=lock.answer(lock.holder, yes=True)).control_lock
-            self._store.say("warn", message("control_lock.unanswered", page=taken))
+            self._store.notify("warn", message("control_lock.unanswered", page=taken))
         if lock.holder is None and lock.pages:
             self._find_holder(now)
 
@@ -137,14 +137,14 @@ class ControlLockActions:
         lock = self._store.state.control_lock
         for page in lock.pages:
             sentence = message("notice.yours") if page == holder else message("notice.taken", page=lock.number(holder))
-            self._store.say("good", sentence, page=page)
+            self._store.notify("good", sentence, page=page)
 
     def _find_holder(self, now: float) -> None:
         """Returns free controls to their former holder, or to the only page once the arm stands still."""
         lock = self._store.state.control_lock
         if lock.former is not None and not self._presence.is_silent(lock.former):
             self._store.update(control_lock=lock.take(lock.former))
-        elif len(lock.pages) == 1 and now - lock.since > OPERATOR_TIMEOUT and not is_moving(self._session.status()):
+        elif len(lock.pages) == 1 and now - lock.since > OPERATOR_TIMEOUT and not is_moving(self._connection.status()):
             only = lock.pages[0]
             if not self._presence.is_silent(only):
                 self._store.update(control_lock=lock.take(only))

@@ -39,16 +39,16 @@ from rcilab.core.errors import RcilabError
 from rcilab.core.memory import memory_needed
 from rcilab.i18n.translator import message
 
-_TICK = 0.03  # [s] About the display's rate; also the interval between two looks at the robot.
-_AGAIN = 1.0  # [s] Minimum time between two answers to a page that acts without the controls.
+_TICK = 0.03  # [s] About the display's rate; also the interval between two reads of the robot's status.
+_REFUSAL_INTERVAL = 1.0  # [s] Minimum time between two answers to a page that acts without the controls.
 
 
 class Dispatcher:
-    """Owns the state and the session; all others read snapshots.
+    """Owns the state and the connection; all others read snapshots.
 
     Args:
         store: The state.
-        session: The robot.
+        connection: The robot.
         deliver: Sends a file to a page.
         autosave: Saves goal and program for a restart after a crash; None: nothing is saved.
         presence: When each page last sent a heartbeat.
@@ -57,32 +57,32 @@ class Dispatcher:
     def __init__(
         self,
         store: Store,
-        session: RobotConnection,
+        connection: RobotConnection,
         deliver: Deliver = lambda page, name, stream, is_cancelled: True,
         autosave: Autosave | None = None,
         presence: ClientHeartbeat | None = None,
     ) -> None:
-        self._store, self._session = store, session
+        self._store, self._connection = store, connection
         self._autosave = autosave or Autosave(None)
-        self._goal = GoalActions(store, session)
-        self.robot = RunActions(store, session)
-        self._mode = ModeActions(store, session)
-        self._where = TargetRobotActions(store, session, self.robot)
-        self._world = WorldActions(store, session)
-        self._signals = SignalActions(store, session, self.robot.requests)
-        self._push = PushActions(store, session)
-        self._setup = SetupActions(store, session)
-        self._jog = JogActions(store, session, self._goal)
+        self._goal = GoalActions(store, connection)
+        self.run = RunActions(store, connection)
+        self._mode = ModeActions(store, connection)
+        self._target_robot = TargetRobotActions(store, connection, self.run)
+        self._world = WorldActions(store, connection)
+        self._signals = SignalActions(store, connection, self.run.requests)
+        self._push = PushActions(store, connection)
+        self._setup = SetupActions(store, connection)
+        self._jog = JogActions(store, connection, self._goal)
         self._poses = NamedPoseActions(store, self._goal)
-        self._program = ProgramActions(store, session, self._goal)
-        self._check = CheckActions(store, session, self._goal, self._program)
-        self._learn = LearnActions(store, session)
+        self._program = ProgramActions(store, connection, self._goal)
+        self._check = CheckActions(store, connection, self._goal, self._program)
+        self._learn = LearnActions(store, connection)
         self._view = ViewActions(store)
-        self._control_lock = ControlLockActions(store, session, presence or ClientHeartbeat())
+        self._control_lock = ControlLockActions(store, connection, presence or ClientHeartbeat())
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
-        self._mailbox: CoalescingQueue[Request] = CoalescingQueue()
+        self._requests: CoalescingQueue[Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
         self._refused_at: dict[tuple[int | None, int | None], float] = {}  # Page and holder -> time, [s].
@@ -91,7 +91,7 @@ class Dispatcher:
         """Failures of our own code; at most one a second is printed and shown on the page."""
         features = (
             self._goal, self._poses, self._scene, self._setup, self._jog, self._push, self._program,
-            self._program.editing, self._check, self._learn, self.robot, self._where, self._mode, self._world,
+            self._program.editing, self._check, self._learn, self.run, self._target_robot, self._mode, self._world,
             self._signals, self._view, self._export, self._folder, self._control_lock,
         )  # fmt: skip
         self._handlers = {kind: act for feature in features for kind, act in feature.handlers.items()}
@@ -100,8 +100,8 @@ class Dispatcher:
     def ask(self, request: Request) -> None:
         """Takes a request and returns at once; callable from any thread."""
         if isinstance(request, Moving):
-            request = replace(request, stops=self._session.stops)
-        self._mailbox.put(request, request.replaces)
+            request = replace(request, stops=self._connection.stops)
+        self._requests.put(request, request.replaces)
 
     def resume(self, *, language: str | None = None) -> None:
         """Restores the state of the previous workbench; before `start`.
@@ -116,7 +116,7 @@ class Dispatcher:
         if kept is not None:
             self._guard(lambda: self._resume(kept))
         for name, setup in self._autosave.recall_setups(self._store.state.model).items():
-            self.robot.remember_setup(name, setup)
+            self.run.remember_setup(name, setup)
         for program in self._autosave.recall_programs(self._store.state.model):
             self._program.lay_aside(program)
 
@@ -138,7 +138,7 @@ class Dispatcher:
         self._check.close()
         self._learn.close()
         self._scene.close()
-        self.robot.close()
+        self.run.close()
         self._export.close()
         self._autosave.close(self._store.state)
 
@@ -149,8 +149,8 @@ class Dispatcher:
             if not request.is_silent:
                 self._refuse(request)
             return
-        if _reloads_pages(request) and is_moving(self._session.status()):
-            self._store.say("warn", message("ready.moving"), page=request.page)
+        if _reloads_pages(request) and is_moving(self._connection.status()):
+            self._store.notify("warn", message("ready.moving"), page=request.page)
             return
         self._guard(lambda: self._handlers[type(request)](request))
 
@@ -159,14 +159,14 @@ class Dispatcher:
         self._view.advance(elapsed)
         self._control_lock.tick()
         if self._store.state.control_lock.holder != self._refused_for:
-            self._store.settle("control_lock")
-        event = self.robot.watch()
-        if event == "placed" and self._store.state.plan is None:  # A plan may be quicker than this status.
+            self._store.clear_notices("control_lock")
+        event = self.run.watch()
+        if event == "arm_known" and self._store.state.plan is None:  # A plan may be quicker than this status.
             self._goal.plan()
-        elif event == "rested":
+        elif event == "standstill":
             self._goal.catch_up()
         self._goal.settle()
-        status = self._session.status()
+        status = self._connection.status()
         self._push.tick(status)
         self._mode.tick(status)
         self._world.tick(status)
@@ -186,28 +186,28 @@ class Dispatcher:
         back += kept.setup.parts
         self._setup.restore(kept.setup)
         if kept.q is not None:
-            self._goal.pose(kept.q)
+            self._goal.set_joints(kept.q)
         if kept.program is not None and kept.program.model == self._store.state.model.name:
             self._program.restore(kept.program)
         if kept.q is not None:
-            self._store.say("good", message("notice.resumed"))
+            self._store.notify("good", message("notice.resumed"))
         elif back:
             name = self._store.state.model.name
-            self._store.say("good", message("setup.back", what=name_parts(tuple(back)), model=name))
+            self._store.notify("good", message("setup.back", what=name_parts(tuple(back)), model=name))
 
     def _refuse(self, request: Request) -> None:
         """Informs a page that it is a spectator, unless it has the controls by now."""
         lock = self._store.state.control_lock
         now = time.monotonic()
         refused = (request.page, lock.holder)
-        if lock.allows(request.page) or now - self._refused_at.get(refused, -_AGAIN) < _AGAIN:
+        if lock.allows(request.page) or now - self._refused_at.get(refused, -_REFUSAL_INTERVAL) < _REFUSAL_INTERVAL:
             return
-        self._refused_at = {key: at for key, at in self._refused_at.items() if now - at < _AGAIN}
+        self._refused_at = {key: at for key, at in self._refused_at.items() if now - at < _REFUSAL_INTERVAL}
         self._refused_at[refused] = now
         self._refused_for = lock.holder
         code = "control_lock.free" if lock.holder is None else "notice.watching"
         sentence = message(code, page=lock.number(lock.holder))
-        self._store.say("warn", sentence, page=request.page, trouble="control_lock")
+        self._store.notify("warn", sentence, page=request.page, trouble="control_lock")
 
     def _drive(self, request: RobotCommand) -> None:
         if request.what == "pause":
@@ -215,7 +215,7 @@ class Dispatcher:
         elif request.what == "resume":
             self._mode.resume()
         else:
-            self.robot.drive(request)
+            self.run.drive(request)
 
     def _type_field(self, request: TypeField) -> None:
         if is_setup_field(request.field):
@@ -230,7 +230,7 @@ class Dispatcher:
     def _run(self) -> None:
         last = time.monotonic()
         while not self._ending.is_set():
-            request = self._mailbox.take(max(0.0, last + _TICK - time.monotonic()))
+            request = self._requests.take(max(0.0, last + _TICK - time.monotonic()))
             if request is not None:
                 self.act(request)
                 self._store.changed.set()
@@ -247,13 +247,13 @@ class Dispatcher:
                 action()
         except RcilabError as error:
             if not trouble or all(notice.trouble != trouble for notice in self._store.state.notices):
-                self._store.say("bad", explain_error(error), trouble=trouble)
+                self._store.notify("bad", explain_error(error), trouble=trouble)
         except Exception as error:  # A bug of ours must neither end the thread nor stay unnoticed.
             if self.errors.report(error):
-                self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+                self._store.notify("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
             if trouble:
-                self._store.settle(trouble)
+                self._store.clear_notices(trouble)
 
 
 def _is_stop(request: Request) -> bool:

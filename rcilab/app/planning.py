@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from rcilab.conformance.report import Report
     from rcilab.motion import Motion, Program
 
-PathKind = Literal["joint", "line", "arc"]
-PATH_KINDS: tuple[PathKind, ...] = get_args(PathKind)
+PathType = Literal["joint", "line", "arc"]
+PATH_TYPES: tuple[PathType, ...] = get_args(PathType)
 
 SMALLEST_MOTION = 1e-4  # [rad] A goal closer than this to the arm counts as the arm's position.
-SAME_WAY = 1e-3  # [rad] At a larger distance a line ends in another branch than the requested one.
+SAME_BRANCH = 1e-3  # [rad] At a larger distance a line ends in another branch than the requested one.
 PATH_POINTS = 120
 
 
@@ -54,7 +54,7 @@ class Plan:
     """The program of the motion; None if it leads to the goal."""
     mode: Mode = "joint_position"
     """The mode it was checked for."""
-    kind: PathKind = "joint"
+    kind: PathType = "joint"
     """Path type, if it is not a program."""
     note: Message | None = None
     """Further message about its end."""
@@ -106,7 +106,7 @@ def make_plan(
     speed: float,
     law: JointLaw,
     box: SafetyBox | None = None,
-    kind: PathKind = "joint",
+    kind: PathType = "joint",
     via: Pose | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal, checked except for collisions, or why planning failed."""
@@ -125,8 +125,8 @@ def make_plan(
         return message("plan.failed", error=describe_error(error))
     away = int(np.abs(motion.goal - goal).argmax())
     note = None
-    if abs(float(motion.goal[away] - goal[away])) > SAME_WAY:
-        note = message("plan.other_way", joint=away + 1)
+    if abs(float(motion.goal[away] - goal[away])) > SAME_BRANCH:
+        note = message("plan.other_branch", joint=away + 1)
     return replace(build_plan_view(model, motion, report, box), kind=kind, note=note)
 
 
@@ -165,7 +165,7 @@ def _go(
     goal: JointVector,
     speed: float,
     law: JointLaw,
-    kind: PathKind,
+    kind: PathType,
     via: Pose | None,
 ) -> Motion:
     if kind == "joint":

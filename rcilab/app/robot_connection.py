@@ -93,7 +93,7 @@ class RobotConnection:
         """Whether `supervisor` returns one; its status may show an idle arm a moment earlier."""
         return self._ready is not None
 
-    def supervisor(self) -> Supervisor:
+    def robot(self) -> Supervisor:
         """Returns the supervisor for requests.
 
         Raises:

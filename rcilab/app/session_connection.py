@@ -131,7 +131,7 @@ class SessionConnection:
             **_describe_progress(way),
         )
 
-    def supervisor(self) -> SessionConnection:
+    def robot(self) -> SessionConnection:
         """Returns this object, which takes the requests itself."""
         return self
 
@@ -188,7 +188,7 @@ class SessionConnection:
             "execute", lambda: self._session.execute(motion, certificate, mode=mode, speed_override=speed_override)
         )
 
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+    def configure(self, setup: RobotConfiguration) -> PendingRequest:
         """Sends limits or parameters to the controller."""
         if self._is_busy and self.is_virtual:
             raise StartingError(f"{self._what} is in progress; try again in a moment")

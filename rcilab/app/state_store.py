@@ -12,7 +12,7 @@ from rcilab.app.goal.goal import Goal, Tone
 from rcilab.i18n.translator import Message
 
 ROBOT_TROUBLE = "robot"
-"""Name of the troubles while the robot cannot move, for `StateStore.settle`."""
+"""Name of the troubles while the robot cannot move, for `StateStore.clear_notices`."""
 
 _UNDO_DEPTH = 100
 _NOTICES = 4  # For each page, and for all pages together: more would cover the scene.
@@ -42,14 +42,14 @@ class StateStore(Generic[S]):
             self._state = replace(self._state, **changes)
             return self._state
 
-    def say(self, tone: Tone, text: Message, *, page: int | None = None, trouble: str = "") -> None:
+    def notify(self, tone: Tone, text: Message, *, page: int | None = None, trouble: str = "") -> None:
         """Shows a notice, on one page or on every page.
 
         Args:
             tone: Its style.
             text: Its message.
             page: Client id of the only page that shows it; None: all pages.
-            trouble: Name of the trouble that it reports, for `settle`.
+            trouble: Name of the trouble that it reports, for `clear_notices`.
         """
         with self._lock:
             self._notices += 1
@@ -64,14 +64,14 @@ class StateStore(Generic[S]):
         with self._lock:
             self._state = replace(self._state, notices=tuple(n for n in self._state.notices if n.page != page))
 
-    def settle(self, trouble: str) -> None:
+    def clear_notices(self, trouble: str) -> None:
         """Withdraws the notices of a trouble that is over."""
         with self._lock:
             notices = self._state.notices
             if any(notice.trouble == trouble for notice in notices):
                 self._state = replace(self._state, notices=tuple(n for n in notices if n.trouble != trouble))
 
-    def complain(self, field: str, problem: Message) -> None:
+    def set_problem(self, field: str, problem: Message) -> None:
         """Shows a problem of a typed value next to its field."""
         self.update(problems=MappingProxyType({**self._state.problems, field: problem}))
 
@@ -82,7 +82,7 @@ class StateStore(Generic[S]):
         if len(kept) < len(problems):
             self.update(problems=MappingProxyType(kept))
 
-    def remember(self) -> None:
+    def push_undo(self) -> None:
         """Stores the current goal for `undo`."""
         self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]
 
@@ -90,6 +90,6 @@ class StateStore(Generic[S]):
         """Returns the goal that was stored last, or None."""
         return self._past.pop() if self._past else None
 
-    def forget(self) -> None:
+    def clear_undo(self) -> None:
         """Clears the undo history: it belongs to another arm."""
         self._past = []

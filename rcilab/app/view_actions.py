@@ -121,7 +121,7 @@ class ViewActions:
         state = displayed_state(self._store.state)
         playing = not state.playing if request.playing is None else request.playing
         if state.plan is None:
-            self._store.say("warn", message("ready.no_plan"))
+            self._store.notify("warn", message("ready.no_plan"))
         elif playing:
             self._store.update(playing=True, place=0.0 if state.place >= 1.0 else state.place)
         else:

@@ -66,13 +66,13 @@ class ConfigurationSync:
         """
         self.collect()
         if self._pending:
-            raise UsageError("the configuration is still being sent; wait for the request of set_up()").coded(
+            raise UsageError("the configuration is still being sent; wait for the request of configure()").coded(
                 "telling_setup"
             )
         if self._refusal is not None and self.requested.parts:
-            raise UsageError(f"the controller refused its configuration ({self._refusal}); call set_up() again").coded(
-                "setup_refused", reason=self._refusal
-            )
+            raise UsageError(
+                f"the controller refused its configuration ({self._refusal}); call configure() again"
+            ).coded("setup_refused", reason=self._refusal)
 
 
 def standard_setup(model: RobotModel, *, is_virtual: bool) -> RobotConfiguration:

@@ -450,7 +450,7 @@ class Supervisor(Closeable):
                 "a stop was requested before the arm had started to move; repeat the request to move it"
             ).coded("stopped_before")
 
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+    def configure(self, setup: RobotConfiguration) -> PendingRequest:
         """Sends a configuration: tool, load, safety box, force-control frame; done once the controller has accepted it.
 
         From now on motions are checked with it, and it is sent again at every new connection.

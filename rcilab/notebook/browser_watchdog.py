@@ -18,7 +18,7 @@ from rcilab.notebook.browser_heartbeat import kernel_heart
 if TYPE_CHECKING:
     from rcilab.execution.session import RobotSession
 
-LEFT_ALONE = Remark("the notebook's page is gone", "page_gone")
+OPERATOR_ABSENT = Remark("the notebook's page is gone", "page_gone")
 """Reason in a run that was stopped for it."""
 _INTERRUPTED = Remark("the kernel was interrupted", "kernel_interrupted")
 _LOOK = 0.1  # [s] Between two checks for a motion.
@@ -64,7 +64,7 @@ class BrowserWatchdog:
             heart.beat()
         if moving and heart.is_gone:
             for session in moving:
-                session.stop(LEFT_ALONE)
+                session.stop(OPERATOR_ABSENT)
 
 
 def _sessions() -> list[RobotSession]:

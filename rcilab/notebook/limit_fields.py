@@ -127,7 +127,7 @@ class LimitFields:
         write(self.sentence, "")
         asked = self._asked
         if asked is not None:
-            self._send("limits", lambda robot: robot.set_up(RobotConfiguration(joints=asked)))
+            self._send("limits", lambda robot: robot.configure(RobotConfiguration(joints=asked)))
 
     def _forget(self) -> None:
         if self._answers.layout.display is None:

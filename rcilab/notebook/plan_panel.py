@@ -41,7 +41,7 @@ class PlanPanel(Part):
         wide = {"width": "24em"}
         self.way = lean(
             ipywidgets.Dropdown, description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS],
-            value=state.now.way,
+            value=state.now.path_type,
             layout=wide,
         )  # fmt: skip
         self.law = lean(

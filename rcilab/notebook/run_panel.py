@@ -25,7 +25,7 @@ from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import require_driver
 from rcilab.notebook.browser_heartbeat import kernel_heart
-from rcilab.notebook.browser_watchdog import LEFT_ALONE
+from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.part import Part
@@ -56,7 +56,7 @@ class _Connection:
         """Returns its status; "closed" without a connection."""
         return self._state.status or SupervisorStatus()
 
-    def supervisor(self) -> Robot:
+    def robot(self) -> Robot:
         """Returns the object that takes requests.
 
         Raises:
@@ -65,7 +65,7 @@ class _Connection:
         robot = self._state.robot
         if robot is None:
             raise StartingError("no robot is connected")
-        return robot.supervisor()
+        return robot.robot()
 
     def take_run(self) -> Run | None:
         """Returns the last run of `execute` if the robot recorded it itself."""
@@ -169,13 +169,13 @@ class RunPanel(Part):
         robot = self.state.robot
         assert robot is not None  # Without one, the buttons are disabled.
         with self.state.lock:
-            self._requests.add(what, ask(robot.supervisor()))
+            self._requests.add(what, ask(robot.robot()))
 
     def _on_recover(self) -> None:
         """Clears the faults; reconnects a lost connection."""
         robot, status = self.state.robot, self.state.status
         if isinstance(robot, RobotConnection) and status is not None and status.phase in ("lost", "crashed"):
-            self._requests.add("recover", robot.supervisor().reconnect())
+            self._requests.add("recover", robot.robot().reconnect())
         else:
             self._send("recover", lambda robot: robot.recover())
 
@@ -234,7 +234,7 @@ class RunPanel(Part):
             self._heart.beat()
             if self._heart.is_gone:
                 if isinstance(robot, SessionConnection):
-                    robot.stop(LEFT_ALONE)
+                    robot.stop(OPERATOR_ABSENT)
                 else:
                     robot.stop()
             elif self._heart.was_seen:
@@ -263,7 +263,7 @@ class RunPanel(Part):
             self.limits.take(outcome.error)
         if outcome.what in ("execute", "cell"):
             self.state.take(outcome)
-        sentence = outcome_html(outcome, self.state.status, self.text, is_left_alone=self._heart.is_gone)
+        sentence = outcome_html(outcome, self.state.status, self.text, is_operator_absent=self._heart.is_gone)
         if outcome.what == "cell":
             sentence += soft(self.text("run.of_cell"))
         write(self._outcome, sentence)

@@ -177,16 +177,16 @@ class LabState:
                     f"q of joint {joint}", float(angle), f"must be from {low:.4f} to {high:.4f} rad"
                 )
         with self.lock:
-            self.store.remember()
-            self.goals.pose(readonly_copy(angles))
+            self.store.push_undo()
+            self.goals.set_joints(readonly_copy(angles))
             self._leave_preview()
             self.notify("goal")
 
     def aim(self, target: Pose) -> None:
         """Sets the goal to a pose of the tool in base: the nearest branch, or the nearest reachable pose."""
         with self.lock:
-            self.store.remember()
-            self.goals.aim(target)
+            self.store.push_undo()
+            self.goals.set_target(target)
             self._leave_preview()
             self.notify("goal")
 

@@ -38,6 +38,7 @@ from rcilab.workbench.renderer import Renderer, tab_name
 if TYPE_CHECKING:
     import viser
 
+    from rcilab.core.errors import RcilabError
     from rcilab.recording.run import Run
 
 _LOWEST, _HIGHEST = 200.0, 4000.0  # [px] Range of window heights for the layout of plots.
@@ -100,7 +101,7 @@ class Workbench:
         if replay is not None:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
-        self.session = RobotConnection(lambda error: self.store.say("bad", explain_error(error, self.session.status())))
+        self.session = RobotConnection(self._report_failure)
         is_own = config.port and replay is None  # No autosave on a free port, which is not reused, nor for a replay.
         autosave = Autosave(autosave_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()
@@ -109,6 +110,9 @@ class Workbench:
         self._stopped = threading.Event()
         self._opened = False
         self._views: dict[int, ViserEnvironment] = {}  # By client id. Owned by the event loop.
+
+    def _report_failure(self, error: RcilabError) -> None:
+        self.store.notify("bad", explain_error(error, self.session.status()))
 
     @property
     def url(self) -> str:
@@ -142,7 +146,7 @@ class Workbench:
         self.renderer.start()
         self.dispatcher.start()
         if self._config.replay is None:
-            self.dispatcher.robot.open(self._config.model, self._config.target)
+            self.dispatcher.run.open(self._config.model, self._config.target)
         threading.Thread(target=self._beat, name="operator", daemon=True).start()
 
     def close(self) -> None:

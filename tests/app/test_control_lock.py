@@ -167,7 +167,7 @@ def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     for page in (1, 2):
         dispatcher.act(PageOpened(page=page))
     for number in range(3):
-        desk.store.say("bad", message("notice.taken", page=number), page=1)
+        desk.store.notify("bad", message("notice.taken", page=number), page=1)
         for _ in range(100):
             dispatcher.act(Seek(page=2, place=0.5))
             dispatcher.act(TakeControls(page=2))

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from rcilab.app.goal.elbow import in_branch, look_at_elbow, nearest_free
+from rcilab.app.goal.elbow import compute_elbow, in_branch, nearest_free
 from rcilab.app.goal.goal import goal_toward
 from rcilab.app.text import Text
 from rcilab.core.safety_box import SafetyBox
@@ -48,7 +48,7 @@ def test_the_nearest_arm_angle_is_free_and_what_was_refused_is_not(name, is_held
     moved = 0
     for _ in range(POSES):
         q = rng.uniform(model.limits.joint.lower + 0.02, model.limits.joint.upper - 0.02)
-        target, elbow = model.forward(q), look_at_elbow(model, q, None)
+        target, elbow = model.forward(q), compute_elbow(model, q, None)
         if elbow is None:
             continue
         branch = elbow.branch if is_held else None
@@ -58,7 +58,7 @@ def test_the_nearest_arm_angle_is_free_and_what_was_refused_is_not(name, is_held
             goal = goal_toward(model, target, q if near is None else near, psi, why)
             assert goal.reach.tone != "bad"
             assert math.remainder(goal.psi - psi, math.tau) == pytest.approx(0.0, abs=1e-6)
-            shown = look_at_elbow(model, goal.q, None)
+            shown = compute_elbow(model, goal.q, None)
             assert branch is None or near is None or shown.branch == branch
             if why is None or why.code != "elbow.snapped":
                 continue
@@ -77,7 +77,7 @@ def test_without_a_free_arm_angle_none_is_called_free():
         psi, why = nearest_free(model, target, 2.5, box=place)
         goal = goal_toward(model, target, model.home, psi)
         is_said = "free range" in EN.render(why)
-        assert is_said == bool(free_in_words(look_at_elbow(model, goal.q, place))) == (place is None)
+        assert is_said == bool(free_in_words(compute_elbow(model, goal.q, place))) == (place is None)
 
 
 def test_an_arm_angle_that_only_a_singularity_forbids_is_taken_as_it_is():

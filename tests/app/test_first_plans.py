@@ -30,7 +30,7 @@ def first_goal(model) -> np.ndarray:
 def test_page_and_notebook_plan_without_a_footnote_as_they_come(name):
     model = load_model(name)
     plan = make_plan(
-        model, model.home, first_goal(model), DEFAULTS["speed"], DEFAULTS["law"], None, DEFAULTS["way"], None
+        model, model.home, first_goal(model), DEFAULTS["speed"], DEFAULTS["law"], None, DEFAULTS["path_type"], None
     )
     assert plan.report.ok
     assert plan.report.warnings == ()

@@ -26,7 +26,7 @@ class Robot:
     def status(self) -> SupervisorStatus:
         return IDLE
 
-    def supervisor(self) -> None:
+    def robot(self) -> None:
         raise StartingError("it is not asked for anything here")
 
 

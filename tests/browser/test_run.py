@@ -43,7 +43,7 @@ def test_a_page_that_is_loaded_anew_opens_its_tab_and_says_what_it_missed(page):
     page.wait(lambda: is_open(page, "Check"), "the tab to open")
     page.tab.wait_for_timeout(200)  # The page looks at its tabs every 50 ms.
     page.tab.goto("about:blank")
-    page.bench.store.say("warn", message("notice.stopped"))
+    page.bench.store.notify("warn", message("notice.stopped"))
     page.tab.goto(f"{page.bench.url}?fixedDpr=0.2")
     page.wait(lambda: "Stopped" in page.toast(), "what was said meanwhile")
     page.wait_until_drawn()

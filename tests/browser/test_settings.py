@@ -51,7 +51,7 @@ def test_a_warning_stays_beside_later_good_news_and_keeps_its_colour(page):
     try:
         for at, (tone, news) in enumerate(zip(("warn", "good"), said, strict=True)):
             page.tab.evaluate(f"Date.now = () => {1e12 + 2000 * at}")
-            store.say(tone, news)
+            store.notify(tone, news)
             store.changed.set()
             page.wait(lambda news=news: text.render(news) in page.toast(), "the notice")
         assert text.render(said[0]) in page.toast()

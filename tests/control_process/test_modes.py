@@ -155,7 +155,7 @@ def test_a_motion_in_torques_is_brought_to_rest_along_a_way(supervisor):
 
 def test_parameters_are_acknowledged_and_told_again(supervisor):
     control = ControllerParameters(joint_stiffness=(250.0,) * 7, filters=(50.0, 40.0, 30.0), desired_wrench=(0.0,) * 6)
-    supervisor.set_up(RobotConfiguration(control=control)).wait(SOON)
+    supervisor.configure(RobotConfiguration(control=control)).wait(SOON)
     wait_for(lambda: supervisor.status().setup.control is not None)
     assert supervisor.status().setup.control == control
     times = supervisor.status().setup_times
@@ -163,9 +163,9 @@ def test_parameters_are_acknowledged_and_told_again(supervisor):
     wait_for(lambda: supervisor.status().setup_times > times)
     assert supervisor.status().setup.control == control
     beyond = ControllerParameters(joint_stiffness=(3e4,) * 7)
-    ticket = supervisor.set_up(RobotConfiguration(control=beyond))
+    ticket = supervisor.configure(RobotConfiguration(control=beyond))
     with pytest.raises((InvalidValueError, CommandRejectedError), match="joint 1"):
         ticket.wait(SOON)
     with pytest.raises(InvalidValueError, match=r"sideways.*known: joint_stiffness"):
-        supervisor.set_up(RobotConfiguration(control=ControllerParameters(sideways=(1.0,)))).wait(SOON)
-    supervisor.set_up(RobotConfiguration(control=ControllerParameters(filters=(1000.0,) * 3))).wait(SOON)
+        supervisor.configure(RobotConfiguration(control=ControllerParameters(sideways=(1.0,)))).wait(SOON)
+    supervisor.configure(RobotConfiguration(control=ControllerParameters(filters=(1000.0,) * 3))).wait(SOON)

@@ -52,7 +52,7 @@ def test_a_configuration_passes_through_pickle():
 
 
 def test_the_controller_reports_the_tool_it_was_told_and_again_after_a_new_connection(supervisor):
-    supervisor.set_up(RobotConfiguration(tool=TOOL, load=LOAD, force=FORCE)).wait(SOON)
+    supervisor.configure(RobotConfiguration(tool=TOOL, load=LOAD, force=FORCE)).wait(SOON)
     wait_for(lambda: (T := supervisor.status().T_flange_tool) is not None and T.is_close(TOOL, 1e-9))
     status = supervisor.status()
     assert status.setup.parts == ("tool", "load", "force")
@@ -63,35 +63,35 @@ def test_the_controller_reports_the_tool_it_was_told_and_again_after_a_new_conne
 
 
 def test_a_motion_that_was_not_checked_with_the_box_of_now_is_refused(supervisor):
-    supervisor.set_up(RobotConfiguration(tool=TOOL)).wait(SOON)
+    supervisor.configure(RobotConfiguration(tool=TOOL)).wait(SOON)
     q = supervisor.status().q_c
     motion = plan_joint(MODEL, q, MODEL.home + 0.2, speed=0.5)
     certificate = check(motion, supervisor.model).certificate
     here = supervisor.model.forward(q).position
-    supervisor.set_up(RobotConfiguration(box=box_around(here, 0.05))).wait(SOON)
+    supervisor.configure(RobotConfiguration(box=box_around(here, 0.05))).wait(SOON)
     with pytest.raises(CertificateError, match="safety box"):
         supervisor.execute(motion, certificate)
     assert not check(motion, supervisor.model, box=box_around(here, 0.05)).ok
-    supervisor.set_up(RobotConfiguration(box=SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))).wait(SOON)
+    supervisor.configure(RobotConfiguration(box=SafetyBox(size=(1, 1, 1), T_base_box=Pose(), active=False))).wait(SOON)
     supervisor.execute(motion, certificate).wait(SOON)
 
 
 def test_a_set_up_that_is_none_or_too_heavy_is_refused_before_it_is_sent(supervisor):
     with pytest.raises(InvalidValueError, match="RobotConfiguration"):
-        supervisor.set_up(TOOL)
+        supervisor.configure(TOOL)
     with pytest.raises(InvalidValueError, match="rated"):
-        supervisor.set_up(RobotConfiguration(load=Payload(mass=99.0)))
+        supervisor.configure(RobotConfiguration(load=Payload(mass=99.0)))
 
 
 def test_what_the_controller_refuses_stands_in_the_way_of_a_motion(supervisor):
     home = plan_joint(MODEL, supervisor.status().q_c, MODEL.home, speed=0.5)
     far = RobotConfiguration(force=ForceControlFrame(T_flange_force=Pose((50.0, 0.0, 0.0))))
-    ticket = supervisor.set_up(far)
+    ticket = supervisor.configure(far)
     with pytest.raises(rcilab.RcilabError, match=r"T_flange_force: .* m from the flange"):
         ticket.wait(SOON)
     with pytest.raises(UsageError, match=r"T_flange_force: .* m from the flange"):
         supervisor.execute(home, check(home, supervisor.model).certificate)
-    supervisor.set_up(RobotConfiguration(force=FORCE)).wait(SOON)
+    supervisor.configure(RobotConfiguration(force=FORCE)).wait(SOON)
     supervisor.execute(home, check(home, supervisor.model).certificate).wait(SOON)
 
 

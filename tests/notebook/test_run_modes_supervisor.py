@@ -105,12 +105,12 @@ class Real:
     def status(self) -> SupervisorStatus:
         return self._status
 
-    def set_up(self, setup: RobotConfiguration) -> PendingRequest:
+    def configure(self, setup: RobotConfiguration) -> PendingRequest:
         assert setup.control is not None
         self.told.append(setup.control)
         return PendingRequest("control")
 
-    def supervisor(self) -> Real:
+    def robot(self) -> Real:
         return self
 
     def drain(self) -> Any:

@@ -18,7 +18,7 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
-from rcilab.notebook.browser_watchdog import LEFT_ALONE
+from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch)
         wait_for(lambda: panel.state.outcome is not None, what="the run")
         run = panel.state.outcome.run
         assert run is not None
-        assert run.stopped == LEFT_ALONE
+        assert run.stopped == OPERATOR_ABSENT
         wait_for(lambda: "page did not answer" in panel._outcome.value, what="why, in words")
     assert repr(robot).endswith("closed>")
 
@@ -213,7 +213,7 @@ class Real:
     def pause(self) -> PendingRequest:
         return self.set_speed_override(0.0)
 
-    def supervisor(self) -> Real:
+    def robot(self) -> Real:
         return self
 
     def drain(self) -> Any:

@@ -62,7 +62,7 @@ class Bench:
     def plan_far(self) -> None:
         """A motion at full speed that asks for more torque than the manual recommends."""
         self.store.update(speed=1.0, law="jerk_limited")
-        self.goal.pose(HOME + np.array([1.0, 0.8, 0.0, -0.6, 0.0, 0.0, 0.0]))
+        self.goal.set_joints(HOME + np.array([1.0, 0.8, 0.0, -0.6, 0.0, 0.0, 0.0]))
         self.store.update(plan=self.plan.completed())
         assert self.plan.report.ok
         assert broken(self.plan)
@@ -97,7 +97,7 @@ def test_a_row_leads_to_its_worst_moment_and_its_joint(bench: Bench) -> None:
     bench.press("row", "joint.torque_rate")
     assert "tau" in bench.state.plots
     bench.press("row", "no.such")
-    assert bench.state.check.sought == 2
+    assert bench.state.check.seek_count == 2
 
 
 def test_a_slow_down_changes_the_speed_until_it_passes_and_can_be_taken_back(bench: Bench) -> None:
@@ -130,7 +130,7 @@ def test_what_passes_already_stays_and_says_so(bench: Bench) -> None:
 
 def test_a_way_into_the_floor_is_mended_by_no_slow_down() -> None:
     bench = Bench()
-    bench.goal.pose(HOME + np.array([0.0, 1.4, 0.0, 0.9, 0.0, 0.0, 0.0]))
+    bench.goal.set_joints(HOME + np.array([0.0, 1.4, 0.0, 0.9, 0.0, 0.0, 0.0]))
     bench.store.update(plan=bench.plan.completed())
     assert not bench.plan.report.ok
     bench.press("slow")
@@ -228,7 +228,7 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     box = SafetyBox(size=(1.0, 0.4, 1.5), T_base_box=Pose((0.5, 0.0, 0.5)))
     setup = bench.state.setup
     bench.store.update(setup=replace(setup, wanted=replace(setup.wanted, box=box)))
-    bench.goal.pose(HOME + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    bench.goal.set_joints(HOME + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     report = bench.plan.report
     assert report.broken_conditions == 1
     cards = rows_html(report, MODEL, "", Text("en"))

@@ -73,7 +73,7 @@ class FakeSession:
     def status(self) -> SupervisorStatus:
         return self.shown
 
-    def supervisor(self) -> FakeSupervisor:
+    def robot(self) -> FakeSupervisor:
         return self.fake
 
 
@@ -136,12 +136,12 @@ def test_a_step_goes_along_and_about_the_axes_of_base_or_tool():
 def test_a_step_to_a_limit_stops_there_and_says_which():
     near = np.array(MODEL.home)
     near[5] = MODEL.limits.joint.upper[5] - math.radians(2.0)
-    led = take_step(MODEL, near, JogState(step=5.0), Axis("joint.5", 1))
-    assert led.q[5] == pytest.approx(MODEL.limits.joint.upper[5], abs=2e-4)
-    assert (led.sentence.code, led.sentence.values["joint"]) == ("jog.at_upper", 6)
-    again = take_step(MODEL, led.q, JogState(step=5.0), Axis("joint.5", 1))
+    result = take_step(MODEL, near, JogState(step=5.0), Axis("joint.5", 1))
+    assert result.q[5] == pytest.approx(MODEL.limits.joint.upper[5], abs=2e-4)
+    assert (result.sentence.code, result.sentence.values["joint"]) == ("jog.at_upper", 6)
+    again = take_step(MODEL, result.q, JogState(step=5.0), Axis("joint.5", 1))
     assert (again.q, again.sentence.code) == (None, "jog.at_upper")
-    back = take_step(MODEL, led.q, JogState(step=5.0), Axis("joint.5", -1))
+    back = take_step(MODEL, result.q, JogState(step=5.0), Axis("joint.5", -1))
     assert back.sentence is None
 
 
@@ -377,11 +377,11 @@ def test_with_the_real_controller_the_goal_follows_the_arm_and_undo_brings_it_ba
 def test_a_step_that_would_swing_the_arm_is_refused(store):
     model = load_model("xMate3")
     q = np.radians([-134.2, -43.0, 90.4, 21.6, -83.6, 44.7])
-    led = take_step(model, q, JogState(step=1.0, frame="base"), Axis("pitch", 1))
-    if led.q is None:
-        assert led.sentence.code in ("jog.far", "jog.no_way")
+    result = take_step(model, q, JogState(step=1.0, frame="base"), Axis("pitch", 1))
+    if result.q is None:
+        assert result.sentence.code in ("jog.far", "jog.no_way")
     else:
-        assert np.abs(led.q - q).max() < np.radians(20.0)
+        assert np.abs(result.q - q).max() < np.radians(20.0)
 
 
 @pytest.mark.parametrize("axis", ["joint.0", "joint.1", "x", "yaw"])

@@ -72,7 +72,7 @@ def bench() -> Iterator[Bench]:
 
 
 def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: Bench) -> None:
-    bench.goal.pose(HOME + 0.1)
+    bench.goal.set_joints(HOME + 0.1)
     own = bench.state.plan
     bench.provoke(Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY)
     show = bench.state.learn.show
@@ -95,7 +95,7 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
             assert "kCommandJointAccelerationDiscontinuity" in said.replace("<wbr>", "")
             assert bound in said
             assert not re.search(r"\d ?(?:rad|m/)" if units.angle == "deg" else r"\d ?(?:°|mm)", said), said
-    bench.goal.pose(HOME - 0.1)
+    bench.goal.set_joints(HOME - 0.1)
     bench.learn.tick()
     assert bench.state.learn.show is None, "another plan is to be seen"
     assert displayed_state(bench.state) is bench.state
@@ -161,7 +161,7 @@ def test_a_lesson_that_an_arm_cannot_do_is_not_offered() -> None:
 def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.press("lesson", name="first")
     assert bench.step() == 0
-    bench.goal.pose(HOME + 0.3)
+    bench.goal.set_joints(HOME + 0.3)
     assert bench.step() == 1
     assert bench.step() == 1
     bench.store.update(place=0.4)
@@ -192,7 +192,7 @@ def test_a_step_can_be_skipped_and_says_so(bench: Bench) -> None:
 
 
 def test_the_elbow_lesson_sees_the_elbow_turn(bench: Bench) -> None:
-    bench.goal.pose(HOME + 0.3)
+    bench.goal.set_joints(HOME + 0.3)
     bench.press("lesson", name="elbow")
     bench.press("skip")
     assert bench.step() == 1

@@ -60,7 +60,7 @@ class FakeSession:
     def status(self) -> SupervisorStatus:
         return self.shown
 
-    def supervisor(self):
+    def robot(self):
         raise UsageError("there is none")
 
 
@@ -90,7 +90,7 @@ def held(actions):
 
 
 def tick(actions):
-    actions.tick(actions._session.status())
+    actions.tick(actions._connection.status())
 
 
 def grab(actions, link: int, page: int = 1):
@@ -117,9 +117,9 @@ def test_a_held_button_pushes_where_and_as_hard_as_is_set_and_silence_ends_it(ac
 
 @pytest.mark.parametrize(("newtons", "taken"), [(77.0, STRONGEST), (-5.0, 0.0), (math.nan, 20.0), (math.inf, 20.0)])
 def test_a_force_beyond_its_range_is_taken_at_the_bound_and_no_number_is_ignored(actions, store, newtons, taken):
-    actions.set_push(SetPush(newtons=newtons, link=9, direction="up", way="joint.sideways"))
+    actions.set_push(SetPush(newtons=newtons, link=9, direction="up", guiding_kind="joint.sideways"))
     push = store.state.push
-    assert (push.newtons, push.link, push.direction, push.way) == (taken, 0, "+y", "joint.free")
+    assert (push.newtons, push.link, push.direction, push.guiding_kind) == (taken, 0, "+y", "joint.free")
 
 
 def test_the_mouse_pulls_with_a_spring_that_goes_along_with_the_arm(actions, session):
@@ -195,7 +195,7 @@ def test_a_real_arm_is_freed_only_when_asked_twice(store, session, monkeypatch):
         start_guiding=lambda *way, stops: freed.append(way) or SimpleNamespace(done=True, error=None),
         **dict.fromkeys(("recover", "power_on", "power_off", "reconnect", "stop_guiding")),
     )
-    monkeypatch.setattr(session, "supervisor", lambda: supervisor)
+    monkeypatch.setattr(session, "robot", lambda: supervisor)
     store.update(target="rci://192.168.0.160:1337")
     robot = RunActions(store, session)
     robot.drive(RobotCommand(page=1, what="guide"))

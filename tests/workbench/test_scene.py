@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rcilab.app.goal.elbow import look_at_elbow, nearest_free
+from rcilab.app.goal.elbow import compute_elbow, nearest_free
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import SETTLED, GoalActions, MoveTarget, PlanGoal, PoseGoal, SetArmAngle, SetPathType
 from rcilab.app.request import TypeField
@@ -61,7 +61,7 @@ def bench():
 
 
 def test_the_arcs_of_an_elbow_go_all_round_and_agree_with_the_inverse():
-    elbow = look_at_elbow(MODEL, HOME, None)
+    elbow = compute_elbow(MODEL, HOME, None)
     assert sum(arc.end - arc.start for arc in elbow.arcs) == pytest.approx(math.tau)
     for arc in elbow.arcs:
         middle = 0.5 * (arc.start + arc.end)
@@ -73,14 +73,14 @@ def test_the_arcs_of_an_elbow_go_all_round_and_agree_with_the_inverse():
 
 def test_a_tool_outside_the_safety_box_forbids_every_arm_angle_and_says_so():
     box = SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=Pose((2.0, 0.0, 0.0)))
-    kinds = {arc.kind for arc in look_at_elbow(MODEL, HOME, box).arcs}
+    kinds = {arc.kind for arc in compute_elbow(MODEL, HOME, box).arcs}
     assert "box" in kinds
     assert not kinds & {"free", "other"}
 
 
 def test_arms_without_a_circle_have_none(bench):
-    assert look_at_elbow(load_model("xMate3"), np.zeros(6), None) is None
-    assert look_at_elbow(MODEL, np.zeros(7), None) is None
+    assert compute_elbow(load_model("xMate3"), np.zeros(6), None) is None
+    assert compute_elbow(MODEL, np.zeros(7), None) is None
     six = Bench(None, load_model("xMate3"))
     six.scene.drag_elbow(DragElbow(eye=(2.0, 0.0, 1.0), hand=(0.0, 0.0, 1.0), phase="update"))
     assert six.state.scene.elbow is None
@@ -207,9 +207,9 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     bench.scene.tick()
     ribbon = bench.state.scene.ribbon
     assert ribbon.usage.max() > 1.0
-    bead = ribbon.beads[0]
+    bead = ribbon.markers[0]
     assert box.excess(bead.position) > 0.0
-    bench.scene.show_bead(ShowViolation(number=0))
+    bench.scene.show_violation(ShowViolation(number=0))
     assert bench.state.place == pytest.approx(bead.place)
     assert bench.state.notice.tone == "bad"
     for language in LANGUAGES:
@@ -217,7 +217,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     assert bead_words(bead, Text("en")).startswith("◆ violated: Tool inside the safety box · ")
     assert bead_words(bead, Text("zh")).startswith("◆ 违反：")
     assert "violated: Tool inside the safety box</p>" in planned_html(bench.state, STANDING, Text("en"))
-    bench.scene.show_bead(ShowViolation(number=99))
+    bench.scene.show_violation(ShowViolation(number=99))
     bench.goal.pose_goal(PoseGoal(name="home"))
     bench.scene.tick()
     assert bench.state.scene.ribbon is None
@@ -228,7 +228,7 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
 
     now = [100.0]
     monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    bench.goal.set_way(SetPathType(kind="line"))
+    bench.goal.set_path_type(SetPathType(kind="line"))
     bench.aim(-0.05, 0.1, 0.05)
     assert bench.state.plan is None
     assert bench.state.no_plan.code == "plan.soon"
@@ -263,20 +263,20 @@ def test_the_arm_is_said_to_be_moved_only_while_it_is(bench):
 
 
 def test_an_arc_needs_a_place_to_lead_over_and_then_does(bench):
-    bench.goal.set_way(SetPathType(kind="arc"))
+    bench.goal.set_path_type(SetPathType(kind="arc"))
     bench.aim(-0.03, 0.08, 0.0)
     bench.goal.plan(PlanGoal())
     assert bench.state.no_plan.code == "plan.no_via"
     said = TimelinePanel(Text("en"), lambda request: None)._read(bench.state, SimpleNamespace(q_c=HOME, code="idle"))
     assert Text("en")("plan.no_via") in said, "not how to begin, but what is missing"
-    bench.goal.set_way(SetPathType(via=True))
+    bench.goal.set_path_type(SetPathType(via=True))
     via = bench.state.via.position
     bench.aim(0.0, 0.08, 0.05)
     bench.goal.plan(PlanGoal())
     assert bench.state.plan.kind == "arc"
     assert np.linalg.norm(bench.state.plan.path - via, axis=1).min() < 5e-3
-    bench.goal.set_way(SetPathType(kind="sideways"))
-    assert bench.state.way == "arc"
+    bench.goal.set_path_type(SetPathType(kind="sideways"))
+    assert bench.state.path_type == "arc"
 
 
 def test_a_typed_quaternion_turns_the_target_and_a_bad_one_is_answered(bench):

@@ -138,7 +138,7 @@ class Power:
     def status(self) -> SupervisorStatus:
         return status(powered=False)
 
-    def supervisor(self):
+    def robot(self):
         if not self.is_there:
             raise StartingError("the control process is still starting")
         return self

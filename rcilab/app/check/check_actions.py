@@ -38,8 +38,8 @@ class PressCheck(Request):
 class CheckActions:
     """Shows a row's worst moment, slows the plan down, explains the report, repeats the check."""
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, program: ProgramActions) -> None:
-        self._store, self._session, self._goal, self._program = store, session, goal, program
+    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions, program: ProgramActions) -> None:
+        self._store, self._connection, self._goal, self._program = store, connection, goal, program
         self._work: BackgroundJob[Plan, SlowdownJob | Explained] = BackgroundJob("check")
 
     @property
@@ -61,7 +61,7 @@ class CheckActions:
         elif request.what == "again":
             self._plan_again(plan)
         elif plan is None:
-            self._store.say("warn", message("check.nothing"))
+            self._store.notify("warn", message("check.nothing"))
         elif request.what == "row":
             self._seek(plan, request.row)
         elif request.what == "slow":
@@ -110,7 +110,7 @@ class CheckActions:
         plot, plots = plot_of(row.condition), self._store.state.plots
         shown = plots if plot is None else plots | {plot}
         self._store.update(place=min(max(place, 0.0), 1.0), playing=False, plot_joint=row.joint, plots=shown)
-        self._set(sought=self._check.sought + 1, row=name)
+        self._set(seek_count=self._check.seek_count + 1, row=name)
 
     def _plan_again(self, plan: Plan | None) -> None:
         """Plans again what the plan was made of: the program, or the path to the goal."""
@@ -121,8 +121,8 @@ class CheckActions:
 
     def _slow_down(self, plan: Plan) -> None:
         state = self._store.state
-        if is_moving(self._session.status()):
-            self._store.say("warn", message("notice.moving"))
+        if is_moving(self._connection.status()):
+            self._store.notify("warn", message("notice.moving"))
             return
         if plan.program is None:
             run = partial(slow_to_goal, plan, state.speed, state.law)

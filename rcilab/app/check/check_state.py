@@ -46,7 +46,7 @@ class CheckState:
     """The result if the plan stays as it is: it contains the reason."""
     slowed: Slowed | None = None
     explained: Explained | None = None
-    sought: int = 0
+    seek_count: int = 0
     """Number of times that the moment of a row was shown."""
     row: str = ""
     """Id of the condition that was shown last."""

@@ -26,7 +26,7 @@ from rcilab.motion import Motion
 if TYPE_CHECKING:
     from rcilab.motion import Motion
 
-Step: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
+RecoveryStep: TypeAlias = Literal["release", "network", "recover", "refused", "power_off", "widen", "power_on", "move"]
 """One step of the recovery from a fault."""
 
 
@@ -49,7 +49,7 @@ class FaultDemo:
     """Recorded cycles after the fault, in which the controller stops the arm; they contain no commands."""
     signal: FaultSignal
     """The quantity that violated its condition, cycle by cycle."""
-    way_out: tuple[Step, ...]
+    way_out: tuple[RecoveryStep, ...]
     """The steps of the recovery, in this order; afterwards the arm moved again."""
 
     @property

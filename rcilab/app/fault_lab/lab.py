@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.app.fault_lab.fault_demo import FaultDemo, Step
+from rcilab.app.fault_lab.fault_demo import FaultDemo, RecoveryStep
 from rcilab.app.fault_lab.signals import Signals
 from rcilab.app.fault_lab.table import FaultTable
 from rcilab.control_process.simulate import simulate
@@ -34,11 +34,11 @@ from rcilab.motion import plan_joint
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
-_CALM = 1.0  # [N, N m] Far below any threshold of a scenario.
-_CALM_STATES = 500
+_SMALL_FORCE = 1.0  # [N, N m] Far below any threshold of a scenario.
+_MAX_WAIT_STATES = 500
 _GAP = 5  # [states] Largest number of missing states between two shown ones, as on any network.
 _AFTER = 200  # [cycles] Recorded part of the controlled stop: the arm stands still by then.
-_NUDGE = 0.02  # [rad] Length of the motion that shows that the arm can move again.
+_TEST_MOTION = 0.02  # [rad] Length of the motion that shows that the arm can move again.
 _THERE = 1e-6  # [rad] Largest distance from the start of a scenario.
 _OPENED, _PLACED, _SHOWN = 0.4, 0.5, 0.8
 """Progress when the controller runs, when the arm is at the start, when the fault has come. About as measured."""
@@ -146,21 +146,21 @@ class FaultLab(Closeable):
         commands = getattr(robot, maker.scheme)
         return Scene(robot=robot, commands=commands, start=robot.receive_state(), limits=self.model.limits)
 
-    def _leave(self, robot: RobotSession, scenario: FaultScenario) -> list[Step]:
+    def _leave(self, robot: RobotSession, scenario: FaultScenario) -> list[RecoveryStep]:
         """Recovers from a fault and returns the steps."""
-        done: list[Step] = []
+        done: list[RecoveryStep] = []
         if scenario.cuts_network:
             robot.world.set_network(None)
             done.append("network")
         if robot.world.status().pushed:
             robot.world.release()
             done.append("release")
-            self._wait_for_calm(robot)
+            self._wait_for_small_force(robot)
         done += self._recover(robot)
         self._widen(robot)
         self._configure(robot, RobotConfiguration(control=default_parameters(parameters_of(self.model))))
         nudged = np.array(robot.receive_state().q_c)
-        nudged[-1] -= np.copysign(_NUDGE, nudged[-1])
+        nudged[-1] -= np.copysign(_TEST_MOTION, nudged[-1])
         self._go(robot, nudged)
         return [*done, "move"]
 
@@ -177,13 +177,13 @@ class FaultLab(Closeable):
     def _configure(self, robot: RobotSession, configuration: RobotConfiguration) -> None:
         robot.configure(configuration.only(capabilities_of(self.model).setup))
 
-    def _wait_for_calm(self, robot: RobotSession) -> None:
+    def _wait_for_small_force(self, robot: RobotSession) -> None:
         """Returns once the estimated external torques are small again: the estimate needs a moment after a push."""
-        for _ in range(_CALM_STATES):
-            if np.abs(robot.receive_state().tau_ext_in_base).max() < _CALM:
+        for _ in range(_MAX_WAIT_STATES):
+            if np.abs(robot.receive_state().tau_ext_in_base).max() < _SMALL_FORCE:
                 return
 
-    def _recover(self, robot: RobotSession) -> list[Step]:
+    def _recover(self, robot: RobotSession) -> list[RecoveryStep]:
         try:
             robot.recover()
         except ManualRecoveryError:

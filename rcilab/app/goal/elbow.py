@@ -20,9 +20,9 @@ from rcilab.model.robot_model import RobotModel
 ArcKind: TypeAlias = Literal["free", "other", "limits", "singular", "box", "reach"]
 """free: in this branch; other: in another branch only; or the reason why it is not."""
 
-LOOKS = 36
+DEXTERITY_SAMPLES = 36
 """Arm angles at which the manipulability is computed: every ten degrees."""
-SAID = math.radians(0.5)  # [rad] A smaller change of the arm angle is not reported.
+MIN_REPORTED_CHANGE = math.radians(0.5)  # [rad] A smaller change of the arm angle is not reported.
 
 _KINDS: dict[str, ArcKind] = {
     "joint limits": "limits",
@@ -57,11 +57,11 @@ class Elbow:
     arcs: tuple[ElbowArc, ...]
     """Consecutive arcs; together a full turn."""
     dexterity: Array
-    """Smallest singular value of the Jacobian in this branch, at `LOOKS` arm angles from -pi, shape (LOOKS,);
+    """Smallest singular value of the Jacobian in this branch, at `DEXTERITY_SAMPLES` arm angles from -pi, one each;
     NaN where the branch has no solution."""
 
 
-def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow | None:
+def compute_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow | None:
     """Returns the elbow circle at these joint angles; None for an arm without one.
 
     Args:
@@ -77,7 +77,7 @@ def look_at_elbow(model: RobotModel, q: Array, box: SafetyBox | None) -> Elbow |
         arcs = model.feasible_arcs(target, box)
     except KinematicsError:
         return None
-    looks = np.append(np.linspace(-math.pi, math.pi, LOOKS, endpoint=False), psi)
+    looks = np.append(np.linspace(-math.pi, math.pi, DEXTERITY_SAMPLES, endpoint=False), psi)
     batch = model.inverse_batch(np.repeat(target.matrix[None], len(looks), axis=0), looks)
     branch = int(np.abs(np.angle(np.exp(1j * (batch.q[-1] - q)))).max(axis=1).argmin())
     along = batch.q[:-1, branch]
@@ -95,7 +95,7 @@ def nearest_free(
         target: Pose of the tool in base.
         psi: Wanted arm angle, [rad].
         branch: The branch to keep, as in `Elbow.branch`; None takes any.
-        box: Safety box for the tool, as for `look_at_elbow`.
+        box: Safety box for the tool, as for `compute_elbow`.
     """
     try:
         arcs = model.feasible_arcs(target, box)
@@ -104,7 +104,7 @@ def nearest_free(
     found = None if branch is None else arcs.nearest(psi, branch)
     is_kept = found is not None
     found = arcs.nearest(psi) if found is None else found
-    if found is None or abs(math.remainder(found - psi, math.tau)) < SAID:
+    if found is None or abs(math.remainder(found - psi, math.tau)) < MIN_REPORTED_CHANGE:
         return psi, None
     left = arcs.at(psi)
     why = message("elbow.why.other") if is_kept and left.branches else _say_why_not(left)

@@ -14,7 +14,7 @@ from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.elbow import in_branch, nearest_free
 from rcilab.app.goal.goal import POSE_FIELDS, Goal, goal_at, goal_toward
-from rcilab.app.planning import PATH_KINDS, Plan, make_plan, make_recovery
+from rcilab.app.planning import PATH_TYPES, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
 from rcilab.app.state_store import StateStore
@@ -156,7 +156,7 @@ class GoalActions:
         self._planned = 0.0  # [s] Time of the last plan.
         self._due: float | None = None  # [s] Time at which a tool path is to be planned.
         self._is_held = False  # The gizmo is being dragged.
-        self._hand, self._moved = "", 0.0  # What was dragged last, and when, [s].
+        self._dragged, self._dragged_at = "", 0.0  # What was dragged last, and when, [s].
 
     @property
     def handlers(self) -> Handlers:
@@ -167,7 +167,7 @@ class GoalActions:
             MoveTarget: self.move_target,
             SetArmAngle: self.set_arm_angle,
             ChooseBranch: self.choose_branch,
-            SetPathType: self.set_way,
+            SetPathType: self.set_path_type,
             PlanGoal: self.plan,
             PlanRecovery: self.plan_recovery,
             SetSpeed: self.set_speed,
@@ -181,13 +181,13 @@ class GoalActions:
             return
         q = np.array(self._store.state.goal.q)
         limits = model.limits.joint
-        self._remember_hand(f"joint {request.joint}")
+        self._push_undo_once(f"joint {request.joint}")
         q[request.joint] = request.angle
-        self.pose(readonly_copy(np.clip(q, limits.lower, limits.upper)))  # All joints: soft limits may be new.
+        self.set_joints(readonly_copy(np.clip(q, limits.lower, limits.upper)))  # All joints: soft limits may be new.
 
     def pose_goal(self, request: PoseGoal) -> None:
         """Sets the goal to a named pose."""
-        state, self._hand = self._store.state, ""
+        state, self._dragged = self._store.state, ""
         if request.name == "undo":
             goal = self._store.undo()
             if goal is not None:
@@ -195,7 +195,7 @@ class GoalActions:
                 self._store.update(goal=goal)
                 self.plan()
             return
-        self._store.remember()
+        self._store.push_undo()
         here = self._robot.status().q_c
         named = {
             "zero": np.zeros(state.model.n),
@@ -203,7 +203,7 @@ class GoalActions:
             "here": state.goal.q if here is None else here,
             "start": state.goal.q if state.plan is None else _beginning(state.plan),
         }
-        self.pose(readonly_copy(named[request.name]))
+        self.set_joints(readonly_copy(named[request.name]))
 
     def move_target(self, request: MoveTarget) -> None:
         """Follows the gizmo."""
@@ -213,16 +213,16 @@ class GoalActions:
         if math.hypot(*request.wxyz) < 1e-6:
             return
         position = [min(max(number, -FURTHEST), FURTHEST) for number in request.position]
-        self._remember_hand("target")
+        self._push_undo_once("target")
         self._is_held = not request.ended
-        self.aim(Pose(position, request.wxyz))
+        self.set_target(Pose(position, request.wxyz))
 
-    def _remember_hand(self, what: str) -> None:
+    def _push_undo_once(self, what: str) -> None:
         """Stores the goal for undo, once per drag."""
         now = time.monotonic()
-        if what != self._hand or now - self._moved > _ONE_DRAG:
-            self._store.remember()
-        self._hand, self._moved = what, now
+        if what != self._dragged or now - self._dragged_at > _ONE_DRAG:
+            self._store.push_undo()
+        self._dragged, self._dragged_at = what, now
 
     def set_arm_angle(self, request: SetArmAngle, branch: int | None = None) -> None:
         """Turns the elbow about the shoulder-wrist line while the tool is held, as far as the limits allow."""
@@ -231,7 +231,7 @@ class GoalActions:
             goal, wanted = state.goal, math.remainder(request.psi, math.tau)
             psi, snapped = nearest_free(state.model, goal.target, wanted, branch, state.box)
             near = None if branch is None else in_branch(state.model, goal.target, psi, goal.q, branch)
-            self.aim(goal.target, psi, near, snapped)
+            self.set_target(goal.target, psi, near, snapped)
 
     def choose_branch(self, request: ChooseBranch) -> None:
         """Chooses another analytic solution of the same pose."""
@@ -239,16 +239,16 @@ class GoalActions:
         solutions = goal.reach.solutions
         if solutions is None or not 0 <= request.index < len(solutions):
             return
-        self._store.remember()
-        self.aim(goal.target, None, near=solutions[request.index])
+        self._store.push_undo()
+        self.set_target(goal.target, None, near=solutions[request.index])
 
-    def lead_to(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
+    def set_waypoint_target(self, target: Pose, psi: float | None, q: JointVector | None) -> None:
         """Sets the goal to that of a waypoint: joint angles, or a pose with an arm angle."""
-        self._store.remember()
+        self._store.push_undo()
         if q is None:
-            self.aim(target, psi)
+            self.set_target(target, psi)
         else:
-            self.pose(q)
+            self.set_joints(q)
 
     def type_field(self, request: TypeField) -> None:
         """Takes a typed number, or shows the problem next to its field."""
@@ -274,11 +274,11 @@ class GoalActions:
             bound, unit = (FURTHEST * 1000.0, "mm") if index < 3 else (360.0, "deg")
             parsed = parse_number(request.text, -bound, bound, unit)
             value = parsed.value
-            act = None if value is None else lambda: self.aim(_with_number(state.goal.target, index, value))
+            act = None if value is None else lambda: self.set_target(with_pose_field(state.goal.target, index, value))
         elif kind == "pose" and name == QUATERNION:
             parsed = parse_quaternion(request.text)
             wxyz = parsed.value
-            act = None if wxyz is None else lambda: self.aim(Pose(state.goal.target.position, wxyz))
+            act = None if wxyz is None else lambda: self.set_target(Pose(state.goal.target.position, wxyz))
         elif request.field == "speed":
             parsed = parse_number(request.text, 100.0 * SLOWEST, 100.0, "%")
             value = parsed.value
@@ -291,9 +291,9 @@ class GoalActions:
             return
         if act is None:
             assert parsed.problem is not None
-            self._store.complain(request.field, parsed.problem)
+            self._store.set_problem(request.field, parsed.problem)
             return
-        self._store.remember()
+        self._store.push_undo()
         self._store.clear_problems(request.field)
         others = self._store.state.problems  # The texts of other fields stay there, to be corrected.
         act()
@@ -312,11 +312,11 @@ class GoalActions:
             self._store.update(law=request.law)
             self.plan()
 
-    def set_way(self, request: SetPathType) -> None:
+    def set_path_type(self, request: SetPathType) -> None:
         """Changes the path type, or the via point of an arc."""
-        kind = next((kind for kind in PATH_KINDS if kind == request.kind), self._store.state.way)
+        kind = next((kind for kind in PATH_TYPES if kind == request.kind), self._store.state.path_type)
         via = self._store.state.goal.target if request.via else self._store.state.via
-        self._store.update(way=kind, via=via)
+        self._store.update(path_type=kind, via=via)
         self.plan()
 
     def plan(self, request: PlanGoal | None = None) -> None:
@@ -335,11 +335,11 @@ class GoalActions:
         start = start_of_plans(state.model, status)
         if start is None:
             if request is not None:  # Nothing has changed: the plan is kept.
-                self._store.say("warn", message("plan.no_arm"))
+                self._store.notify("warn", message("plan.no_arm"))
             elif state.recording is None:  # A displayed run stays, whatever the goal is.
                 self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
             return
-        if state.way != "joint" and request is None:
+        if state.path_type != "joint" and request is None:
             self._due = time.monotonic() + SETTLED
             self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
             return
@@ -350,7 +350,7 @@ class GoalActions:
         self._planned = time.monotonic()
         is_program = state.plan is not None and state.plan.program is not None
         if is_program and not is_asked and state.plan is not None and not is_done(state.plan, start):
-            self._store.say("warn", message("plan.replaced"))
+            self._store.notify("warn", message("plan.replaced"))
         self.show(made)
 
     def prepare_plan(self, start: JointVector) -> Callable[[], Plan | Message]:
@@ -359,7 +359,7 @@ class GoalActions:
         box, short = state.box, state.goal.reach.short
 
         def make() -> Plan | Message:
-            made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.way, state.via)
+            made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.path_type, state.via)
             return replace(made, short=short) if isinstance(made, Plan) else made
 
         return make
@@ -404,13 +404,13 @@ class GoalActions:
         self._stale = True
         return goal
 
-    def pose(self, q: JointVector) -> None:
+    def set_joints(self, q: JointVector) -> None:
         """Sets the goal to joint angles; rejected texts were about the previous one."""
         self._store.clear_problems(*_FIELDS)
         self._store.update(goal=goal_at(self._store.state.model, q))
         self.plan()
 
-    def aim(
+    def set_target(
         self,
         target: Pose,
         psi: float | None = None,
@@ -433,7 +433,7 @@ def _beginning(plan: Plan) -> JointVector:
     return plan.motion.start if plan.program is None else np.array(plan.program.start)
 
 
-def _with_number(pose: Pose, index: int, value: float) -> Pose:
+def with_pose_field(pose: Pose, index: int, value: float) -> Pose:
     """Returns a pose with one of x, y, z [mm] and roll, pitch, yaw [deg] replaced."""
     position, rpy = pose.position, pose.rpy
     if index < 3:

@@ -59,27 +59,27 @@ class NamedPoseActions:
     def _keep(self, name: str) -> None:
         name = name.strip()
         if not name or len(name) > LONGEST_NAME or not name.isprintable():
-            self._store.say("warn", message("poses.no_name", longest=LONGEST_NAME))
+            self._store.notify("warn", message("poses.no_name", longest=LONGEST_NAME))
         elif name in self._store.state.jog.poses:
-            self._store.say("warn", message("poses.taken", name=name))
+            self._store.notify("warn", message("poses.taken", name=name))
         elif self._try(lambda: self._book.store(name, self._store.state.goal.q)):
             self._try(lambda: self._show(name))
-            self._store.say("good", message("poses.stored", name=name))
+            self._store.notify("good", message("poses.stored", name=name))
 
     def _recall(self, name: str) -> None:
         def pose() -> None:
             q = self._book.recall(name)
-            self._store.remember()
-            self._goal.pose(q)
+            self._store.push_undo()
+            self._goal.set_joints(q)
 
         if not name:
-            self._store.say("warn", message("poses.none"))
+            self._store.notify("warn", message("poses.none"))
         else:
             self._try(pose)
 
     def _delete(self, name: str) -> None:
         if not name:
-            self._store.say("warn", message("poses.none"))
+            self._store.notify("warn", message("poses.none"))
         elif self._try(lambda: self._book.delete(name)):
             self._try(self._show)
 
@@ -104,7 +104,7 @@ class NamedPoseActions:
         except RcilabError as error:
             plain = error.requirement if isinstance(error, InvalidValueError) else str(error)
             reason = describe_error(error) if error.code else LiteralText(plain)
-            self._store.say("bad", message("poses.file", file=self._book.file, reason=reason))
+            self._store.notify("bad", message("poses.file", file=self._book.file, reason=reason))
             if isinstance(error, InvalidValueError) and error.name == "pose":
                 self._try(self._show)  # Another process has deleted it.
             return False

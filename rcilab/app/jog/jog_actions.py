@@ -48,7 +48,7 @@ class SetJog(Request):
     agreed: bool = False
     """Whether this is the second confirmation for a foreign robot."""
     step: float | None = None
-    """Step, [mm, deg]; 0: as long as a button is held."""
+    """JogStepResult, [mm, deg]; 0: as long as a button is held."""
     frame: str | None = None
     speed: float | None = None
     """Share of the fastest jog, 0 to 1."""
@@ -76,16 +76,16 @@ class JogActions:
 
     Args:
         store: The state.
-        session: The robot.
+        connection: The robot.
         goal: Sets the goal.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
+    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
         self._store, self._goal = store, goal
-        self._robot = RobotJog(store, session, goal)
+        self._robot = RobotJog(store, connection, goal)
         self._press: _Press | None = None
         self._preview: Jog | None = None  # The moving goal, until it stops.
-        self._who: tuple[object, ...] = ()
+        self._context: tuple[object, ...] = ()
 
     @property
     def handlers(self) -> Handlers:
@@ -149,9 +149,9 @@ class JogActions:
         """Releases the button of a page that has fallen silent or has lost the controls."""
         state = self._store.state
         who = (state.target, state.model.name, state.plant, state.control_lock.holder)
-        if who != self._who:
-            self._who = who
-            self._begin_anew()
+        if who != self._context:
+            self._context = who
+            self._reset()
         press = self._press
         is_held = press is not None and press.is_robot and not press.is_spent
         # First: a jog that has ended stays ended, also after a long pause.
@@ -165,7 +165,7 @@ class JogActions:
     def _begin_preview(self, axis: Axis) -> bool:
         state = self._store.state
         change_jog(self._store, sentence=None)
-        self._store.remember()
+        self._store.push_undo()
         q = inside(state.model, state.goal.q)
         self._preview = Jog(state.model, q)
         kind, values = jog_velocity(state.model, q, state.jog, axis)
@@ -181,7 +181,7 @@ class JogActions:
             preview.step()
         state, press = self._store.state, self._press
         if float(np.abs(preview.q - state.goal.q).max()) > _SAME:
-            self._goal.pose(preview.q)
+            self._goal.set_joints(preview.q)
         if press is None:
             self._preview = None if preview.is_stationary else preview
         elif float(np.abs(preview.dq).max()) < STILL:
@@ -189,13 +189,13 @@ class JogActions:
 
     def _step_goal(self, axis: Axis) -> None:
         state = self._store.state
-        led = take_step(state.model, state.goal.q, state.jog, axis)
-        change_jog(self._store, sentence=led.sentence)
-        if led.q is not None:
-            self._store.remember()
-            self._goal.pose(led.q)
+        result = take_step(state.model, state.goal.q, state.jog, axis)
+        change_jog(self._store, sentence=result.sentence)
+        if result.q is not None:
+            self._store.push_undo()
+            self._goal.set_joints(result.q)
 
-    def _begin_anew(self) -> None:
+    def _reset(self) -> None:
         """Another arm, destination or operator: the buttons move the goal again until changed."""
         self.release()
         self._preview = None

@@ -18,12 +18,12 @@ from rcilab.motion.online import POSITION_MARGIN
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_NOWHERE = 1e-9  # [rad] A smaller step counts as none.
+_MIN_STEP = 1e-9  # [rad] A smaller step counts as none.
 _FARTHEST = math.radians(20.0)  # A joint that turns more for a step of the tool would take the arm far from here.
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class JogStepResult:
     """Where a step leads."""
 
     q: JointVector | None
@@ -32,7 +32,7 @@ class Step:
     """The limit that prevents it, or why there is no step."""
 
 
-def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> Step:
+def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> JogStepResult:
     """Returns where one press of a button leads from joint angles `q`.
 
     A joint moves as far as its range allows; a tool makes a whole step or none.
@@ -41,18 +41,18 @@ def take_step(model: RobotModel, q: JointVector, jog: JogState, axis: Axis) -> S
     if joint is None:
         reach = evaluate_pose(model, step_pose(model.forward(q), axis, jog.step, jog.frame), q)
         if reach.tone == "bad":
-            return Step(None, message("jog.no_way", reason=reach.reason))
+            return JogStepResult(None, message("jog.no_way", reason=reach.reason))
         turns = np.abs(reach.q - q)
         if turns.max() > _FARTHEST:
             farthest = int(turns.argmax())
             angle = float(turns[farthest])
-            return Step(None, message("jog.far", joint=farthest + 1, angle=angle))
-        return Step(reach.q)
+            return JogStepResult(None, message("jog.far", joint=farthest + 1, angle=angle))
+        return JogStepResult(reach.q)
     limits, moved = model.limits.joint, np.array(q)
     low, high = limits.lower[joint] + POSITION_MARGIN, limits.upper[joint] - POSITION_MARGIN
     moved[joint] = min(max(q[joint] + math.radians(axis.sign * jog.step), low), high)
-    is_further = axis.sign * (moved[joint] - q[joint]) > _NOWHERE
-    return Step(readonly_copy(moved) if is_further else None, at_limit(model, readonly_copy(moved), axis))
+    is_further = axis.sign * (moved[joint] - q[joint]) > _MIN_STEP
+    return JogStepResult(readonly_copy(moved) if is_further else None, at_limit(model, readonly_copy(moved), axis))
 
 
 def step_pose(T_base_tool: Pose, axis: Axis, step: float, frame: Frame) -> Pose:

@@ -46,25 +46,25 @@ class RobotJog:
 
     Args:
         store: The state.
-        session: The robot.
+        connection: The robot.
         goal: Sets the goal.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
-        self._store, self._session, self._goal = store, session, goal
+    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
+        self._store, self._connection, self._goal = store, connection, goal
         self._request: PendingRequest | None = None  # In progress, until the arm stands still.
         self._followed: Goal | None = None  # The goal that was set to the jogged position.
 
     def begin(self) -> bool:
         """Returns whether a button may move the robot now; shows why not."""
         state = self._store.state
-        reason = no_jog(state, self._session.status())
+        reason = no_jog(state, self._connection.status())
         change_jog(self._store, sentence=reason)
         if reason is not None:
             return False
         if self._request is None or self._request.done:
             self._request = None
-            self._store.remember()
+            self._store.push_undo()
         return True
 
     def renew(self, axis: Axis, stops: int | None) -> bool:
@@ -74,7 +74,7 @@ class RobotJog:
             axis: Direction.
             stops: Number of stops when the message of the button was sent.
         """
-        state, status, request = self._store.state, self._session.status(), self._request
+        state, status, request = self._store.state, self._connection.status(), self._request
         if (request is not None and request.error is not None) or status.q_c is None or status.phase == "stopping":
             return False
         if request is not None and request.done and is_moving(status):
@@ -93,7 +93,7 @@ class RobotJog:
             return False
         try:
             continues = None if request is None or request.done else request
-            self._request = self._session.supervisor().jog(
+            self._request = self._connection.robot().jog(
                 kind, min(share, room) * values, continues=continues, stops=stops
             )
         except RcilabError as error:
@@ -104,7 +104,7 @@ class RobotJog:
     def let_go(self) -> None:
         """Stops the jog of a held button."""
         with suppress(RcilabError):  # There is no supervisor, or no longer: nothing of ours moves.
-            self._session.supervisor().release_jog()
+            self._connection.robot().release_jog()
 
     def step(self, axis: Axis, stops: int | None) -> None:
         """Makes one step: a planned motion, checked like any other, collisions too.
@@ -113,20 +113,20 @@ class RobotJog:
             axis: Direction.
             stops: Number of stops when the button was pressed.
         """
-        state, status = self._store.state, self._session.status()
+        state, status = self._store.state, self._connection.status()
         reason = no_jog(state, status) or (message("ready.moving") if is_moving(status) else None)
         if reason is not None or status.q_c is None:
             change_jog(self._store, sentence=reason)
             return
-        led = take_step(state.model, status.q_c, state.jog, axis)
-        change_jog(self._store, sentence=led.sentence)
-        if led.q is None:
+        result = take_step(state.model, status.q_c, state.jog, axis)
+        change_jog(self._store, sentence=result.sentence)
+        if result.q is None:
             return
         share = state.jog.speed * FASTEST_JOINT / float(state.model.limits.joint.velocity.max())
         box = state.setup.wanted.box
-        made = make_plan(state.model, status.q_c, led.q, share, "jerk_limited", box)
+        made = make_plan(state.model, status.q_c, result.q, share, "jerk_limited", box)
         if isinstance(made, Plan) and (fast := fastest_tool(made) / FASTEST_TOOL) > 1.0:
-            made = make_plan(state.model, status.q_c, led.q, share / fast, "jerk_limited", box)
+            made = make_plan(state.model, status.q_c, result.q, share / fast, "jerk_limited", box)
         if not isinstance(made, Plan):
             change_jog(self._store, sentence=made)
             return
@@ -136,11 +136,11 @@ class RobotJog:
             change_jog(self._store, sentence=message("jog.unsafe", condition=broken))
             return
         try:
-            request = self._session.supervisor().execute(made.motion, report.certificate, stops=stops)
+            request = self._connection.robot().execute(made.motion, report.certificate, stops=stops)
         except RcilabError as error:
             change_jog(self._store, sentence=explain_error(error, status))
             return
-        self._store.remember()
+        self._store.push_undo()
         self._followed, self._request = None, request
 
     def watch(self, axis: Axis | None) -> bool:
@@ -152,7 +152,7 @@ class RobotJog:
         request = self._request
         if request is None:
             return True
-        status = self._session.status()
+        status = self._connection.status()
         if status.q_c is not None and status.dq is not None:
             speed = float(np.abs(status.dq).max())
             if axis is not None or speed > STILL:
@@ -174,7 +174,7 @@ class RobotJog:
 
     def _end(self, request: PendingRequest, status: SupervisorStatus) -> None:
         if status.q_c is not None and self._followed in (None, self._store.state.goal):
-            self._goal.pose(status.q_c)
+            self._goal.set_joints(status.q_c)
         self._request = self._followed = None
         if request.error is not None:
             is_stopped = status.phase == "idle"

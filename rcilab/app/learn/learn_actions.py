@@ -39,8 +39,8 @@ class PressLearn(Request):
 class LearnActions:
     """The fault lab never touches the robot of the page; lessons only watch."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
+    def __init__(self, store: Store, connection: RobotConnection) -> None:
+        self._store, self._connection = store, connection
         self._arm = PrivateArm()
         self._work: BackgroundJob[FaultCode, FaultDemo] = BackgroundJob("fault lab")
         self._watcher = Watcher()
@@ -70,7 +70,7 @@ class LearnActions:
                 self._watcher = Watcher()
                 self._set(lesson=LessonState(name=request.name))
                 first = LESSONS[request.name][0].name
-                self._store.say("good", message(f"lesson.{request.name}.{first}"))
+                self._store.notify("good", message(f"lesson.{request.name}.{first}"))
             case "skip":
                 self._step(skipped=True)
             case "leave":
@@ -135,14 +135,14 @@ class LearnActions:
             return
         beside = None if state.plan is None else state.plan.motion
         other = beside is not show.beside or state.model.name != show.demo.model.name
-        if other or is_moving(self._session.status()):
+        if other or is_moving(self._connection.status()):
             self._set(show=None)
 
     def _watch(self) -> None:
         lesson = self._learn.lesson
         if lesson is not None and lesson.step < len(LESSONS[lesson.name]):
             step = LESSONS[lesson.name][lesson.step]
-            if self._watcher.is_done(step, self._store.state, self._session.status()):
+            if self._watcher.is_done(step, self._store.state, self._connection.status()):
                 self._step()
 
     def _step(self, *, skipped: bool = False) -> None:
@@ -155,7 +155,7 @@ class LearnActions:
         if not skipped:  # Shown on every tab: the learner is on the tab of the step.
             steps = LESSONS[lesson.name][lesson.step + 1 :]
             last = message("lesson.over") if not steps else message(f"lesson.{lesson.name}.{steps[0].name}")
-            self._store.say("good", message("lesson.ticked", next=last))
+            self._store.notify("good", message("lesson.ticked", next=last))
 
 
 def make_show(demo: FaultDemo, beside: object) -> Show:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.model.robot_model import RobotModel
 
-Look: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
+StepCheck: TypeAlias = "Callable[[UiState, UiState, SupervisorStatus], bool]"
 """Whether the step is done, from the state at its beginning, the current state, and the robot's status."""
 
 _POSED = 0.15  # [rad] At a larger distance from the arm, the learner has moved the goal on purpose.
@@ -27,12 +27,12 @@ _FELT = 3.0  # [N] More than the external force of an arm at standstill.
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class LessonStep:
     """One step."""
 
     name: str
     """Its texts are lesson.LESSON.NAME in the catalogues."""
-    is_done: Look
+    is_done: StepCheck
 
 
 def _distance(state: UiState, status: SupervisorStatus) -> float:
@@ -69,7 +69,7 @@ def _refused(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 
 def _sought(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
-    return now.check.sought != then.check.sought
+    return now.check.seek_count != then.check.seek_count
 
 
 def _slowed(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
@@ -128,36 +128,36 @@ def lessons_of(model: RobotModel) -> tuple[str, ...]:
     return tuple(name for name in LESSONS if possible.get(name, True))
 
 
-LESSONS: Mapping[str, tuple[Step, ...]] = MappingProxyType(
+LESSONS: Mapping[str, tuple[LessonStep, ...]] = MappingProxyType(
     {
         "first": (
-            Step("pose", _posed),
-            Step("look", _looked),
-            Step("check", _checked),
-            Step("execute", _moving),
-            Step("arrive", _arrived),
+            LessonStep("pose", _posed),
+            LessonStep("look", _looked),
+            LessonStep("check", _checked),
+            LessonStep("execute", _moving),
+            LessonStep("arrive", _arrived),
         ),
         "limits": (
-            Step("fast", _fast),
-            Step("far", _refused),
-            Step("row", _sought),
-            Step("slow", _slowed),
+            LessonStep("fast", _fast),
+            LessonStep("far", _refused),
+            LessonStep("row", _sought),
+            LessonStep("slow", _slowed),
         ),
         "elbow": (
-            Step("pose", _posed),
-            Step("turn", _turned),
-            Step("branch", _other_branch),
+            LessonStep("pose", _posed),
+            LessonStep("turn", _turned),
+            LessonStep("branch", _other_branch),
         ),
         "push": (
-            Step("mujoco", _physics),
-            Step("guide", _guided),
-            Step("push", _pushed),
-            Step("stop", _let_go),
+            LessonStep("mujoco", _physics),
+            LessonStep("guide", _guided),
+            LessonStep("push", _pushed),
+            LessonStep("stop", _let_go),
         ),
         "network": (
-            Step("cut", _provoked),
-            Step("script", _script),
-            Step("close", _closed),
+            LessonStep("cut", _provoked),
+            LessonStep("script", _script),
+            LessonStep("close", _closed),
         ),
     }
 )
@@ -170,7 +170,7 @@ class Watcher:
     def __init__(self) -> None:
         self._then: UiState | None = None
 
-    def is_done(self, step: Step, state: UiState, status: SupervisorStatus) -> bool:
+    def is_done(self, step: LessonStep, state: UiState, status: SupervisorStatus) -> bool:
         """Returns whether the learner has done it; never at the first call."""
         if self._then is None:
             self._then = state

@@ -43,13 +43,13 @@ class EditActions:
 
     Args:
         store: The state.
-        session: The robot; it reports the arm's position.
+        connection: The robot; it reports the arm's position.
         goal: Set to a step's target, or the source of a step.
         history: The programs.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions, history: ProgramHistory) -> None:
-        self._store, self._session, self._goal, self._history = store, session, goal, history
+    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions, history: ProgramHistory) -> None:
+        self._store, self._connection, self._goal, self._history = store, connection, goal, history
         self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,
             "delete": self._delete, "duplicate": self._duplicate, "aim": self._aim,
@@ -79,7 +79,7 @@ class EditActions:
             return
         key = self._history.state.selected if request.key is None else request.key
         if key is None or self._draft.place(key) is None:
-            self._store.say("warn", message("program.select"))
+            self._store.notify("warn", message("program.select"))
             return
         self._edits[request.what](request, key)
 
@@ -115,13 +115,13 @@ class EditActions:
 
     def _configuration(self, source: str) -> JointVector | None:
         """Returns the joint angles of the arm or of the goal; reports why they are unknown."""
-        state, here = self._store.state, self._session.status().q_c
+        state, here = self._store.state, self._connection.status().q_c
         if source == "target":
             if state.goal.reach.short is not None:
-                self._store.say("warn", message("program.short", short=state.goal.reach.short))
+                self._store.notify("warn", message("program.short", short=state.goal.reach.short))
             return state.goal.q
         if here is None:
-            self._store.say("warn", message("plan.no_arm"))
+            self._store.notify("warn", message("plan.no_arm"))
         return here
 
     def _add(self, request: EditProgram) -> None:
@@ -130,7 +130,7 @@ class EditActions:
             return
         draft, chosen = self._draft, self._draft.waypoint(self._history.state.selected)
         if draft.start is None:
-            here = self._session.status().q_c
+            here = self._connection.status().q_c
             draft = replace(draft, start=tuple((q if here is None else here).tolist()))
         waypoint = Waypoint(type="joint", q=tuple(q.tolist()))
         if chosen is not None:
@@ -160,7 +160,7 @@ class EditActions:
         if q is None or waypoint is None:
             return
         if waypoint.type not in TYPES:
-            self._store.say("warn", message("program.no_target"))
+            self._store.notify("warn", message("program.no_target"))
             return
         taught = replace(waypoint, q=tuple(q.tolist()), position=None, wxyz=None, psi=None)
         self._history.change(self._draft.changed(key, taught), key)
@@ -178,15 +178,15 @@ class EditActions:
         if waypoint is None or request.type == waypoint.type or request.type not in TYPES:
             return
         if waypoint.type not in TYPES:
-            self._store.say("warn", message("program.no_target"))
+            self._store.notify("warn", message("program.no_target"))
             return
         via = None
         if request.type == "arc":
             via = default_via(self._draft, key, self._draft.arm(self._store.state.model))
             if via is None:
-                self._store.say("warn", message("program.no_way"))
+                self._store.notify("warn", message("program.no_way"))
                 return
-            self._store.say("good", message("program.via_made"))
+            self._store.notify("good", message("program.via_made"))
         self._history.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
 
     def _delete(self, request: EditProgram, key: int) -> None:
@@ -216,8 +216,8 @@ class EditActions:
         arm = self._draft.arm(model)
         target = target_of(waypoint, arm)
         if target is None:
-            self._store.say("warn", message("program.no_target"))
+            self._store.notify("warn", message("program.no_target"))
             return
         if arm is not model:
             target = target @ arm.T_flange_tool.inverse() @ model.T_flange_tool
-        self._goal.lead_to(target, waypoint.psi, None if waypoint.q is None else readonly_copy(waypoint.q))
+        self._goal.set_waypoint_target(target, waypoint.psi, None if waypoint.q is None else readonly_copy(waypoint.q))

@@ -56,12 +56,12 @@ class ProgramActions:
         editing: The edits of the program.
     """
 
-    def __init__(self, store: Store, session: RobotConnection, goal: GoalActions) -> None:
-        self._store, self._session = store, session
+    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
+        self._store, self._connection = store, connection
         self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
         self._basis: tuple[RobotModel, SafetyBox | None] | None = None  # What the failure that is shown is about.
         self._history = ProgramHistory(store, self._drop_planning)
-        self.editing = EditActions(store, session, goal, self._history)
+        self.editing = EditActions(store, connection, goal, self._history)
 
     @property
     def handlers(self) -> Handlers:
@@ -75,7 +75,7 @@ class ProgramActions:
     def plan(self, request: PlanProgram) -> None:
         """Plans the program, or its part up to the selected step, from the arm's position."""
         self._history.open()
-        state, status = self._store.state, self._session.status()
+        state, status = self._store.state, self._connection.status()
         start = start_of_plans(state.model, status)
         upto = self._history.state.selected if request.upto else None
         program = self._history.draft.program(state.model, upto)
@@ -84,7 +84,7 @@ class ProgramActions:
             else "program.empty" if program is None else "program.select" if request.upto and upto is None else None
         )  # fmt: skip
         if reason is not None:
-            self._store.say("warn", message(reason))
+            self._store.notify("warn", message(reason))
             return
         assert program is not None
         assert start is not None
@@ -124,7 +124,7 @@ class ProgramActions:
         self._store.clear_problems(FILE_FIELD)
         draft = draft_of(program, self._store.state.model)
         self._history.change(draft, draft.steps[0].key)
-        self._store.say("good", message("program.loaded", count=len(draft.steps), name=request.name[:LONGEST_NAME]))
+        self._store.notify("good", message("program.loaded", count=len(draft.steps), name=request.name[:LONGEST_NAME]))
 
     def restore(self, program: Program) -> None:
         """Restores a program of the previous workbench."""
@@ -161,7 +161,7 @@ class ProgramActions:
         elif (
             self._history.state.answer is not None
             and self._history.state.tone != "bad"
-            and is_moving(self._session.status())
+            and is_moving(self._connection.status())
         ):
             self._history.set(tone="good", answer=None)  # It describes the arm's position before the motion.
 
@@ -171,8 +171,8 @@ class ProgramActions:
 
     def _refuse_file(self, why: Message) -> None:
         """Shows on every tab why a file was not loaded; on this one until the next file, edit or plan."""
-        self._store.complain(FILE_FIELD, why)
-        self._store.say("bad", message("program.not_loaded", why=why))
+        self._store.set_problem(FILE_FIELD, why)
+        self._store.notify("bad", message("program.not_loaded", why=why))
 
     def _drop_planning(self) -> bool:
         if self._planner.progress is None:

@@ -59,9 +59,9 @@ class ProgramHistory:
         found = self._histories.setdefault(model, _ArmHistory(ProgramState(draft=Draft(model=model))))
         self._store.update(program=found.state)
         if left.steps:
-            self._store.say("good", message("program.kept", count=len(left.steps), model=left.model))
+            self._store.notify("good", message("program.kept", count=len(left.steps), model=left.model))
         elif found.state.draft.steps:
-            self._store.say("good", message("program.back", count=len(found.state.draft.steps), model=model))
+            self._store.notify("good", message("program.back", count=len(found.state.draft.steps), model=model))
 
     def lay_aside(self, draft: Draft) -> None:
         """Keeps the program of an arm that is not chosen."""
@@ -107,7 +107,7 @@ class ProgramHistory:
         if problem is None:
             self._store.clear_problems(name)
             return True
-        self._store.complain(name, problem)
+        self._store.set_problem(name, problem)
         return False
 
     @property

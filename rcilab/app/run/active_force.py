@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 STRONGEST = 60.0  # [N] About what one hand exerts without effort.
 SPRING = 200.0  # [N/m] between the grabbed point and the mouse: a pull of 0.3 m gives the largest force.
 TOOL = 0  # The tool, in the place of a link's number.
-WAYS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
+GUIDING_KINDS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
 DIRECTIONS = MappingProxyType(
     {
         "+x": (1.0, 0.0, 0.0),
@@ -54,7 +54,7 @@ class PushState:
     newtons: float = 20.0
     grab: bool = True
     """Whether the mouse can grab the arm in the scene."""
-    way: str = WAYS[0]
+    guiding_kind: str = GUIDING_KINDS[0]
     """Space and kind of hand guiding, as "space.kind"."""
     acting: ActiveForce | None = None
 

@@ -44,7 +44,7 @@ class CancelExport(Request):
     """Cancel the export in progress."""
 
 
-class _UnwantedError(Exception):
+class _CancelledError(Exception):
     """The export was cancelled."""
 
 
@@ -68,7 +68,7 @@ class ExportActions:
     def __init__(self, store: Store, deliver: Deliver) -> None:
         self._store, self._deliver = store, deliver
         self._worker: threading.Thread | None = None
-        self._unwanted = threading.Event()
+        self._cancelled = threading.Event()
 
     @property
     def handlers(self) -> Handlers:
@@ -85,11 +85,11 @@ class ExportActions:
         if request.ending not in ENDINGS:
             return
         if run is None:
-            self._store.say("warn", message("export.nothing"))
+            self._store.notify("warn", message("export.nothing"))
         elif self._worker is not None and self._worker.is_alive():
-            self._store.say("warn", message("export.busy"))
+            self._store.notify("warn", message("export.busy"))
         else:
-            self._unwanted.clear()
+            self._cancelled.clear()
             self._store.update(export=Export(request.ending, 0.0))
             self._worker = threading.Thread(
                 target=self._write, args=(run, request.ending, request.page), name="export", daemon=True
@@ -98,11 +98,11 @@ class ExportActions:
 
     def cancel(self, request: CancelExport) -> None:
         """Cancels the export in progress, at its next progress report."""
-        self._unwanted.set()
+        self._cancelled.set()
 
     def close(self) -> None:
         """Cancels the export in progress."""
-        self._unwanted.set()
+        self._cancelled.set()
         if self._worker is not None:
             self._worker.join(10.0)
 
@@ -114,23 +114,23 @@ class ExportActions:
                     run, ending, stream, progress=self._follow(ending), language=state.language, units=state.units
                 )
                 size = f"{max(stream.tell() / 1e6, 0.01):.2f}"
-                is_sent = self._deliver(page, file_name(run, ending), stream, self._unwanted.is_set)
-            if self._unwanted.is_set():
-                raise _UnwantedError
-        except _UnwantedError:
-            self._store.say("warn", message("export.cancelled"))
+                is_sent = self._deliver(page, file_name(run, ending), stream, self._cancelled.is_set)
+            if self._cancelled.is_set():
+                raise _CancelledError
+        except _CancelledError:
+            self._store.notify("warn", message("export.cancelled"))
         except MissingExtraError as error:
-            self._store.say("bad", message("export.missing", library=error.library))
+            self._store.notify("bad", message("export.missing", library=error.library))
         except MemoryError:
-            self._store.say("bad", message("export.memory"))
+            self._store.notify("bad", message("export.memory"))
         except RcilabError as error:
-            self._store.say("bad", explain_error(error))
+            self._store.notify("bad", explain_error(error))
         except Exception as error:  # After a bug of ours, no incomplete file must be sent.
             traceback.print_exc(file=sys.stderr)
-            self._store.say("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
+            self._store.notify("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
             sentence = message("export.done" if is_sent else "export.unsent", file=file_name(run, ending), size=size)
-            self._store.say("good" if is_sent else "warn", sentence)
+            self._store.notify("good" if is_sent else "warn", sentence)
         finally:
             self._store.update(export=None)
 
@@ -139,8 +139,8 @@ class ExportActions:
 
         def follow(share: float) -> None:
             nonlocal shown
-            if self._unwanted.is_set():
-                raise _UnwantedError
+            if self._cancelled.is_set():
+                raise _CancelledError
             if share - shown >= _STEP:
                 shown = share
                 self._store.update(export=Export(ending, share))

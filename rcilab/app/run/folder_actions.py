@@ -60,7 +60,7 @@ class FolderActions:
             gone = keep_newest(state.runs, request.keep + is_recording)
             self._show(asked=False)
             self._next = float("-inf")
-            self._store.say("good", message("runs.cleared", count=gone.count, size=megabytes(gone.size)))
+            self._store.notify("good", message("runs.cleared", count=gone.count, size=megabytes(gone.size)))
 
     def tick(self) -> None:
         """Reads the folder from time to time."""

@@ -66,15 +66,15 @@ class ModeActions:
 
     Args:
         store: The state.
-        session: The robot.
+        connection: The robot.
         keeps_rest: Whether the controller keeps its other parameters; otherwise it gets the standard values of these
             with the first change.
     """
 
-    def __init__(self, store: StateStore[AppState], session: Connection, *, keeps_rest: bool = False) -> None:
-        self._store, self._session, self._keeps_rest = store, session, keeps_rest
+    def __init__(self, store: StateStore[AppState], connection: Connection, *, keeps_rest: bool = False) -> None:
+        self._store, self._connection, self._keeps_rest = store, connection, keeps_rest
         self._was_running = False
-        self._sender = ConfigurationSender(session, self._refuse)
+        self._sender = ConfigurationSender(connection, self._refuse)
         self._wish = RequestedSpeed()
         self._changing: tuple[float, PendingRequest] | None = None  # A speed override that awaits its answer.
         self._asked_to_send = -math.inf
@@ -91,10 +91,10 @@ class ModeActions:
 
     def set_drive(self, request: SetDrive) -> None:
         """Chooses a mode, by whose conditions the plan is then checked, or a speed override; ignores invalid ones."""
-        state, status = self._store.state, self._session.status()
+        state, status = self._store.state, self._connection.status()
         if request.mode in MODES and request.mode != state.drive.mode:
             if is_moving(status):
-                self._store.say("warn", message("notice.moving"))
+                self._store.notify("warn", message("notice.moving"))
                 return
             choose_mode(self._store, cast("Mode", request.mode))
             self._store.update(asked=None)
@@ -124,7 +124,7 @@ class ModeActions:
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            self._store.complain(request.field, parsed.problem)
+            self._store.set_problem(request.field, parsed.problem)
             return
         self._store.clear_problems(request.field)
         self.set_control(SetControl(group=group.name, index=index, value=parsed.value))
@@ -152,11 +152,11 @@ class ModeActions:
             return
         if state.target != "virtual" and now - self._asked_to_send > CONFIRM_TIMEOUT:
             self._asked_to_send = now
-            self._store.say("warn", ask_to_send(state.target))
+            self._store.notify("warn", ask_to_send(state.target))
             return
         self._asked_to_send = -math.inf
         self._store.update(drive=replace(state.drive, refusal=None))
-        self._send(self._session.status())
+        self._send(self._connection.status())
 
     def tick(self, status: SupervisorStatus) -> None:
         """Collects answers, sends changes to a virtual controller, changes the speed override."""
@@ -166,7 +166,7 @@ class ModeActions:
             self.forget()
         if self._sender.is_underway:
             self._sender.collect()
-            status = self._session.status()  # Values that were acknowledged meanwhile are not sent again.
+            status = self._connection.status()  # Values that were acknowledged meanwhile are not sent again.
         state = self._store.state
         if state.target == "virtual" and state.drive.refusal is None and status.phase == "idle":
             self._send(status)
@@ -188,9 +188,9 @@ class ModeActions:
         self._store.update(drive=replace(self._store.state.drive, refusal=why))
 
     def _require_motion(self) -> bool:
-        if is_running(self._session.status()):
+        if is_running(self._connection.status()):
             return True
-        self._store.say("warn", message("pace.nothing"))
+        self._store.notify("warn", message("pace.nothing"))
         return False
 
     def _change_speed_override(self, status: SupervisorStatus) -> None:
@@ -205,17 +205,17 @@ class ModeActions:
         if wish is None:
             return
         self._set_override_refusal(None)
-        supervisor = self._session.supervisor()
+        supervisor = self._connection.robot()
         try:
             self._changing = wish, supervisor.set_speed_override(wish) if wish else supervisor.pause()
         except RcilabError as error:
             self._report_override_refusal(error, wish)
 
     def _report_override_refusal(self, error: RcilabError | None, speed_override: float) -> None:
-        refusal = None if error is None else describe_override_refusal(error, speed_override, self._session.status())
+        refusal = None if error is None else describe_override_refusal(error, speed_override, self._connection.status())
         if refusal is not None:
             self._set_override_refusal(refusal)
-            self._store.say("warn", refusal)
+            self._store.notify("warn", refusal)
 
     def _set_override_refusal(self, refusal: Message | None) -> None:
         drive = self._store.state.drive

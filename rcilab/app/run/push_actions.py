@@ -13,9 +13,9 @@ from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import (
     DIRECTIONS,
+    GUIDING_KINDS,
     STRONGEST,
     TOOL,
-    WAYS,
     ActiveForce,
     can_grab,
     no_push,
@@ -43,7 +43,7 @@ class SetPush(Request):
     direction: str | None = None
     newtons: float | None = None
     grab: bool | None = None
-    way: str | None = None
+    guiding_kind: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +87,8 @@ class _Grip:
 class PushActions:
     """The push button and the mouse in the scene; both press on the arm only while they are held."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
+    def __init__(self, store: Store, connection: RobotConnection) -> None:
+        self._store, self._connection = store, connection
         self._grip: _Grip | None = None
         self._button: tuple[int | None, float] | None = None  # Page that holds it, and time of its last message, [s].
         self._push: ExternalForceHold | None = None
@@ -115,21 +115,21 @@ class PushActions:
             changes["newtons"] = min(max(request.newtons, 0.0), STRONGEST)
         if request.grab is not None:
             changes["grab"] = request.grab
-        if request.way in WAYS:
-            changes["way"] = request.way
+        if request.guiding_kind in GUIDING_KINDS:
+            changes["guiding_kind"] = request.guiding_kind
         self._store.update(push=replace(state.push, **changes))
 
     def hold(self, request: HoldPush) -> None:
         """Continues the push of the button as long as messages that it is held arrive."""
-        reason = no_push(self._session.status())
+        reason = no_push(self._connection.status())
         if reason is not None:
-            self._store.say("warn", reason)
+            self._store.notify("warn", reason)
             return
         self._button = request.page, time.monotonic()
 
     def pull(self, request: DragLink) -> None:
         """Grabs a link at the mouse, follows the mouse, releases the link."""
-        state, status = self._store.state, self._session.status()
+        state, status = self._store.state, self._connection.status()
         numbers = np.array((request.grabbed, request.hand), dtype=float)
         if request.phase == "end" or not can_grab(state, status) or status.q is None:
             self._grip = None
@@ -160,7 +160,7 @@ class PushActions:
         error = None if self._push is None else self._push.pop_error()
         if error is not None:
             self._grip = self._button = None
-            self._store.say("bad", explain_error(error))
+            self._store.notify("bad", explain_error(error))
 
     def close(self) -> None:
         """Removes the force."""

@@ -37,7 +37,7 @@ class Recording:
     """The tracking error, once the arm stands still."""
     file: str = ""
     """Its file; "" without one."""
-    is_left_alone: bool = False
+    is_operator_absent: bool = False
     """Whether it was stopped because no page answered."""
     finding: str = ""
     """Joint, value and bound of the fault, from the last cycles; "" if they are unknown."""

@@ -32,7 +32,7 @@ class Outcome:
     error: RcilabError | None = None
     run: Run | None = None
     """The run of "execute", if the arm moved."""
-    is_left_alone: bool = False
+    is_operator_absent: bool = False
     """Whether the motion was stopped because no page answered."""
 
     @property
@@ -78,7 +78,7 @@ class RobotRequests:
         """
         certificate = plan.report.require().certificate
         assert certificate is not None  # A report that is ok has one.
-        robot, speed_override = self._connection.supervisor(), self._store.state.drive.speed_override
+        robot, speed_override = self._connection.robot(), self._store.state.drive.speed_override
         robot.drain()
         self.add(
             "execute", robot.execute(plan.motion, certificate, plan.mode, speed_override=speed_override, stops=stops)
@@ -114,21 +114,23 @@ class RobotRequests:
         if what != "execute":
             return Outcome(what=what, error=error)
         is_stopped = isinstance(error, ControlError) and not error.faults
-        is_left_alone = is_stopped and self._connection.status().code == "idle.operator"
+        is_operator_absent = is_stopped and self._connection.status().code == "idle.operator"
         stopped = None if error is None else describe_end(error)
         finding = error.finding if isinstance(error, ControlError) else ""
         run = self._connection.take_run()
-        self._recorder.finish(stopped, self._paced(), is_left_alone=is_left_alone, finding=finding, run=run)
+        self._recorder.finish(stopped, self._paced(), is_operator_absent=is_operator_absent, finding=finding, run=run)
         last = self._store.state.last_run
-        return Outcome(what=what, error=error, run=None if last is None else last.run, is_left_alone=is_left_alone)
+        return Outcome(
+            what=what, error=error, run=None if last is None else last.run, is_operator_absent=is_operator_absent
+        )
 
     def _record(self) -> None:
         with suppress(RcilabError):  # The robot is disconnected.
-            self._recorder.add(self._connection.supervisor().drain(), self._paced())
+            self._recorder.add(self._connection.robot().drain(), self._paced())
 
     def _paced(self) -> SpeedScaledMotion | None:
         """Returns how the motion in progress, or the last one, runs; None: as planned."""
         with suppress(RcilabError):
-            paced = self._connection.supervisor().scaled_motion
+            paced = self._connection.robot().scaled_motion
             return paced if paced is not None and paced.changed else None
         return None

@@ -67,9 +67,9 @@ class ChooseRobot(Request):
 class RunActions:
     """Execute, stop, power, recover, connect; and the recording of the run."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
-        self.requests = RobotRequests(store, session)
+    def __init__(self, store: Store, connection: RobotConnection) -> None:
+        self._store, self._connection = store, connection
+        self.requests = RobotRequests(store, connection)
         self._is_stop_said = False  # The safety stop that ended the last motion was reported with its error.
         self._placed = False  # The goal was set to the arm's first position.
         self._powered = False  # The virtual arm's motors have been switched on once.
@@ -100,19 +100,19 @@ class RunActions:
             self._store.update(asked=None)
             return
         if request.what == "stop":
-            self._session.stop()
+            self._connection.stop()
             return
         if request.what == "disconnect":
-            if is_moving(self._session.status()):
-                self._store.say("warn", message("notice.moving"))
+            if is_moving(self._connection.status()):
+                self._store.notify("warn", message("notice.moving"))
             else:
                 self.disconnect()
             return
-        status = self._session.status()
+        status = self._connection.status()
         if request.what != "reconnect" and status.phase in ("starting", "connecting", "lost", "crashed"):
-            self._store.say("warn", obstacle(self._store.state, status) or message("ready.starting"))
+            self._store.notify("warn", obstacle(self._store.state, status) or message("ready.starting"))
             return
-        supervisor = self._session.supervisor()
+        supervisor = self._connection.robot()
         act = {
             "recover": supervisor.recover,
             "power_on": supervisor.power_on,
@@ -128,29 +128,29 @@ class RunActions:
     def _guide(self, stops: int | None) -> PendingRequest | None:
         """Starts hand guiding; for a real arm only after a confirmation."""
         state, now = self._store.state, time.monotonic()
-        unset = setup_obstacle(state, self._session.status())
+        unset = setup_obstacle(state, self._connection.status())
         if unset is not None:
-            self._store.say("warn", unset)
+            self._store.notify("warn", unset)
             return None
         if state.target != "virtual" and now - self._asked_to_guide > _CONFIRM_TIMEOUT:
             self._asked_to_guide = now
-            self._store.say("warn", message("guide.sure", address=state.target, seconds=f"{_CONFIRM_TIMEOUT:.0f}"))
+            self._store.notify("warn", message("guide.sure", address=state.target, seconds=f"{_CONFIRM_TIMEOUT:.0f}"))
             return None
         self._asked_to_guide = -math.inf
-        space, kind = state.push.way.split(".")
-        return self._session.supervisor().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of WAYS.
+        space, kind = state.push.guiding_kind.split(".")
+        return self._connection.robot().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of GUIDING_KINDS.
 
     def choose_robot(self, request: ChooseRobot) -> None:
         """Changes arm, destination or plant; refused while the arm moves."""
         state = self._store.state
-        if is_moving(self._session.status()):
-            self._store.say("warn", message("notice.moving"))
+        if is_moving(self._connection.status()):
+            self._store.notify("warn", message("notice.moving"))
             return
         if request.plant is not None and request.model is None and request.target is None:
             self._choose_plant(request.plant)
             return
         if request.target is not None and not request.target.strip():
-            self._store.say("warn", message("run.address_needed"))
+            self._store.notify("warn", message("run.address_needed"))
             return
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
@@ -166,17 +166,17 @@ class RunActions:
         if plant not in PLANT_KINDS or plant == state.plant:
             return
         if state.target != "virtual":
-            self._store.say("warn", message("plant.address", address=state.target))
+            self._store.notify("warn", message("plant.address", address=state.target))
             return
         self._store.update(plant=plant, playing=False, **_unasked(state))
         self._forget_robot()
-        self._session.open(state.model, state.target, plant, _own_setup(state, state.target))
+        self._connection.open(state.model, state.target, plant, _own_setup(state, state.target))
 
     def disconnect(self) -> None:
         """Disconnects, and ends our own controller; goal and plan are kept, for the preview."""
         state = self._store.state
         self._forget_robot()
-        self._session.disconnect()
+        self._connection.disconnect()
         self._store.update(asked=None, playing=False, **_unasked(state))
 
     def open(self, name: str, target: str) -> None:
@@ -186,7 +186,7 @@ class RunActions:
         self._forget_robot()
         changes: dict[str, object] = {"target": target, "recording": None, "asked": None, **_unasked(state)}
         if model is not state.model:
-            self._store.forget()
+            self._store.clear_undo()
             self._placed = False
             changes |= {"plan": None, "no_plan": None}
             changes |= {"plot_joint": 0, "problems": {}}
@@ -198,7 +198,7 @@ class RunActions:
             changes |= {"drive": replace(state.drive, control=None, refusal=None)}
             state = replace(state, model=model, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
-        self._session.open(model, target, state.plant, _own_setup(state, target))
+        self._connection.open(model, target, state.plant, _own_setup(state, target))
         self._store.update(place=0.0, playing=False, **changes)
 
     def _forget_robot(self) -> None:
@@ -218,18 +218,18 @@ class RunActions:
         self._setups[state.model.name] = replace(state.setup, edited="", asked=None, refusal=None, can_undo=False)
         setup = self._setups.get(name, SetupState())
         if setup.touched:
-            self._store.say("good", message("setup.back", what=name_parts(tuple(sorted(setup.touched))), model=name))
+            self._store.notify("good", message("setup.back", what=name_parts(tuple(sorted(setup.touched))), model=name))
         return setup
 
     def watch(self) -> str | None:
         """Reads the supervisor: finished requests, new incidents, recorded cycles, the arm's first position.
 
         Returns:
-            "rested" when the arm has just stopped, "placed" at its first position, else None.
+            "standstill" when the arm has just stopped, "arm_known" at its first position, else None.
         """
         for outcome in self.requests.collect():
             self._report(outcome)
-        status = self._session.status()  # After the requests: it contains the end of a motion, too.
+        status = self._connection.status()  # After the requests: it contains the end of a motion, too.
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
@@ -237,9 +237,9 @@ class RunActions:
             self._trouble = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
                 sentence = describe_incident(status.incident.code, status.incident.message, status)
-                self._store.say("bad", sentence, trouble=ROBOT_TROUBLE)
+                self._store.notify("bad", sentence, trouble=ROBOT_TROUBLE)
         if self._guided and status.code == "idle.operator":
-            self._store.say("warn", message("notice.operator"))
+            self._store.notify("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
         if status.phase == "idle":
             self._settle()
@@ -249,18 +249,18 @@ class RunActions:
             self._placed = True
             if self._store.state.goal is self._untouched:
                 self._store.update(goal=goal_at(self._store.state.model, status.q_c))
-            return "placed"
-        may_power = self._session.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
+            return "arm_known"
+        may_power = self._connection.is_ready and status.phase == "idle" and self._store.state.target == "virtual"
         if may_power and not self._powered:
             self._switch_on(status)
-        return "rested" if before in ("moving", "stopping") and not is_moving(status) else None
+        return "standstill" if before in ("moving", "stopping") and not is_moving(status) else None
 
     def _settle(self) -> None:
         """Withdraws the notices of a trouble that is over; the end of one that cut the connection is reported."""
-        self._store.settle(ROBOT_TROUBLE)
+        self._store.clear_notices(ROBOT_TROUBLE)
         if self._trouble.startswith(("crashed", "lost")):
             code = "lost" if self._trouble.startswith("lost") else self._trouble
-            self._store.say("good", message(f"incident.over.{code}"))
+            self._store.notify("good", message(f"incident.over.{code}"))
         self._trouble = ""
 
     def _follow(self, status: SupervisorStatus) -> None:
@@ -283,7 +283,7 @@ class RunActions:
         if time.monotonic() - self._power_asked < _POWER_PAUSE or self.requests.is_pending("power_on"):
             return
         with suppress(StartingError):  # The next tick finds it started.
-            self.requests.add("power_on", self._session.supervisor().power_on())
+            self.requests.add("power_on", self._connection.robot().power_on())
             self._power_asked = time.monotonic()
 
     def _execute(self, *, is_agreed: bool, stops: int | None) -> None:
@@ -291,9 +291,9 @@ class RunActions:
         mode = state.drive.mode
         if state.plan is not None and (not state.plan.complete or state.plan.mode != mode):
             state = self._store.update(plan=state.plan.completed(mode))
-        reason = obstacle(state, self._session.status())
+        reason = obstacle(state, self._connection.status())
         if reason is not None:
-            self._store.say("warn", reason)
+            self._store.notify("warn", reason)
             return
         if state.plan is None:
             return
@@ -303,7 +303,7 @@ class RunActions:
         try:
             self.requests.execute(state.plan, stops=stops)
         except (CertificateError, PlanningError, UsageError) as error:
-            self._store.say("warn", explain_error(error))
+            self._store.notify("warn", explain_error(error))
             return
         self._arrival = state.plan.short
         self._is_stop_said = False
@@ -314,26 +314,26 @@ class RunActions:
                 self._reached = 0.0  # It had begun, but no status showed it.
             self._is_stop_said = outcome.error.code == SAFETY_STOP
             trouble = ROBOT_TROUBLE if _is_trouble(outcome.error) else ""
-            self._store.say(*self._report_failure(outcome, outcome.error), trouble=trouble)
+            self._store.notify(*self._report_failure(outcome, outcome.error), trouble=trouble)
         elif outcome.what == "power_on":
             self._powered = True
         elif outcome.what == "reboot":
-            self._store.say("warn", message("signals.rebooted"))
+            self._store.notify("warn", message("signals.rebooted"))
         elif outcome.what == "execute":
             self._reached = math.inf  # Even if it was too short for a status.
             self._report_arrival()
 
     def _report_arrival(self) -> None:
         if self._arrival is not None:
-            self._store.say("warn", message("notice.arrived_short", short=self._arrival))
+            self._store.notify("warn", message("notice.arrived_short", short=self._arrival))
         else:
-            self._store.say("good", message("notice.arrived"))
+            self._store.notify("good", message("notice.arrived"))
 
     def _report_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
         if _is_trouble(error):
-            return "bad", explain_error(error, self._session.status())
+            return "bad", explain_error(error, self._connection.status())
         if isinstance(error, ControlError) and outcome.what == "execute":
-            return "warn", message("notice.operator" if outcome.is_left_alone else _stopped(self._store.state))
+            return "warn", message("notice.operator" if outcome.is_operator_absent else _stopped(self._store.state))
         return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=explain_error(error))
 
     def close(self) -> None:

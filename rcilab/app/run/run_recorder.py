@@ -64,7 +64,7 @@ class RunRecorder:
         stopped: str | None,
         paced: SpeedScaledMotion | None = None,
         *,
-        is_left_alone: bool = False,
+        is_operator_absent: bool = False,
         finding: str = "",
         run: Run | None = None,
     ) -> None:
@@ -73,7 +73,7 @@ class RunRecorder:
         Args:
             stopped: Why the motion did not reach its end; None: it did.
             paced: How the plan was run, if its speed override was changed.
-            is_left_alone: Whether the motion was stopped because no page answered.
+            is_operator_absent: Whether the motion was stopped because no page answered.
             finding: Joint, value and bound of the fault that ended it, from its last cycles.
             run: The run as recorded by the robot itself; None: it is built from the added cycles.
         """
@@ -88,7 +88,7 @@ class RunRecorder:
             run = live.finish(stopped, plan)  # If its file failed, the run in memory is complete.
         if run is not None:
             recording = whole_recording(run, self._file, paced, finding)
-            recording = replace(recording, is_left_alone=is_left_alone)
+            recording = replace(recording, is_operator_absent=is_operator_absent)
             self._store.update(recording=recording, last_run=recording)
 
     def _open(self, state: AppState, plan: Plan, setup: Setup) -> RunFile | None:
@@ -109,7 +109,7 @@ class RunRecorder:
 
     def _complain(self, error: InvalidValueError) -> None:
         self._file = ""
-        self._store.say(
+        self._store.notify(
             "warn",
             message(
                 "record.unwritable",

@@ -42,8 +42,8 @@ def signal_rows(model: RobotModel, status: SupervisorStatus) -> list[tuple[str, 
 class SignalActions:
     """Owned by the dispatcher's thread; it never waits for the controller."""
 
-    def __init__(self, store: Store, session: RobotConnection, requests: RobotRequests) -> None:
-        self._store, self._session, self._requests = store, session, requests
+    def __init__(self, store: Store, connection: RobotConnection, requests: RobotRequests) -> None:
+        self._store, self._connection, self._requests = store, connection, requests
 
     @property
     def handlers(self) -> Handlers:
@@ -55,17 +55,17 @@ class SignalActions:
 
     def set_output(self, request: SetOutput) -> None:
         """Sets a digital output."""
-        self._requests.add("output", self._session.supervisor().set_output(request.signal, request.level))
+        self._requests.add("output", self._connection.robot().set_output(request.signal, request.level))
 
     def press(self, request: PressSignals) -> None:
         """Reads the inputs; restarts the controller after a confirmation."""
         if request.what == "read":
-            self._requests.add("inputs", self._session.supervisor().read_inputs())
+            self._requests.add("inputs", self._connection.robot().read_inputs())
             return
         was_asked = self._store.state.reboot_asked
         self._store.update(reboot_asked=request.what == "reboot")
         if request.what == "confirm" and was_asked:
-            self._requests.add("reboot", self._session.supervisor().reboot())
+            self._requests.add("reboot", self._connection.robot().reboot())
 
     def tick(self, status: SupervisorStatus) -> None:
         """Withdraws the question about a restart when the connection ends."""

@@ -34,8 +34,8 @@ class ChooseDestination(Request):
 class TargetRobotActions:
     """Preview, the virtual controller with one of its arms, or a controller at an address."""
 
-    def __init__(self, store: Store, session: RobotConnection, robot: RunActions) -> None:
-        self._store, self._session, self._robot = store, session, robot
+    def __init__(self, store: Store, connection: RobotConnection, robot: RunActions) -> None:
+        self._store, self._connection, self._robot = store, connection, robot
 
     @property
     def handlers(self) -> Handlers:
@@ -49,9 +49,9 @@ class TargetRobotActions:
         state = self._store.state
         if request.where not in DESTINATIONS:
             return
-        self._store.settle(_ADDRESS)
-        if is_moving(self._session.status()):
-            self._store.say("warn", message("notice.moving"))
+        self._store.clear_notices(_ADDRESS)
+        if is_moving(self._connection.status()):
+            self._store.notify("warn", message("notice.moving"))
             return
         if request.answer == "no":
             self._ask("")
@@ -72,12 +72,12 @@ class TargetRobotActions:
             self._robot.open(self._store.state.model.name, asked)
             return
         if not address:
-            self._store.say("warn", message("run.address_needed"), trouble=_ADDRESS)
+            self._store.notify("warn", message("run.address_needed"), trouble=_ADDRESS)
             return
         try:
             parse_address(address, self._store.state.model)
         except RcilabError as error:
-            self._store.say("bad", explain_error(error), trouble=_ADDRESS)
+            self._store.notify("bad", explain_error(error), trouble=_ADDRESS)
             return
         self._ask(address)
 

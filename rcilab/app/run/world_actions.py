@@ -61,8 +61,8 @@ class SetWiring(Request):
 class WorldActions:
     """Owned by the thread that changes the state; it never waits for the controller."""
 
-    def __init__(self, store: StateStore[AppState], session: Connection) -> None:
-        self._store, self._session = store, session
+    def __init__(self, store: StateStore[AppState], connection: Connection) -> None:
+        self._store, self._connection = store, connection
         self._watch: SimulationStatusPoller | None = None
         self._address: str | None = None
 
@@ -101,9 +101,9 @@ class WorldActions:
             watch.ask(Press(request.button))
             status = self._store.state.world.status
             if request.button != "none":
-                self._store.say("warn", message(f"safety.{request.button}_done"), trouble=ROBOT_TROUBLE)
+                self._store.notify("warn", message(f"safety.{request.button}_done"), trouble=ROBOT_TROUBLE)
             elif status is not None and status.button != "none":
-                self._store.say("good", message(f"safety.{status.button}_over"), trouble=ROBOT_TROUBLE)
+                self._store.notify("good", message(f"safety.{status.button}_over"), trouble=ROBOT_TROUBLE)
 
     def set_wiring(self, request: SetWiring) -> None:
         """Wires outputs to inputs, or stops commands at the soft limits; or ends that."""
@@ -128,7 +128,7 @@ class WorldActions:
             return
         error = self._watch.pop_error()
         if error is not None:
-            self._store.say("bad", explain_error(error))
+            self._store.notify("bad", explain_error(error))
         is_settled, world, sentence = self._watch.is_settled, self._store.state.world, self._watch.status
         if sentence is not world.status:
             world = replace(world, status=sentence)
@@ -154,8 +154,8 @@ class WorldActions:
 
     def _require_watch(self) -> SimulationStatusPoller | None:
         if self._watch is None:
-            reason = no_push(self._session.status())
+            reason = no_push(self._connection.status())
             if reason is not None and reason.code == "push.no_world":
-                reason = message("world.not_ours", address=self._session.status().target)
-            self._store.say("warn", reason or message("ready.starting"))
+                reason = message("world.not_ours", address=self._connection.status().target)
+            self._store.notify("warn", reason or message("ready.starting"))
         return self._watch

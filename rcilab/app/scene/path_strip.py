@@ -13,7 +13,7 @@ from rcilab.core.arrays import Array
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report, Violation
 
-MOST_BEADS = 24
+MAX_MARKERS = 24
 """More hide the path; the worst are kept."""
 _TOGETHER = 0.02  # [s] Violations closer in time than this share a bead.
 
@@ -40,14 +40,14 @@ class PathStrip:
     """Positions of the tool, shape (N, 3), [m]."""
     usage: Array
     """The most that is used of a limit between each of these and the next, shape (N,); from 1 on it is broken."""
-    beads: tuple[ViolationMarker, ...]
+    markers: tuple[ViolationMarker, ...]
 
 
-def look_at_path(plan: Plan) -> PathStrip:
+def compute_path_strip(plan: Plan) -> PathStrip:
     """Returns what is to be drawn of a plan's path."""
     rows = sampled_rows(plan.motion)
     usage = plan.report.usage().at_most(rows)
-    return PathStrip(report=plan.report, path=plan.path, usage=usage, beads=_beads(plan))
+    return PathStrip(report=plan.report, path=plan.path, usage=usage, markers=_beads(plan))
 
 
 def _beads(plan: Plan) -> tuple[ViolationMarker, ...]:
@@ -56,7 +56,7 @@ def _beads(plan: Plan) -> tuple[ViolationMarker, ...]:
         near = next((g for g in groups if abs(g[0].worst_time - violation.worst_time) < _TOGETHER), None)
         if near is not None:
             near.append(violation)
-        elif len(groups) < MOST_BEADS:
+        elif len(groups) < MAX_MARKERS:
             groups.append([violation])
     if not groups:
         return ()

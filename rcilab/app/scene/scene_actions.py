@@ -11,11 +11,11 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
-from rcilab.app.goal.elbow import look_at_elbow
+from rcilab.app.goal.elbow import compute_elbow
 from rcilab.app.goal.goal_actions import GoalActions, SetArmAngle
 from rcilab.app.request import Handlers, Request
-from rcilab.app.scene.path_strip import look_at_path
-from rcilab.app.scene.scene_extras import EXTRAS, look_at_dexterity, look_at_reach, look_at_sweep
+from rcilab.app.scene.path_strip import compute_path_strip
+from rcilab.app.scene.scene_extras import EXTRAS, compute_ellipsoid, compute_swept_volume, compute_workspace
 from rcilab.app.store import Store
 from rcilab.i18n.translator import message
 from rcilab.views.elbow_view import OUTWARD
@@ -67,7 +67,7 @@ class ShowExtra(Request):
 
 
 class SceneActions:
-    """The elbow's circle, the path with its beads, the branch under the mouse, and what is behind switches.
+    """The elbow's circle, the path with its markers, the branch under the mouse, and what is behind switches.
 
     Args:
         store: The state.
@@ -77,22 +77,22 @@ class SceneActions:
     def __init__(self, store: Store, goal: GoalActions) -> None:
         self._store, self._goal = store, goal
         self._seen: dict[str, tuple[object, ...]] = {}
-        self._beside = ThreadPoolExecutor(1, thread_name_prefix="scene")
+        self._executor = ThreadPoolExecutor(1, thread_name_prefix="scene")
         self._made: dict[str, Future[Any]] = {}
 
     @property
     def handlers(self) -> Handlers:
-        """What it does for each of its requests."""
+        """The handlers of its requests."""
         return {
             DragElbow: self.drag_elbow,
             HighlightBranch: self.peek,
-            ShowViolation: self.show_bead,
+            ShowViolation: self.show_violation,
             ShowExtra: self.show_extra,
         }
 
     def close(self) -> None:
         """Drops what is being computed."""
-        self._beside.shutdown(wait=False, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def drag_elbow(self, request: DragElbow) -> None:
         """Turns the elbow to where the mouse sees its circle."""
@@ -101,7 +101,7 @@ class SceneActions:
         if elbow is None or len(numbers) != 6 or not all(math.isfinite(number) for number in numbers):
             return
         if request.phase == "start":
-            self._store.remember()
+            self._store.push_undo()
             return
         psi = elbow.circle.angle_along(request.eye, request.hand, elbow.psi, OUTWARD)
         self._goal.set_arm_angle(SetArmAngle(page=request.page, psi=psi), elbow.branch)
@@ -112,15 +112,15 @@ class SceneActions:
         known = solutions is not None and request.index is not None and 0 <= request.index < len(solutions)
         self._change(peek=request.index if known else None)
 
-    def show_bead(self, request: ShowViolation) -> None:
+    def show_violation(self, request: ShowViolation) -> None:
         """Takes the preview to a violation and says what it is."""
         state = self._store.state
         ribbon = state.scene.ribbon
-        if ribbon is None or not 0 <= request.number < len(ribbon.beads):
+        if ribbon is None or not 0 <= request.number < len(ribbon.markers):
             return
-        bead = ribbon.beads[request.number]
+        bead = ribbon.markers[request.number]
         self._store.update(place=bead.place, playing=False)
-        self._store.say("bad", message("notice.plain", text=bead.violations[0]))
+        self._store.notify("bad", message("notice.plain", text=bead.violations[0]))
 
     def show_extra(self, request: ShowExtra) -> None:
         """Turns a switch."""
@@ -135,14 +135,14 @@ class SceneActions:
         model, goal, plan, box = state.model, state.goal, state.plan, state.setup.wanted.box
         extras = state.scene.extras
         if self._is_new("elbow", model, goal, box):
-            self._change(elbow=look_at_elbow(model, goal.q, box), peek=None)
+            self._change(elbow=compute_elbow(model, goal.q, box), peek=None)
         if self._is_new("ribbon", None if plan is None else plan.report):
-            self._change(ribbon=None if plan is None else look_at_path(plan))
+            self._change(ribbon=None if plan is None else compute_path_strip(plan))
         if self._is_new("ellipsoid", *((model, goal.q) if "ellipsoid" in extras else ())):
-            self._change(ellipsoid=look_at_dexterity(model, goal.q) if "ellipsoid" in extras else None)
-        self._compute("cloud", (model,) if "cloud" in extras else (), lambda: look_at_reach(model))
+            self._change(ellipsoid=compute_ellipsoid(model, goal.q) if "ellipsoid" in extras else None)
+        self._compute("cloud", (model,) if "cloud" in extras else (), lambda: compute_workspace(model))
         moved = () if plan is None or "swept" not in extras else (model, plan.motion)
-        self._compute("swept", moved, lambda: look_at_sweep(model, plan.motion))  # type: ignore[union-attr]
+        self._compute("swept", moved, lambda: compute_swept_volume(model, plan.motion))  # type: ignore[union-attr]
 
     def _compute(self, name: str, wanted: tuple[object, ...], work: Callable[[], Any]) -> None:
         """Has something computed beside the page when it is wanted anew, and shows it once it is there."""
@@ -153,7 +153,7 @@ class SceneActions:
         elif running is None and self._is_new(name, *wanted):
             self._change(**{name: None})
             if wanted:
-                self._made[name] = self._beside.submit(work)
+                self._made[name] = self._executor.submit(work)
 
     def _is_new(self, name: str, *of: object) -> bool:
         """Returns whether something is to be looked at again: by identity, as all of it is frozen."""

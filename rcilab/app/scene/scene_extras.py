@@ -56,18 +56,18 @@ class SceneState:
     swept: Mesh | None = field(default=None, repr=False)
 
 
-def look_at_dexterity(model: RobotModel, q: Array) -> Ellipsoid:
+def compute_ellipsoid(model: RobotModel, q: Array) -> Ellipsoid:
     """Returns the ellipsoid of linear manipulability at the tool (Yoshikawa 1985)."""
     axes, radii, _ = np.linalg.svd(model.jacobian(q)[:3], full_matrices=False)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return Ellipsoid(position=model.forward(q).position, axes=axes, radii=radii)
 
 
-def look_at_reach(model: RobotModel) -> Workspace:
+def compute_workspace(model: RobotModel) -> Workspace:
     """Returns a cloud of places that the tool can be brought to."""
     return model.sample_workspace(_SAMPLES)
 
 
-def look_at_sweep(model: RobotModel, motion: Motion) -> Mesh:
+def compute_swept_volume(model: RobotModel, motion: Motion) -> Mesh:
     """Returns the arm at several moments of a motion, as one mesh in base."""
     return swept_mesh(model, np.stack([motion.at(t).q for t in np.linspace(0.0, motion.duration, _MOMENTS)]))

@@ -19,12 +19,12 @@ class ConfigurationSender:
     """Owned by the thread that changes the state.
 
     Args:
-        session: The robot.
+        connection: The robot.
         refuse: Called with the reason if the controller refuses a request.
     """
 
-    def __init__(self, session: Connection, refuse: Callable[[Message], None]) -> None:
-        self._session, self._refuse = session, refuse
+    def __init__(self, connection: Connection, refuse: Callable[[Message], None]) -> None:
+        self._connection, self._refuse = connection, refuse
         self._request: PendingRequest | None = None
 
     @property
@@ -36,7 +36,7 @@ class ConfigurationSender:
         """Sends a request; nothing while the control process is still starting."""
         assert self._request is None
         try:
-            self._request = self._session.supervisor().set_up(setup)
+            self._request = self._connection.robot().configure(setup)
         except StartingError:
             return
         except RcilabError as error:

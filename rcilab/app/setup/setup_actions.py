@@ -116,15 +116,15 @@ class PressSetup(Request):
 class SetupActions:
     """Handles in the scene, typed numbers, switches; each edit is sent to a virtual controller at once."""
 
-    def __init__(self, store: Store, session: RobotConnection) -> None:
-        self._store, self._session = store, session
+    def __init__(self, store: Store, connection: RobotConnection) -> None:
+        self._store, self._connection = store, connection
         self._past: list[
             tuple[RobotConfiguration, frozenset[SetupPart]]
         ] = []  # The configuration, and the edited parts.
         self._arm = store.state.model.name
         self._drag: tuple[int | None, str] | None = None  # The page that drags, and the part.
         self._dragged = -math.inf  # Time of the last drag event, [s].
-        self._sender = ConfigurationSender(session, self._refuse)
+        self._sender = ConfigurationSender(connection, self._refuse)
         self._reported_for: object = None  # The program of the last notice about another tool.
         self._is_back = False  # The configuration was restored and reported.
         self._announced = 0  # Number of connections at which an accepted configuration was reported.
@@ -147,7 +147,7 @@ class SetupActions:
         state = self._store.state
         missing = explain_missing_part(state.model, cast("SetupPart", part)) if part in LISTED else None
         if missing is not None:
-            self._store.complain(request.field, missing)
+            self._store.set_problem(request.field, missing)
             return
         if part == "joints":
             self._type_joint_limit(request, name)
@@ -159,7 +159,7 @@ class SetupActions:
         parsed = parse_number(request.text, bounds.low, bounds.high, bounds.unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            self._store.complain(request.field, parsed.problem)
+            self._store.set_problem(request.field, parsed.problem)
             return
         changed = with_field(state.setup, part, name, parsed.value, longest)
         if isinstance(changed, SetupState) and name in INERTIA_NAMES:
@@ -170,13 +170,13 @@ class SetupActions:
             made = with_inertia(changed)
             changed, untaken = (changed, made) if isinstance(made, Message) else (made, None)
         if isinstance(changed, Message):
-            self._store.complain(request.field, changed)
+            self._store.set_problem(request.field, changed)
             return
         related = {name, *INERTIA_NAMES} if name in (*INERTIA_NAMES, "mass") else {name}
         self._store.clear_problems(*(f"setup.{part}.{other}" for other in related))
         self._edit(changed, cast("SetupPart", part))
         if untaken is not None:
-            self._store.complain("setup.load.ixx", untaken)
+            self._store.set_problem("setup.load.ixx", untaken)
 
     def _type_joint_limit(self, request: TypeField, name: str) -> None:
         end, _, number = name.partition(".")
@@ -188,14 +188,14 @@ class SetupActions:
         parsed = parse_number(request.text, least, largest, "deg")
         if parsed.value is None:
             assert parsed.problem is not None
-            self._store.complain(request.field, parsed.problem)
+            self._store.set_problem(request.field, parsed.problem)
             return
         now = soft_limits(self._store.state)
         bounds = {"lower": list(now.lower), "upper": list(now.upper)}
         bounds[end][joint] = exact_end(own, end, joint, math.radians(parsed.value))
         joints = joint_limits_between(**bounds)
         if isinstance(joints, Message):
-            self._store.complain(request.field, joints)
+            self._store.set_problem(request.field, joints)
             return
         self._store.clear_problems(*(f"setup.joints.{name}.{joint}" for name in JOINT_ENDS))
         self._limit_joints(joints)
@@ -219,7 +219,7 @@ class SetupActions:
         state, pose = self._store.state, Pose(request.position, request.wxyz)
         changed = with_pose(state.setup, request.part, pose, capabilities_of(state.model).longest_tool)
         if isinstance(changed, Message):
-            self._store.say("warn", changed)
+            self._store.notify("warn", changed)
         else:
             self._edit(changed, request.part, drag=(request.page, request.part))
             self._store.clear_problems(f"setup.{request.part}.")
@@ -288,7 +288,7 @@ class SetupActions:
             self._store.update(setup=replace(setup, refusal=None))
         elif request.what == "confirm" and setup.asked is setup.wanted:
             self._store.update(setup=replace(setup, asked=None))
-            self._send(self._session.status())
+            self._send(self._connection.status())
 
     def restore(self, setup: RobotConfiguration) -> None:
         """Restores and draws an edited configuration; a real robot gets it only after a question."""
@@ -308,12 +308,12 @@ class SetupActions:
             self._sender.forget()
         if self._sender.is_underway:
             self._sender.collect()
-            status = self._session.status()  # Values that were acknowledged meanwhile are not sent again.
+            status = self._connection.status()  # Values that were acknowledged meanwhile are not sent again.
         state = self._store.state
         announced, self._announced = self._announced, status.setup_times  # Another supervisor counts from 0.
         if self._announced > announced:
             if not self._is_back:
-                self._store.say("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
+                self._store.notify("good", message("setup.sent_again", what=name_parts(status.setup.parts)))
             self._is_back = False
         is_held = time.monotonic() - self._dragged < _HAND_GONE
         if state.target == "virtual" and not is_held and state.setup.refusal is None and status.phase == "idle":
@@ -339,7 +339,7 @@ class SetupActions:
         """Applies an edit, unless the arm lacks the part; a drag is one step for undo."""
         missing = explain_missing_part(self._store.state.model, part)
         if missing is not None:
-            self._store.say("warn", missing)
+            self._store.notify("warn", missing)
             return
         if drag is None or drag != self._drag:
             now = self._store.state.setup
@@ -351,7 +351,7 @@ class SetupActions:
         if not self._past:
             return
         setup, (before, touched) = self._store.state.setup, self._past.pop()
-        touched |= frozenset(self._session.status().setup.parts)  # Parts that were sent have to be reset there.
+        touched |= frozenset(self._connection.status().setup.parts)  # Parts that were sent have to be reset there.
         if self._sender.is_underway:
             touched |= setup.touched
         parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
@@ -364,7 +364,7 @@ class SetupActions:
         is_here = draft.model == state.model.name and bool(draft.steps) and draft.tool is None
         if is_here and draft is not self._reported_for:
             self._reported_for = draft
-            self._store.say("warn", message("setup.program_moves"))
+            self._store.notify("warn", message("setup.program_moves"))
 
     def _take(self, setup: SetupState, parts: set[SetupPart]) -> None:
         """Replaces the configuration and what depends on it: tool, load, goal, path. The plan may become outdated."""
@@ -374,7 +374,7 @@ class SetupActions:
             changes["model"] = model = setup.wanted.only(parts).applied_to(state.model)
             if "tool" in parts:
                 self._report_program(state)
-                self._store.forget()  # Its goals are those of another tool.
+                self._store.clear_undo()  # Its goals are those of another tool.
                 target = model.forward(state.goal.q)
                 reach = evaluate_joints(model, state.goal.q)
                 if state.goal.reach.solutions is not None:

@@ -59,7 +59,7 @@ def bench_control_loop(seconds: float = 30.0) -> Measurement:
             if reason is None:
                 wait_for("the page to open", lambda: bool(bench.server.get_clients()))
                 time.sleep(min(10.0, seconds))  # The browser compiles shaders and uploads meshes first.
-            return _evaluate(stream(bench, bench.session.supervisor(), seconds), reason)
+            return _evaluate(stream(bench, bench.session.robot(), seconds), reason)
 
 
 def _evaluate(found: Streamed, reason: str | None) -> Measurement:

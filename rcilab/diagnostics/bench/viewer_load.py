@@ -26,12 +26,12 @@ def bench_spectators(seconds: float = 30.0) -> Measurement | Absent:
         wait_for("the page to open", lambda: bool(bench.server.get_clients()))
         settle = min(10.0, seconds)  # [s] The browser compiles shaders and uploads meshes first.
         time.sleep(settle)
-        alone = stream(bench, bench.session.supervisor(), seconds)
+        alone = stream(bench, bench.session.robot(), seconds)
         for _ in range(_SPECTATORS):
             open_window(page.context.browser, bench.url)
         wait_for("the spectators", lambda: len(bench.server.get_clients()) == 1 + _SPECTATORS, _TIMEOUT)
         time.sleep(settle)
-        shared = stream(bench, bench.session.supervisor(), seconds)
+        shared = stream(bench, bench.session.robot(), seconds)
     return _compare(alone, shared)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.goal.elbow import LOOKS, Elbow, ElbowArc, say_why
+from rcilab.app.goal.elbow import DEXTERITY_SAMPLES, Elbow, ElbowArc, say_why
 from rcilab.app.goal.goal_actions import SetArmAngle
 from rcilab.app.text import Text
 from rcilab.model.kinematics.solvers.solver import Redundancy
@@ -44,7 +44,7 @@ class ElbowPanel:
             self._psi = BoundControl(slider, ask, lambda v, p: SetArmAngle(page=p, psi=v / factor))
             self._field = NumberField(gui.add_text("", ""), ask, "psi", text.unit("deg"))
             self._ring = Html(gui)
-        self._said = Html(gui)
+        self._sentence = Html(gui)
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the goal."""
@@ -65,7 +65,7 @@ class ElbowPanel:
             sentence += (
                 f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
             )
-        self._said.show(sentence)
+        self._sentence.show(sentence)
 
 
 def no_ring_html(redundancy: Redundancy, text: Text) -> str:
@@ -129,7 +129,7 @@ def _is_wide(arc: ElbowArc) -> bool:
 
 def _shaded(start: float, end: float, elbow: Elbow, text: Text) -> tuple[list[str], list[str]]:
     """Returns a free arc in pieces, from amber near a singularity to blue-green, and their names in the legend."""
-    pieces = max(1, math.ceil((end - start) / math.tau * LOOKS))
+    pieces = max(1, math.ceil((end - start) / math.tau * DEXTERITY_SAMPLES))
     marks = np.linspace(start, end, pieces + 1)
     middles = 0.5 * (marks[:-1] + marks[1:])
     colors = free_colors(middles, elbow.dexterity)

@@ -36,7 +36,7 @@ class JogPanel:
             self._build_settings(gui, state)
         with gui.add_folder(self._text("jog.joints")):
             self._build_joints(gui, state)
-        self._said = Html(gui)
+        self._sentence = Html(gui)
 
     def _build_settings(self, gui: Any, state: UiState) -> None:
         text, ask, jog = self._text, self._ask, state.jog
@@ -103,7 +103,7 @@ class JogPanel:
             self._margins[joint].show(margin_html(float(state.goal.q[joint]), *ends, self._text))
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
         sentence = problems_html(state, self._text, fields) + said_html(state, status, self._text)
-        self._said.show(f'<div class="rl-slot">{sentence}</div>')
+        self._sentence.show(f'<div class="rl-slot">{sentence}</div>')
 
 
 def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:

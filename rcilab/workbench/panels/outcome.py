@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rcilab.recording.run import Run
 
 
-def way_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
+def progress_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns the progress of a motion, or of the planning of a program, as a bar; nothing without either."""
     if state.program.progress is not None:
         return _bar(state.program.progress)
@@ -100,7 +100,7 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     if not run.is_complete:
         return "warn", text("record.cut"), facts
     if run.stopped:
-        return "warn", text("record.left_alone" if recording.is_left_alone else "record.stopped"), facts
+        return "warn", text("record.operator_absent" if recording.is_operator_absent else "record.stopped"), facts
     if run.missed_goal is not None:
         return "warn", describe_goal(run, text), facts
     return "good", text("record.arrived"), facts

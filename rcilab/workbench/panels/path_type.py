@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rcilab.app.goal.goal_actions import PlanGoal, SetLaw, SetPathType, SetSpeed
-from rcilab.app.planning import PATH_KINDS
+from rcilab.app.planning import PATH_TYPES
 from rcilab.app.text import Text
 from rcilab.motion.joint import JOINT_LAWS
 from rcilab.workbench.panels.jog import problems_html
@@ -27,7 +27,7 @@ class PathTypePanel:
         """Adds the controls."""
         text, ask = self._text, self._ask
         with gui.add_folder(text("target.motion")):
-            ways = {text(f"way.{kind}"): kind for kind in PATH_KINDS}
+            ways = {text(f"way.{kind}"): kind for kind in PATH_TYPES}
             self._ways = {kind: label for label, kind in ways.items()}
             way = gui.add_dropdown(text("target.way"), tuple(ways), hint=text("target.way_hint"))
             self._way = BoundControl(way, ask, lambda v, p: SetPathType(page=p, kind=ways.get(v)))
@@ -51,8 +51,8 @@ class PathTypePanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the choices and the plan."""
         text = self._text
-        self._way.show(self._ways[state.way])
-        self._via.visible = state.way == "arc"
+        self._way.show(self._ways[state.path_type])
+        self._via.visible = state.path_type == "arc"
         self._note.show(_note_html(state, text))
         self._speed.show(round(state.speed * 100.0))
         self._field.show(shown(state.speed * 100.0), state.problems.get("speed"), state.entered)
@@ -63,7 +63,7 @@ class PathTypePanel:
 
 def _note_html(state: UiState, text: Text) -> str:
     """Returns the via point of an arc."""
-    if state.way != "arc":
+    if state.path_type != "arc":
         return ""
     if state.via is None:
         return f'<p class="rl-note rl-why">{esc(text("target.via_none"))}</p>'

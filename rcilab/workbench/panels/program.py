@@ -113,7 +113,7 @@ class ProgramPanel:
         if FILE_FIELD in state.problems:  # The message below is about the program that the file did not replace.
             sentence += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
         elif sentence:  # A verdict beside it would seem to be about the number that was not taken.
-            sentence += f'<p class="rl-note">{esc(text("program.untaken"))}</p>'
+            sentence += f'<p class="rl-note">{esc(text("program.rejected"))}</p>'
         elif plan is not None:
             where = describe_place(plan, t)
             sentence += planned_html(state, status, text)

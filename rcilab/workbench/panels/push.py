@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.run.active_force import (
     DIRECTIONS,
+    GUIDING_KINDS,
     SPRING,
     STRONGEST,
     TOOL,
-    WAYS,
     can_grab,
     gives_way,
     is_guided,
@@ -45,12 +45,15 @@ class PushPanel:
 
     def _build_guiding(self, gui: Any, state: UiState) -> None:
         text, ask = self._text, self._ask
-        ways = {text(f"guide.{way}"): way for way in WAYS}
+        ways = {text(f"guide.{way}"): way for way in GUIDING_KINDS}
         self._ways = {way: label for label, way in ways.items()}
         way = gui.add_dropdown(
-            text("guide.way"), tuple(ways), initial_value=self._ways[state.push.way], hint=text("guide.way_hint")
+            text("guide.way"),
+            tuple(ways),
+            initial_value=self._ways[state.push.guiding_kind],
+            hint=text("guide.way_hint"),
         )
-        self._way = BoundControl(way, ask, lambda v, p: SetPush(page=p, way=ways.get(v)))
+        self._way = BoundControl(way, ask, lambda v, p: SetPush(page=p, guiding_kind=ways.get(v)))
         self._guide = gui.add_button(text("drive.guide"), icon="hand-move", color="blue", hint=text("guide.hint"))
         on_press(self._guide, ask, lambda page: RobotCommand(page=page, what="guide"))
         self._unguide = gui.add_button(text("drive.unguide"), icon="hand-stop", color="gray")
@@ -84,7 +87,7 @@ class PushPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows state and robot."""
         text, push = self._text, state.push
-        self._way.show(self._ways[push.way])
+        self._way.show(self._ways[push.guiding_kind])
         self._link.show(self._places[push.link])
         self._direction.show(push.direction)
         self._force.show(push.newtons)

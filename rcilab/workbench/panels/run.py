@@ -26,7 +26,7 @@ from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.sim.api import WorldStatus
-from rcilab.workbench.panels.outcome import outcome_html, way_html
+from rcilab.workbench.panels.outcome import outcome_html, progress_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
 
@@ -128,7 +128,7 @@ class RunPanel:
         self._pause.visible, self._resume.visible = not is_held, is_held  # Visible beforehand: the layout is fixed.
         self._pause.disabled = status.code != "moving" or status.motion_plan_time is None
         self._speed_override.show(round(100.0 * state.drive.speed_override, 1))
-        self._way.show(way_html(state, status, text))
+        self._way.show(progress_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
         self._plan.disabled = self._to_target.disabled = moving or not is_connected(status)

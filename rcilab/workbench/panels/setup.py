@@ -93,7 +93,7 @@ class SetupPanel:
         if differing is not None:
             return _verdict("warn", text("setup.differs"), text("setup.differs_long", tool=text.render(differing)))
         if any(field.startswith("setup.") for field in state.problems):
-            return _verdict("warn", text("setup.untaken"), text("setup.untaken_long"))
+            return _verdict("warn", text("setup.rejected"), text("setup.rejected_long"))
         if not setup.touched:
             return f'<p class="rl-note">{esc(text("setup.untouched"))}</p>'
         return _verdict("good", text("setup.given"), text("setup.given_long"))

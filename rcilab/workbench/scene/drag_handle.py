@@ -35,7 +35,7 @@ class DragHandle:
     def __init__(self, server: viser.ViserServer, drawing: ViserScene, arm: ArmView, ask: Ask) -> None:
         self._drawing, self._arm, self._ask = drawing, arm, ask
         self._is_on = False
-        self._said = ""
+        self._sentence = ""
         nowhere = np.zeros((1, 2, 3), dtype=np.float32)
         self._arrow: Any = server.scene.add_arrows(
             "/push", nowhere, _COLOR, shaft_radius=0.008, head_radius=0.022, head_length=0.05, visible=False
@@ -64,8 +64,8 @@ class DragHandle:
         self._label.position = end
         where = text("push.tool") if acting.link == TOOL else text("push.link", number=acting.link)
         sentence = text("push.label", newtons=f"{float(np.linalg.norm(acting.force)):.0f}", where=where)
-        if sentence != self._said:
-            self._said = sentence
+        if sentence != self._sentence:
+            self._sentence = sentence
             self._label.text = sentence
 
     def remove(self) -> None:

@@ -34,7 +34,7 @@ class GoalView:
 
     def __init__(self, server: viser.ViserServer, state: UiState, ask: Ask) -> None:
         pose, scene = state.goal.target, server.scene
-        self._tone = self._said = ""
+        self._tone = self._sentence = ""
         self._via: object = None
         self._target: object = None
         self._touched = float("-inf")
@@ -100,8 +100,8 @@ class GoalView:
         tone, reason = goal.reach.tone, text.render(goal.reach.reason)
         sentence = text("reach.label") if tone == "good" else "".join(with_space(text("reach.tone." + tone), reason))
         sentence = text("target.handles", verdict=sentence)
-        if sentence != self._said:
-            self._said = sentence
+        if sentence != self._sentence:
+            self._sentence = sentence
             self._label.text = sentence
         self._show_via(state, text)
 
@@ -111,7 +111,7 @@ class GoalView:
             handle.remove()
 
     def _show_via(self, state: UiState, text: Text) -> None:
-        via, sentence = state.via if state.way == "arc" else None, text("target.via_label")
+        via, sentence = state.via if state.path_type == "arc" else None, text("target.via_label")
         if sentence != self._via_label.text:
             self._via_label.text = sentence
         if via is self._via:

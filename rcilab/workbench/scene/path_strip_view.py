@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rcilab.app.store import UiState
 
 _NAMED = 5
-"""Number of beads with a label; the others show theirs after a click."""
+"""Number of markers with a label; the others show theirs after a click."""
 _BEAD = np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1.35), (0, 0, -1.35)]) * 0.024  # [m]
 _BEAD_FACES = np.array(
     [(0, 2, 4), (2, 1, 4), (1, 3, 4), (3, 0, 4), (2, 0, 5), (1, 2, 5), (3, 1, 5), (0, 3, 5)]
@@ -62,20 +62,20 @@ class PathStripView:
             shades = np.repeat(colors[:-1, None], 2, axis=1)
             self._drawing.add_segments("/path", ends, color=shades, thickness=_THICK)
         self._drawing.set_visible("/path", ribbon is not None)
-        self._exchange_beads(() if ribbon is None or is_old else ribbon.beads, text)
+        self._exchange_beads(() if ribbon is None or is_old else ribbon.markers, text)
 
     def remove(self) -> None:
-        """Removes path and beads."""
+        """Removes path and markers."""
         self._exchange_beads((), None)
         self._drawing.remove("/path")
 
-    def _exchange_beads(self, beads: tuple[ViolationMarker, ...], text: Text | None) -> None:
+    def _exchange_beads(self, markers: tuple[ViolationMarker, ...], text: Text | None) -> None:
         for number in range(self._beads):
             self._drawing.remove(f"/bead{number}")
         for label in self._labels:
             label.remove()
-        self._labels, self._beads = [], len(beads)
-        for number, bead in enumerate(beads):
+        self._labels, self._beads = [], len(markers)
+        for number, bead in enumerate(markers):
             name = f"/bead{number}"
             self._drawing.add_mesh(name, _BEAD, _BEAD_FACES, color=_BEAD_COLOR)
             self._drawing.set_transform(name, position=bead.position.tolist())
