@@ -37,7 +37,7 @@ class TypeField(Request):
     """The text of a number field; the part of its name before the first dot names the feature."""
 
     field: str
-    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup.fields`)."""
+    """joint.0 ..., pose.x ..., psi, speed, program.KEY.speed ..., setup.PART.NAME (see `setup/setup_fields.py`)."""
     text: str
 
 

@@ -35,7 +35,7 @@ class RobotConnection:
         self._worker: threading.Thread | None = None
         self.name = ""
         """The target: "virtual", or an address."""
-        self._is_apart = False  # No connection is wanted.
+        self._is_disconnected = False  # No connection is wanted.
 
     def open(
         self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
@@ -55,8 +55,8 @@ class RobotConnection:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
-            self._is_apart, self.name = False, target
-            self._work(self._exchange, generation, previous, model, target, plant, setup)
+            self._is_disconnected, self.name = False, target
+            self._work(self._replace, generation, previous, model, target, plant, setup)
 
     def disconnect(self) -> None:
         """Closes the open supervisor and starts nothing; returns at once, `status` is "closed" from then on."""
@@ -64,8 +64,8 @@ class RobotConnection:
             self._generation += 1
             previous = self._worker
             self._ready = self._shown = None
-            self._is_apart = True
-            self._work(self._let_go, previous)
+            self._is_disconnected = True
+            self._work(self._close_current, previous)
 
     def close(self) -> None:
         """Ends the supervisor and waits for the end of its processes."""
@@ -84,7 +84,7 @@ class RobotConnection:
         shown = self._shown
         if shown is not None:
             return shown.status()
-        if self._worker is None or self._is_apart:
+        if self._worker is None or self._is_disconnected:
             return SupervisorStatus()  # No connection is wanted.
         return SupervisorStatus(phase="starting", code="starting", target=self.name)
 
@@ -137,18 +137,18 @@ class RobotConnection:
             with memory_needed():
                 worker.start()
         except UsageError:
-            self._is_apart = True  # Nothing is being started.
+            self._is_disconnected = True  # Nothing is being started.
             raise
         self._worker = worker
 
-    def _let_go(self, previous: threading.Thread | None) -> None:
+    def _close_current(self, previous: threading.Thread | None) -> None:
         if previous is not None:
             previous.join()
         old, self._current = self._current, None
         if old is not None:
             old.close()
 
-    def _exchange(
+    def _replace(
         self,
         generation: int,
         previous: threading.Thread | None,
@@ -157,11 +157,7 @@ class RobotConnection:
         plant: str,
         setup: RobotConfiguration | None,
     ) -> None:
-        if previous is not None:
-            previous.join()
-        old, self._current = self._current, None
-        if old is not None:
-            old.close()
+        self._close_current(previous)
         with self._lock:
             if generation != self._generation:
                 return
@@ -173,7 +169,7 @@ class RobotConnection:
         except RcilabError as error:
             with self._lock:
                 if generation == self._generation:
-                    self._is_apart = True  # Else a supervisor whose creation failed would be starting for ever.
+                    self._is_disconnected = True  # Else a supervisor whose creation failed would be starting for ever.
             self._on_failure(error)
             return
         with self._lock:

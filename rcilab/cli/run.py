@@ -131,8 +131,8 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
 def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     """Appends the motions with their outcomes to `moves` and returns the name of the arm."""
     from rcilab.conformance.check import check
+    from rcilab.execution.command_validation import find_start_mismatch
     from rcilab.execution.session import connect
-    from rcilab.execution.start_pose_check import describe_start_mismatch
     from rcilab.model.robot_model import load_model
 
     found = read_file(args.file, args.max_rows)
@@ -141,7 +141,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
         show_note = partial(print, file=_text_stream(args))
         motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
         state = robot.state
-        mismatch = describe_start_mismatch(motion.q[0], state.q_c)
+        mismatch = find_start_mismatch(motion.q[0], state.q_c)
         if mismatch is None or not args.to_start:
             if mismatch is not None:  # Before the report, whose violations would all have this cause.
                 raise UsageError(f"{mismatch}; in the shell, rcilab run --to-start does that after a confirmation")

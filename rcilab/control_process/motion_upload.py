@@ -15,7 +15,7 @@ from rcilab.control_process.status import SupervisorStatus
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import CertificateError, PlanningError, RcilabError, UsageError
 from rcilab.core.state import Mode, require_mode
-from rcilab.execution.start_pose_check import describe_start_mismatch
+from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.motion import Motion, require_motion
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
@@ -57,7 +57,7 @@ def require_admissible(
     q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
     if certificate is None:
         raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
-    mismatch = describe_start_mismatch(motion.q[0], q_c)
+    mismatch = find_start_mismatch(motion.q[0], q_c)
     if mismatch is not None:
         raise CertificateError(mismatch, ["start state"])
     certificate.verify(motion, model, q_c, box, mode=mode)

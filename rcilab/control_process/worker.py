@@ -48,12 +48,12 @@ from rcilab.core.fault import name_faults
 from rcilab.core.limits import Limits
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotMode, RobotState
+from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.guiding import HandGuide
 from rcilab.execution.jog import JogCallback
 from rcilab.execution.motion_executor import HELD_TOO_LONG, LONGEST_PAUSE, MotionExecutor, MotionStream
 from rcilab.execution.recorder import CycleLog
-from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import StreamingDriver, open_driver
 from rcilab.makers.maker import capabilities_of, timing_of
@@ -404,7 +404,7 @@ class MotionService:
         rows = self._block.motion[: request.rows]
         mode = request.mode
         if driver.latest is not None:
-            mismatch = describe_start_mismatch(rows[0], driver.latest.q_c)
+            mismatch = find_start_mismatch(rows[0], driver.latest.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch).coded("elsewhere")
             model.rigid_body.motion_torque(driver.latest.q, driver.latest.dq, driver.latest.dq)  # Warm-up.

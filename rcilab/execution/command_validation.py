@@ -1,4 +1,4 @@
-"""Validation of a callback's commands before they are sent: their type and values, and the start of the motion."""
+"""Validation of commands before they are sent: their type and values, and the start of a motion or of a callback."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rcilab.core.arrays import Array
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
+from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
 from rcilab.core.errors import InvalidValueError
@@ -21,7 +22,7 @@ _ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, excep
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
 
 
-def check_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
+def require_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
     """Returns a valid command with copies of its arrays, so that the caller may reuse them.
 
     Args:
@@ -49,7 +50,31 @@ def check_command(command: Any, kind: type[Command], n: int, t: float) -> Comman
     return CartesianPosition(T, command.psi, command.finished)
 
 
-def require_first(command: Command, state: RobotState, limits: Limits, *, has_psi: bool) -> None:
+def find_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
+    """Returns a message if a motion does not start at the arm's position, or None.
+
+    Args:
+        start: Start of the motion, shape (n,), [rad].
+        q_c: Commanded joint angles of the arm, [rad].
+    """
+    if len(start) != len(q_c):
+        return f"the motion is for {len(start)} joints and the arm has {len(q_c)}; plan it for the right model"
+    off = np.abs(np.asarray(start) - q_c)
+    if float(off.max()) <= START_POSITION_TOLERANCE:
+        return None
+    joint = int(off.argmax())
+    others = int((off > START_POSITION_TOLERANCE).sum()) - 1
+    more = f" (and {others} more joint{'s' if others > 1 else ''})" if others else ""
+    return (
+        f"the motion does not start at the arm's position: joint {joint + 1} starts at "
+        f"{math.degrees(start[joint]):.4f} deg and is at {math.degrees(q_c[joint]):.4f} deg, "
+        f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
+        "plan the motion from robot.state.q_c, or move the arm to its start first: "
+        "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
+    )
+
+
+def require_start(command: Command, state: RobotState, limits: Limits, *, has_psi: bool) -> None:
     """Rejects a first command that differs from the commanded state: the arm would jump.
 
     Args:

@@ -25,7 +25,7 @@ from rcilab.core.errors import (
 from rcilab.core.limits import Limits
 from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.execution.call_times import CallTimes
-from rcilab.execution.command_validation import check_command, describe_distance, distance_to, require_first
+from rcilab.execution.command_validation import describe_distance, distance_to, require_command, require_start
 from rcilab.execution.filters import CommandFilter, is_near
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner
@@ -312,7 +312,7 @@ class ControlLoop:
                 before = off
 
     def _end(self, error: BaseException | None, *, brake: bool = True) -> None:
-        """The single stop path: every motion ends here, also one that ran to its end.
+        """The stop path of a motion: every motion ends here, also one that ran to its end.
 
         It stops the arm within the limits if commands are still possible, then ends the motion over TCP. After
         `ControlError` and `ConnectionLostError` the controller stops the arm.
@@ -399,7 +399,7 @@ class ControlLoop:
 
     def _checked(self, command: Any, state: RobotState) -> Command:
         """Returns the callback's command after validation."""
-        return check_command(command, self._kind, self._driver.n, self._time(state))
+        return require_command(command, self._kind, self._driver.n, self._time(state))
 
     def _filtered(self, command: Command, state: RobotState) -> Command:
         """Returns the filtered command; the first command starts the filters and must match the commanded state."""
@@ -409,7 +409,7 @@ class ControlLoop:
                 stage.begin(command)
             command = stage.step(command)
         if is_first:
-            require_first(command, state, self._limits, has_psi=self._has_psi)
+            require_start(command, state, self._limits, has_psi=self._has_psi)
         return command
 
     def _time(self, state: RobotState) -> float:

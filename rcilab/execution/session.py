@@ -20,6 +20,7 @@ from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageErro
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.core.state import Mode, RobotState, require_mode
+from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
 from rcilab.execution.motion_executor import MotionStream
@@ -34,7 +35,6 @@ from rcilab.execution.motion_runner import (
 from rcilab.execution.session_lock import SessionLock
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.speed_override import SpeedOverride, StreamRows
-from rcilab.execution.start_pose_check import describe_start_mismatch
 from rcilab.i18n.translator import Remark
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import (
@@ -412,7 +412,7 @@ class RobotSession(Closeable):
         require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):
             state = self.receive_state()
-            mismatch = describe_start_mismatch(motion.q[0], state.q_c)
+            mismatch = find_start_mismatch(motion.q[0], state.q_c)
             if mismatch is not None:
                 raise UsageError(mismatch)
             if certificate is None:

@@ -78,7 +78,7 @@ class Timing:
 
 
 Feature: TypeAlias = Mode | SetupPart | Literal["simulation", "driving", "streaming", "guiding", "signals", "reboot"]
-"""Features that an arm may missing; their texts are `feature.NAME`."""
+"""Features that an arm may lack; their texts are `feature.NAME`."""
 
 
 class Maker(Protocol):
@@ -221,11 +221,6 @@ def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
 def simulated_robots() -> tuple[str, ...]:
     """Returns the names of the arms that have a virtual controller."""
     return _robots_of(maker for maker in all_makers() if maker.capabilities.simulates)
-
-
-def driven_robots() -> tuple[str, ...]:
-    """Returns the names of the arms that have a driver."""
-    return _robots_of(maker for maker in all_makers() if maker.capabilities.drives)
 
 
 def find_missing_feature(model: RobotModel, feature: Feature) -> ModelError | None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.model.kinematics.collision import Clearance, CollisionGeometry
 
-_SOFT_LIMIT = "soft limit that was set (SetJointLimit, RCI manual 3.1.15)"
+_SOFT_LIMIT = "soft limit that was set at the controller"
 
 __all__ = ["RobotModel", "load_model", "require_model"]
 

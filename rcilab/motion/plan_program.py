@@ -79,34 +79,8 @@ def plan_program(
             waypoint, the position and the reason. Or the motion takes too long.
         InvalidValueError: The program is for another arm, or an argument is out of range.
     """
-    require_model(model)
-    if not isinstance(program, Program):
-        raise InvalidValueError("program", described(program), "must be a Program; use Program.load")
-    if program.model != model.name:
-        raise InvalidValueError(
-            "program", program.model, f"is the model of the program, not {model.name}; load that model"
-        ).coded("program_model", theirs=program.model, ours=model.name)
-    speed = as_number(speed, "speed")
-    if not 0.0 < speed <= 1.0:
-        raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds").coded(
-            "span", low="0", high="1"
-        )
-    for number, waypoint in enumerate(program.waypoints, 1):
-        if speed * waypoint.speed < MIN_SPEED:
-            what = f"{label(number, waypoint)}, speed times {speed:g}"
-            raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}").coded(
-                "least", least=f"{MIN_SPEED:g}"
-            )
+    speed = _require_valid(model, program, speed, rounds, law, max_rows)
     count = len(program.waypoints)
-    if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
-        raise InvalidValueError(
-            "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
-        ).coded("rounds", most=MOST_WAYPOINTS // count)
-    require_max_rows(max_rows)
-    if law not in JOINT_LAWS:
-        raise InvalidValueError("law", described(law), f"is unknown; known: {', '.join(JOINT_LAWS)}")
-    if law == "s_profile":
-        _require_stops(program)
     if program.T_flange_tool is not None:
         model = model.with_tool(program.T_flange_tool)
     done = 0.0
@@ -147,6 +121,41 @@ def plan_program(
             f"fewer rounds or shorter dwells, or pass max_rows={len(motion)} (in a shell --max-rows {len(motion)})"
         ).coded("program_long", duration=f"{motion.duration:.0f}", most=f"{1e-3 * max_rows:.0f}")
     return motion
+
+
+def _require_valid(
+    model: RobotModel, program: Program, speed: float, rounds: int, law: JointLaw, max_rows: int
+) -> float:
+    """Returns the speed if the arguments of `plan_program` are valid."""
+    require_model(model)
+    if not isinstance(program, Program):
+        raise InvalidValueError("program", described(program), "must be a Program; use Program.load")
+    if program.model != model.name:
+        raise InvalidValueError(
+            "program", program.model, f"is the model of the program, not {model.name}; load that model"
+        ).coded("program_model", theirs=program.model, ours=model.name)
+    speed = as_number(speed, "speed")
+    if not 0.0 < speed <= 1.0:
+        raise InvalidValueError("speed", speed, "must be above 0, to 1: a part of the waypoints' speeds").coded(
+            "span", low="0", high="1"
+        )
+    for number, waypoint in enumerate(program.waypoints, 1):
+        if speed * waypoint.speed < MIN_SPEED:
+            what = f"{label(number, waypoint)}, speed times {speed:g}"
+            raise InvalidValueError(what, speed * waypoint.speed, f"must be at least {MIN_SPEED:g}").coded(
+                "least", least=f"{MIN_SPEED:g}"
+            )
+    count = len(program.waypoints)
+    if not 1 <= as_number(rounds, "rounds") <= MOST_WAYPOINTS / count or int(rounds) != rounds:
+        raise InvalidValueError(
+            "rounds", rounds, f"must be whole, 1 to {MOST_WAYPOINTS // count} for {count} waypoints"
+        ).coded("rounds", most=MOST_WAYPOINTS // count)
+    require_max_rows(max_rows)
+    if law not in JOINT_LAWS:
+        raise InvalidValueError("law", described(law), f"is unknown; known: {', '.join(JOINT_LAWS)}")
+    if law == "s_profile":
+        _require_stops(program)
+    return speed
 
 
 def _overall_progress(first: int, last: int, count: int, part: float) -> float:

@@ -22,7 +22,7 @@ from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import CertificateError, CommandRejectedError, RcilabError, UsageError
 from rcilab.core.optional_deps import MissingExtraError
 from rcilab.core.spatial import Pose
-from rcilab.execution.start_pose_check import describe_start_mismatch
+from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.number_parsing import parse_number, parse_quaternion
 from rcilab.i18n.translator import Remark, message
@@ -82,7 +82,7 @@ def refuse(error: RcilabError) -> Callable[[], object]:
 
 
 def start_elsewhere() -> None:
-    mismatch = describe_start_mismatch(HOME + 0.1, HOME)
+    mismatch = find_start_mismatch(HOME + 0.1, HOME)
     assert mismatch is not None
     raise UsageError(mismatch).coded("elsewhere")
 

@@ -11,7 +11,7 @@ import pytest
 from rcilab.core.command import CartesianPosition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
-from rcilab.execution.command_validation import describe_distance, distance_to, require_first
+from rcilab.execution.command_validation import describe_distance, distance_to, require_start
 from rcilab.model.robot_model import load_model
 
 LIMITS = load_model("xMatePro7").limits
@@ -21,9 +21,9 @@ TURNED = CartesianPosition(np.eye(4), 0.5)
 @pytest.mark.parametrize("joints", [6, 7, 8])
 def test_the_arm_angle_counts_by_the_redundancy_and_not_by_the_number_of_joints(joints: int) -> None:
     state: Any = SimpleNamespace(q_c=np.zeros(joints), T_base_tool_c=Pose(), psi_c=0.0)
-    require_first(TURNED, state, LIMITS, has_psi=False)
+    require_start(TURNED, state, LIMITS, has_psi=False)
     assert distance_to(state, TURNED, has_psi=False) == 0.0
     with pytest.raises(InvalidValueError, match="psi of the first command"):
-        require_first(TURNED, state, LIMITS, has_psi=True)
+        require_start(TURNED, state, LIMITS, has_psi=True)
     assert distance_to(state, TURNED, has_psi=True) == 0.5
     assert describe_distance(state, TURNED, has_psi=True) == "the arm angle is 28.65 deg"

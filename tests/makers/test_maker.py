@@ -21,7 +21,6 @@ from rcilab.makers.maker import (
     Feature,
     Maker,
     all_makers,
-    driven_robots,
     find_missing_feature,
     maker_of,
     require_driver,
@@ -98,7 +97,7 @@ def test_what_cannot_be_simulated_or_driven_is_refused_by_the_capabilities(maker
     has = maker.capabilities
     for name in maker.robots:
         model = load_model(name)
-        assert (name in simulated_robots(), name in driven_robots()) == (has.simulates, has.drives)
+        assert (name in simulated_robots()) == has.simulates
         for require, possible in ((require_simulator, has.simulates), (require_driver, has.simulates or has.drives)):
             if possible:
                 assert require(model) is model

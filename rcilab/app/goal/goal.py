@@ -54,6 +54,17 @@ class Goal:
     """Why the arm angle differs from the requested one; None if it does not."""
 
 
+def with_pose_field(pose: Pose, name: str, value: float) -> Pose:
+    """Returns a pose with one number replaced: x, y, z [mm], or roll, pitch, yaw [deg]."""
+    position, rpy = pose.position, pose.rpy
+    index = POSE_FIELDS.index(name)
+    if index < 3:
+        position[index] = value / 1000.0
+    else:
+        rpy[index - 3] = math.radians(value)
+    return Pose.from_rpy(position, rpy)
+
+
 def goal_at(model: RobotModel, q: JointVector) -> Goal:
     """Returns the goal at joint angles, shape (n,), [rad]."""
     return Goal(q=q, target=model.forward(q), reach=evaluate_joints(model, q), psi=_arm_angle(model, q))

@@ -13,7 +13,7 @@ import numpy as np
 from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import start_of_plans
 from rcilab.app.goal.elbow import in_branch, nearest_free
-from rcilab.app.goal.goal import POSE_FIELDS, Goal, goal_at, goal_toward
+from rcilab.app.goal.goal import POSE_FIELDS, Goal, goal_at, goal_toward, with_pose_field
 from rcilab.app.planning import PATH_TYPES, Plan, make_plan, make_recovery
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.run.plan_readiness import ArmStatus, is_done, is_moving
@@ -274,7 +274,7 @@ class GoalActions:
             bound, unit = (FURTHEST * 1000.0, "mm") if index < 3 else (360.0, "deg")
             parsed = parse_number(request.text, -bound, bound, unit)
             value = parsed.value
-            act = None if value is None else lambda: self.set_target(with_pose_field(state.goal.target, index, value))
+            act = None if value is None else lambda: self.set_target(with_pose_field(state.goal.target, name, value))
         elif kind == "pose" and name == QUATERNION:
             parsed = parse_quaternion(request.text)
             wxyz = parsed.value
@@ -431,13 +431,3 @@ class GoalActions:
 def _beginning(plan: Plan) -> JointVector:
     """Returns where a plan begins; for a program its start, not that of the approach, shape (n,), [rad]."""
     return plan.motion.start if plan.program is None else np.array(plan.program.start)
-
-
-def with_pose_field(pose: Pose, index: int, value: float) -> Pose:
-    """Returns a pose with one of x, y, z [mm] and roll, pitch, yaw [deg] replaced."""
-    position, rpy = pose.position, pose.rpy
-    if index < 3:
-        position[index] = value / 1000.0
-    else:
-        rpy[index - 3] = math.radians(value)
-    return Pose.from_rpy(position, rpy)

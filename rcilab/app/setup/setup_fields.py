@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rcilab.app.goal.goal import POSE_FIELDS
+from rcilab.app.goal.goal import POSE_FIELDS, with_pose_field
 from rcilab.app.setup.configuration_state import SetupState
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
@@ -108,11 +108,11 @@ def with_field(setup: SetupState, part: str, name: str, value: float, longest_to
         return _with(setup, box=box_between(wanted.box, bounds))
     if part == "box":
         box = wanted.box
-        return _with(setup, box=replace(box, T_base_box=_turned(box.T_base_box, name, value)))
+        return _with(setup, box=replace(box, T_base_box=with_pose_field(box.T_base_box, name, value)))
     if part == "tool":
-        return with_pose(setup, "tool", _turned(wanted.tool, name, value), longest_tool)
+        return with_pose(setup, "tool", with_pose_field(wanted.tool, name, value), longest_tool)
     if part == "force":
-        return with_pose(setup, "force", _turned(wanted.force.T_flange_force, name, value), longest_tool)
+        return with_pose(setup, "force", with_pose_field(wanted.force.T_flange_force, name, value), longest_tool)
     return _with_load_field(setup, wanted.load, name, value)
 
 
@@ -194,16 +194,6 @@ def with_inertia(setup: SetupState) -> SetupState | Message:
 
 def _with(setup: SetupState, **parts: object) -> SetupState:
     return replace(setup, wanted=setup.wanted.updated(RobotConfiguration(**parts)))  # type: ignore[arg-type]  # By their names.
-
-
-def _turned(pose: Pose, name: str, value: float) -> Pose:
-    position, rpy = pose.position, pose.rpy
-    index = POSE_FIELDS.index(name)
-    if index < 3:
-        position[index] = value / 1000.0
-    else:
-        rpy[index - 3] = math.radians(value)
-    return Pose.from_rpy(position, rpy)
 
 
 def exact_end(own: JointLimits, end: str, joint: int, angle: float) -> float:
