@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Generic, TypeVar
 
 from rcilab.app.autosave import Autosave, SavedState
 from rcilab.app.check.check_actions import CheckActions
-from rcilab.app.coalescing_queue import CoalescingQueue
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import ControlLockActions, Refuse
 from rcilab.app.failures import Failures
@@ -41,6 +42,40 @@ from rcilab.i18n.translator import message
 
 _TICK = 0.03  # [s] About the display's rate; also the interval between two reads of the robot's status.
 _REFUSAL_INTERVAL = 1.0  # [s] Minimum time between two answers to a page that acts without the controls.
+
+T = TypeVar("T")
+
+
+class CoalescingQueue(Generic[T]):
+    """A queue in which a newer request can replace a waiting older one.
+
+    During a drag, twenty positions per second arrive; only the newest needs a solution.
+    """
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self._waiting: deque[tuple[str | None, T]] = deque()
+
+    def put(self, request: T, key: str | None = None) -> None:
+        """Appends a request and returns at once.
+
+        Args:
+            request: The request.
+            key: The newest waiting request with the same key is replaced.
+        """
+        with self._condition:
+            if key is not None and self._waiting and self._waiting[-1][0] == key:
+                self._waiting[-1] = (key, request)
+            else:
+                self._waiting.append((key, request))
+            self._condition.notify()
+
+    def take(self, timeout: float) -> T | None:
+        """Returns the oldest request, or None if none came within `timeout`, [s]."""
+        with self._condition:
+            if not self._waiting:
+                self._condition.wait(timeout)
+            return self._waiting.popleft()[1] if self._waiting else None
 
 
 class Dispatcher:

@@ -24,7 +24,7 @@ from rcilab.workbench.panels.elbow import ElbowPanel
 from rcilab.workbench.panels.extras import ExtrasPanel
 from rcilab.workbench.panels.fault_injection import FaultInjectionPanel
 from rcilab.workbench.panels.health import HealthPanel
-from rcilab.workbench.panels.jog import JogPanel
+from rcilab.workbench.panels.jog import JogPanel, ToolJogPanel
 from rcilab.workbench.panels.learn import LearnPanel
 from rcilab.workbench.panels.learn_demo import LearnDemoPanel
 from rcilab.workbench.panels.learn_lesson import LearnLessonPanel
@@ -46,7 +46,6 @@ from rcilab.workbench.panels.status import status_values
 from rcilab.workbench.panels.target import TargetPanel
 from rcilab.workbench.panels.target_robot import TargetRobotPanel
 from rcilab.workbench.panels.timeline import TimelinePanel
-from rcilab.workbench.panels.tool_jog import ToolJogPanel
 from rcilab.workbench.panels.waypoint import WaypointPanel
 from rcilab.workbench.scene.stage import Stage
 from rcilab.workbench.scene.waypoint_markers import ProgramMarks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from rcilab.app.coalescing_queue import CoalescingQueue
+from rcilab.app.dispatcher import CoalescingQueue
 
 
 def drained(box: CoalescingQueue) -> list:

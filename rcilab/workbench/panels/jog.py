@@ -1,4 +1,4 @@
-"""Jog: what the buttons move and how fast; each joint with slider, buttons and number."""
+"""Jog: what the buttons move and how fast; each joint with slider, buttons and number; the axes of the tool."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from rcilab.app.goal.goal import NEAR_LIMIT
 from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.jog.jog_actions import SetJog
-from rcilab.app.jog.jog_state import FASTEST_JOINT, FASTEST_TOOL, STEPS, HoldJog, PressJog, no_jog
+from rcilab.app.jog.jog_state import AXES, FASTEST_JOINT, FASTEST_TOOL, FRAMES, STEPS, HoldJog, PressJog, no_jog
 from rcilab.app.request import Request
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
@@ -104,6 +104,34 @@ class JogPanel:
         fields = [(field.field, f"J{number}") for number, field in enumerate(self._fields, start=1)]
         sentence = problems_html(state, self._text, fields) + said_html(state, status, self._text)
         self._sentence.show(f'<div class="rl-slot">{sentence}</div>')
+
+
+class ToolJogPanel:
+    """A group of the Jog tab."""
+
+    def __init__(self, text: Text, ask: Ask) -> None:
+        self._text, self._ask = text, ask
+
+    def build(self, gui: Any, state: UiState) -> None:
+        """Adds the controls."""
+        text = self._text
+        with gui.add_folder(text("jog.tool")):
+            gui.add_html('<i class="rl-axes rl-held"></i>')
+            frames = {text(f"jog.frame.{frame}"): frame for frame in FRAMES}
+            self._frames = {frame: label for label, frame in frames.items()}
+            chosen = self._frames[state.jog.frame]
+            frame = gui.add_dropdown(
+                text("jog.frame"), tuple(frames), initial_value=chosen, hint=text("jog.frame_hint")
+            )
+            self._frame = BoundControl(frame, self._ask, lambda v, p: SetJog(page=p, frame=frames.get(v)))
+            for place in range(3):
+                for axis in (AXES[place], AXES[place + 3]):
+                    add_jog_button(gui, self._ask, text(f"target.{axis}"), axis, -1)
+                    add_jog_button(gui, self._ask, text(f"target.{axis}"), axis, 1)
+
+    def show(self, state: UiState, status: SupervisorStatus) -> None:
+        """Follows the settings."""
+        self._frame.show(self._frames[state.jog.frame])
 
 
 def add_jog_button(gui: Any, ask: Ask, label: str, axis: str, sign: int) -> None:
