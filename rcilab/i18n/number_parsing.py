@@ -77,9 +77,9 @@ def parse_number(
 
 def _bounds(low: float, high: float, unit: str) -> Message:
     if not unit:
-        return message("parse.bounds.plain", low=_short(low), high=_short(high))
+        return message("parse.bounds.plain", low=format_short(low), high=format_short(high))
     if unit not in _UNITS:
-        return message("parse.bounds", low=_short(low), high=_short(high), unit=unit)
+        return message("parse.bounds", low=format_short(low), high=format_short(high), unit=unit)
     scale = math.pi / 180.0 if unit == "deg" else 1e-3
     return message(f"parse.bounds.{unit}", low=scale * low, high=scale * high)
 
@@ -115,5 +115,6 @@ def parse_quaternion(typed: str) -> ParsedQuaternion:
     return ParsedQuaternion(tuple(number / length for number in numbers))
 
 
-def _short(number: float) -> str:
+def format_short(number: float) -> str:
+    """Returns a number with at most three digits after the point, without trailing zeros."""
     return f"{number:.3f}".rstrip("0").rstrip(".")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rcilab.notebook.target_panel import TargetPanel as TargetPanel
     from rcilab.notebook.timeline import Timeline as Timeline
 
-_HOMES = {
+_MODULES = {
     "FaultPanel": "fault_panel",
     "JogPanel": "jog_panel",
     "Lab": "lab_widget",
@@ -36,14 +36,14 @@ _HOMES = {
     "Timeline": "timeline",
 }
 
-__all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> object:
     """Loads a part at its first use."""
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'rcilab.notebook' has no name {name!r}; it has: {', '.join(__all__)}")
-    value = getattr(import_module(f"rcilab.notebook.{_HOMES[name]}"), name)
+    value = getattr(import_module(f"rcilab.notebook.{_MODULES[name]}"), name)
     globals()[name] = value
     return value
 

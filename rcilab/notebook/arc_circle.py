@@ -12,7 +12,7 @@ _SIZE, _RADIUS, _WIDTH = 190.0, 62.0, 13.0
 _GOOD, _BAD, _GREY = "#1f9d57", "#d1392b", "#8a94a3"
 _INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
 _FULL_TURN = 2.0 * math.pi - 1e-6
-_SEAM = 0.01  # [rad] Overlap of neighbouring arcs, against hairlines between two of a colour.
+_OVERLAP = 0.01  # [rad] Overlap of neighbouring arcs, against hairlines between two of a colour.
 
 
 def draw_circle(arcs: FeasibleArcs, psi: float | None, text: Text) -> str:
@@ -52,7 +52,7 @@ def _arc(start: float, end: float, color: str, title: str) -> str:
     if end - start > _FULL_TURN:
         shape = f'<circle cx="{_SIZE / 2:g}" cy="{_SIZE / 2:g}" r="{_RADIUS:g}" {style}>'
         return f"{shape}<title>{esc(title)}</title></circle>"
-    (x0, y0), (x1, y1) = _at(start, _RADIUS), _at(end + _SEAM, _RADIUS)
+    (x0, y0), (x1, y1) = _at(start, _RADIUS), _at(end + _OVERLAP, _RADIUS)
     large = int(end - start > math.pi)
     d = f"M{x0:.2f},{y0:.2f}A{_RADIUS:g},{_RADIUS:g} 0 {large} 1 {x1:.2f},{y1:.2f}"
     return f'<path d="{d}" {style}><title>{esc(title)}</title></path>'

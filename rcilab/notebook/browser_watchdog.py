@@ -1,8 +1,8 @@
-"""Stops an arm that a cell moves when the notebook's page, and so the operator, is gone.
+"""Stops an arm that a cell moves when the notebook's page is gone, and with it the operator.
 
-The page is asked once the notebook has a part or sliders. Before, or where the kernel handles no message of the page
-while a cell runs (ipykernel before 7; before 7.4 VS Code, too), nothing is known and nothing is stopped. The same
-holds while a button of the user's own runs the motion in the thread that serves the page.
+Heartbeats are sent once the notebook has a part or sliders. Before, or where the kernel handles no message of the page
+while a cell runs (ipykernel before 7; before 7.4 VS Code, too), no motion is stopped. The same holds
+while a button of the user's own runs the motion in the thread that serves the page.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rcilab.i18n.translator import Remark
-from rcilab.notebook.browser_heartbeat import kernel_heart
+from rcilab.notebook.browser_heartbeat import kernel_heartbeat
 
 if TYPE_CHECKING:
     from rcilab.execution.session import RobotSession
 
-OPERATOR_ABSENT = Remark("the notebook's page is gone", "page_gone")
-"""Reason in a run that was stopped for it."""
+PAGE_GONE = Remark("the notebook's page is gone", "page_gone")
+"""Reason in a run that was stopped because the page is gone."""
 _INTERRUPTED = Remark("the kernel was interrupted", "kernel_interrupted")
-_LOOK = 0.1  # [s] Between two checks for a motion.
+_POLL_INTERVAL = 0.1  # [s] Between two checks for a motion.
 
 
 class BrowserWatchdog:
-    """Watches every session of the kernel. One thread; it sends nothing while nothing moves.
+    """Watches every session of the kernel. One thread; it sends no heartbeats while no arm moves.
 
-    It imports nothing either: two threads that import the same library can find it incomplete.
+    It imports nothing either: of two threads that import the same library, one can find it incomplete.
 
     Args:
         is_cell_running: Whether the kernel runs a cell.
     """
 
     def __init__(self, is_cell_running: Callable[[], bool]) -> None:
-        kernel_heart().is_cell_running = is_cell_running
+        kernel_heartbeat().is_cell_running = is_cell_running
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="rcilab-notebook-page", daemon=True)
         self._thread.start()
@@ -50,21 +50,21 @@ class BrowserWatchdog:
         self._thread.join()
 
     def _watch(self) -> None:
-        while not self._ending.wait(_LOOK):
-            self._look()  # It holds no session while it waits: an unreferenced one is to be collected.
+        while not self._ending.wait(_POLL_INTERVAL):
+            self._check()  # No session is referenced while waiting, so that an unused one can be collected.
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         sessions = _sessions()
         if not sessions:
             return
-        heart = kernel_heart()
-        heart.open()  # Before any motion, so that only heartbeats are sent during one.
+        heartbeat = kernel_heartbeat()
+        heartbeat.open()  # Before any motion, so that only heartbeats are sent during one.
         moving = [session for session in sessions if session.is_moving]
         if moving:
-            heart.beat()
-        if moving and heart.is_gone:
+            heartbeat.beat()
+        if moving and heartbeat.is_gone:
             for session in moving:
-                session.stop(OPERATOR_ABSENT)
+                session.stop(PAGE_GONE)
 
 
 def _sessions() -> list[RobotSession]:

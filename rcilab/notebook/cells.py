@@ -1,4 +1,4 @@
-"""What a cell has created ends when the cell runs again, when it is interrupted, and with the kernel.
+"""Closes what a cell has created when the cell runs again and when the kernel ends; an interrupt stops its motions.
 
 A notebook has no window to close: without this, a cell that runs again would leave its server, process and threads.
 JupyterLab and VS Code send the cell's id with every run; for other front ends (nbclient) the text is the id.
@@ -27,11 +27,11 @@ class CellResource(Protocol):
     """A resource that a cell may own."""
 
     def close(self) -> None:
-        """Ends it; may be called twice."""
+        """Closes the resource; may be called twice."""
         ...
 
     def halt(self) -> None:
-        """Stops what it moves; from any thread, without waiting."""
+        """Stops the motion that the resource controls; from any thread, without waiting."""
         ...
 
 
@@ -51,7 +51,7 @@ class CellRegistry:
             shell.events.register("pre_run_cell", self.begin)
             shell.events.register("post_run_cell", self.end)
             _stop_on_interrupts(shell, self.halt)
-            if self._current() is not None:  # It began before this object existed.
+            if self._current() is not None:  # The running cell began before this object existed.
                 self._running.set()
 
     @property
@@ -66,31 +66,31 @@ class CellRegistry:
             return True
         return self.is_running and threading.current_thread() is threading.main_thread()
 
-    def adopt(self, thing: CellResource) -> None:
-        """Assigns a resource to the running cell; what a click creates between two cells ends with its creator."""
+    def adopt(self, resource: CellResource) -> None:
+        """Assigns a resource to the running cell; one that a click creates between two cells ends with its creator."""
         cell = self._current()
         if cell is not None:
-            self._owned.setdefault(cell, []).append(weakref.ref(thing))
-        self.keep(thing)
+            self._owned.setdefault(cell, []).append(weakref.ref(resource))
+        self.keep(resource)
 
-    def keep(self, thing: CellResource) -> None:
+    def keep(self, resource: CellResource) -> None:
         """Assigns a resource to the kernel."""
-        self._keep[id(thing)] = thing
+        self._keep[id(resource)] = resource
 
-    def forget(self, thing: CellResource) -> None:
-        """Forgets closed resources."""
-        self._keep.pop(id(thing), None)
+    def forget(self, resource: CellResource) -> None:
+        """Removes a closed resource."""
+        self._keep.pop(id(resource), None)
 
     def begin(self, info: Any) -> None:
-        """A cell is about to run: the resources of its last run end."""
+        """Closes the resources of a cell's last run; called before the cell runs."""
         self._running.set()
         for reference in reversed(self._owned.pop(_name(info.cell_id, info.raw_cell), [])):
-            thing = reference()
-            if thing is not None:
-                thing.close()
+            resource = reference()
+            if resource is not None:
+                resource.close()
 
     def end(self, result: Any) -> None:
-        """A cell has ended; if it was interrupted, all motions stop.
+        """Stops all motions if the cell that has ended was interrupted; called after every cell.
 
         A cell that awaits is cancelled by an interrupt, and may then have no result.
         """
@@ -99,11 +99,11 @@ class CellRegistry:
             self.halt()
 
     def halt(self) -> None:
-        """Stops the motions of all cells; an error does not keep others from being stopped."""
+        """Stops the motions of all cells; an error does not prevent the others from being stopped."""
         failures: list[Exception] = []
-        for thing in list(self._keep.values()):
+        for resource in list(self._keep.values()):
             try:
-                thing.halt()
+                resource.halt()
             except Exception as error:
                 failures.append(error)
         if failures:
@@ -112,9 +112,9 @@ class CellRegistry:
     def close(self) -> None:
         """Ends all resources."""
         self._owned.clear()
-        for thing in reversed(list(self._keep.values())):
-            with suppress(Exception):  # The process ends: an error must not keep others open.
-                thing.close()
+        for resource in reversed(list(self._keep.values())):
+            with suppress(Exception):  # The process ends: an error must not prevent the rest from being closed.
+                resource.close()
 
     def _current(self) -> str | None:
         parent = self._shell.get_parent() if hasattr(self._shell, "get_parent") else {}
@@ -151,7 +151,7 @@ def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
     """Makes every interrupt of the kernel stop all motions, whatever its main thread does at that moment.
 
     ipykernel ignores an interrupt while it is idle, drops one that comes while it handles a widget's message, and does
-    not wake its event loop for one that is to cancel a cell which awaits. The interpreter informs a thread of each
+    not wake its event loop for one that is to cancel a cell which awaits. The interpreter reports each to a thread
     (`signal.set_wakeup_fd`), also while the main thread is inside a library.
     """
     kernel = getattr(shell, "kernel", None)

@@ -21,7 +21,7 @@ from rcilab.notebook.flight_recorder import record_html
 from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, esc, problem, soft, verdict, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 
 class FaultPanel(Part):
@@ -42,32 +42,34 @@ class FaultPanel(Part):
         self.demo: FaultDemo | None = None
         """The displayed fault; None before the first one."""
         self._faults = FaultTable(self.model)
-        self._failed = ""  # Why the last one failed.
-        self._now, self._shown_text, self._record = block(), block(), block()
+        self._failed = ""  # Why the last demo failed.
+        self._now, self._details, self._record = block(), block(), block()
         self._set: tuple[FaultCode, ...] | None = None
         self._arm = PrivateArm()
-        self._work: LongTask[FaultCode, FaultDemo] = LongTask(text, "rcilab-fault-lab", self._take, self._tell)
-        self.fault: Any = lean(
+        self._work: LongTask[FaultCode, FaultDemo] = LongTask(text, "rcilab-fault-lab", self._take, self._show_demo)
+        self.fault: Any = shared_style_widget(
             ipywidgets.Dropdown, description=text("fault.which"), layout={"width": "98%", "max_width": "46em"},
             options=[(_name(fault, text), fault) for fault in self.model.description.faults],
         )  # fmt: skip
         self.provoke = self._button("fault.provoke", self._provoke, icon="bolt", tooltip=text("fault.provoke_hint"))
         self.progress, self.cancel = self._work.progress, self._work.cancel
-        self.moment = self._button("learn.moment", self._look, icon="crosshairs", tooltip=text("learn.moment_hint"))
-        self._buttons = lean(
+        self.moment = self._button(
+            "learn.moment", self._go_to_fault, icon="crosshairs", tooltip=text("learn.moment_hint")
+        )
+        self._buttons = shared_style_widget(
             ipywidgets.HBox,
             [self.provoke, self.moment, self.progress, self.cancel],
             layout={"align_items": "center"},
         )
-        self.build([self._now, self.fault, self._buttons, self._shown_text, self._record], min_width="360px")
+        self.build([self._now, self.fault, self._buttons, self._details, self._record], min_width="360px")
         self.fault.observe(lambda _: self._on_fault(), names="value")
-        self._tell()
+        self._show_demo()
         self.subscribe("robot", self._show)
         self.subscribe("run", lambda: write(self._record, record_html(self.state, self.text)))
 
     def halt(self) -> None:
         """Cancels the provocation; the private arm is stopped meanwhile."""
-        self._work.give_up()
+        self._work.request_cancel()
 
     def end(self) -> None:
         """Ends the private controller."""
@@ -97,14 +99,14 @@ class FaultPanel(Part):
         if self._shown is None:
             self.state.display(None)
         self._failed = ""
-        self._tell()
+        self._show_demo()
 
-    def _look(self) -> None:
+    def _go_to_fault(self) -> None:
         """Shows the moment of the fault in scene, timeline and curves."""
         if self._shown is not None:
             self.state.display(display_fault(self._shown))
 
-    def _tell(self) -> None:
+    def _show_demo(self) -> None:
         fault: FaultCode | None = self.fault.value  # None: an arm of no maker has no faults.
         text, demo = self.text, self._shown
         sentence = self._failed
@@ -118,7 +120,7 @@ class FaultPanel(Part):
             details = ("" if fault is None else _card_html(fault, text)) + soft(
                 text("fault.private") if obstacle is None else text.render(obstacle)
             )
-        write(self._shown_text, sentence + details)
+        write(self._details, sentence + details)
         self.provoke.disabled = obstacle is not None or self._work.is_busy
 
     def _provoke(self) -> None:
@@ -126,7 +128,7 @@ class FaultPanel(Part):
         self.demo, self._failed = None, ""
         self.state.display(None)
         self._work.start(fault, partial(self._arm.provoke, fault, self.model.name))
-        self._tell()
+        self._show_demo()
 
     def _take(self, fault: FaultCode, found: FaultDemo | RcilabError) -> None:
         if isinstance(found, RcilabError):
@@ -134,11 +136,11 @@ class FaultPanel(Part):
             return
         self.demo = found
         self.fault.value = found.fault
-        self._look()
+        self._go_to_fault()
 
     def _button(self, code: str, act: Any, *, icon: str, tooltip: str = "") -> Any:
         sentence = self.text(code)
-        button = lean(
+        button = shared_style_widget(
             ipywidgets.Button,
             description=sentence,
             tooltip=tooltip or sentence,

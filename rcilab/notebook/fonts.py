@@ -1,4 +1,4 @@
-"""Fonts of matplotlib figures: its own have no Chinese characters."""
+"""Fonts of matplotlib figures: those of matplotlib have no Chinese characters."""
 
 from __future__ import annotations
 
@@ -24,12 +24,11 @@ _CHINESE = (
 
 
 @contextmanager
-def writing(language: Language) -> Iterator[Language]:
-    """Selects fonts that contain the characters of a language, for text that is created inside.
+def select_font(language: Language) -> Iterator[Language]:
+    """Selects fonts that contain the characters of a language, for text that is created inside the context.
 
     Yields:
-        The language to use: English if there is no font for Chinese, as rows of empty boxes do not help a
-        reader.
+        The language to use: English if no font with Chinese characters is installed.
     """
     family = chinese_font() if language == "zh" else None
     if family is None:
@@ -37,7 +36,9 @@ def writing(language: Language) -> Iterator[Language]:
         return
     from matplotlib import rc_context, rcParams
 
-    with rc_context({"font.family": [*rcParams["font.family"], family]}):  # The usual font for all characters it has.
+    with rc_context(
+        {"font.family": [*rcParams["font.family"], family]}
+    ):  # The usual font is used for all characters that it has.
         yield "zh"
 
 

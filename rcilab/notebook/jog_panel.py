@@ -16,7 +16,7 @@ from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.style import block, verdict, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _STEP_DEG = 0.5
 _BUTTONS: dict[PoseName, str] = {"home": "home", "zero": "zero", "here": "arm", "undo": "undo"}
@@ -48,7 +48,7 @@ class JogPanel(Part):
         here: list[float] = np.degrees(self.state.now.goal.q).tolist()
         names = [self.text("jog.joint", joint=j + 1) for j in range(self.model.n)]
         self.sliders = [
-            lean(
+            shared_style_widget(
                 ipywidgets.FloatSlider, value=here[j], tooltip=names[j], min=float(low[j]), max=float(high[j]),
                 step=_STEP_DEG, readout=False, continuous_update=continuous,
                 layout={"flex": "1 1 auto", "width": "auto", "min_width": "150px"},
@@ -57,7 +57,7 @@ class JogPanel(Part):
         ]  # fmt: skip
         self.fields = [
             NumberField(
-                self.text, "", "deg", round(float(low[j]), 6), round(float(high[j]), 6), self._taker(j), digits=2,
+                self.text, "", "deg", round(float(low[j]), 6), round(float(high[j]), 6), self._setter(j), digits=2,
                 of=names[j], value=here[j],
             )
             for j in range(self.model.n)
@@ -69,7 +69,7 @@ class JogPanel(Part):
             rows += [_row(slider, field), field.sentence]
         buttons = [self._button(name) for name in _BUTTONS]
         self._pose, self._reach = block(), block()
-        self.build([*rows, lean(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
+        self.build([*rows, shared_style_widget(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")
         self.subscribe("goal", self._show)
 
     @property
@@ -88,7 +88,7 @@ class JogPanel(Part):
             shown = np.degrees(state.now.goal.q).tolist()
             for slider, echo, field, angle in zip(self.sliders, self._echoes, self.fields, shown, strict=True):
                 if abs(slider.value - angle) > 1e-9:
-                    echo.give(angle)
+                    echo.register(angle)
                     slider.value = angle
                 field.show(angle)
         finally:
@@ -112,10 +112,10 @@ class JogPanel(Part):
 
     def _on_slider(self, change: Any) -> None:
         joint = self.sliders.index(change["owner"])
-        if not self._writing and self._echoes[joint].is_hand(change["new"]):
+        if not self._writing and self._echoes[joint].is_drag(change["new"]):
             self._move(joint, math.radians(change["new"]))
 
-    def _taker(self, joint: int) -> Any:
+    def _setter(self, joint: int) -> Any:
         return lambda degrees: self._move(joint, math.radians(degrees))
 
     def _move(self, joint: int, angle: float) -> None:
@@ -125,7 +125,7 @@ class JogPanel(Part):
         self.state.ask(PoseGoal(name=name))
 
     def _button(self, name: PoseName) -> Any:
-        button = lean(
+        button = shared_style_widget(
             ipywidgets.Button,
             description=self.text(f"jog.{_BUTTONS[name]}"),
             tooltip=self.text(f"jog.{_BUTTONS[name]}_hint"),
@@ -140,4 +140,6 @@ def _row(slider: Any, field: NumberField) -> Any:
     low, high = (f"<span>{end:.0f}°</span>" for end in (slider.min, slider.max))
     before = block(f'<div class="rl-ends"><span>{slider.tooltip}</span>{low}</div>', width="8em", flex="0 0 auto")
     behind = block(high, width="2.6em", flex="0 0 auto")
-    return lean(ipywidgets.HBox, [before, slider, behind, field.box, field.unit], layout={"align_items": "center"})
+    return shared_style_widget(
+        ipywidgets.HBox, [before, slider, behind, field.box, field.unit], layout={"align_items": "center"}
+    )

@@ -1,13 +1,13 @@
-"""Where the browser runs, as far as the kernel can know: whether it can show a page of the kernel in a frame.
+"""Whether the browser can show a page of the kernel in a frame, from what the kernel knows of where the browser runs.
 
-The rule; the first line that applies:
+The rule; the first line that applies counts:
 
-    1  Colab                                                            static: its frames reach no port of the kernel
+    1  Colab                                                            static: its frames cannot reach the kernel
     2  VS Code in a browser (code-server), which names port addresses   proxy, at the address that it names
     3  VS Code with a kernel elsewhere: over ssh, in a container, ...,  static
        or of a notebook server as in 4, whose paths VS Code's page lacks
     4  a hub, a server that listens beyond loopback, a server below a   proxy where jupyter-server-proxy is installed,
-       path of its own (so there is something in front), or ssh         static otherwise
+       path other than / (so behind a proxy), or ssh                    static otherwise
     5  otherwise the browser is on this machine                         loopback
 
 The front end is known from the running cell: VS Code's cells have a special address. If no cell runs, VS Code is
@@ -27,26 +27,26 @@ from typing import Any, Literal
 
 from rcilab.i18n.notebook_language import shell
 
-Way = Literal["loopback", "proxy", "static"]
+Route = Literal["loopback", "proxy", "static"]
 _LOOPBACK = ("127.0.0.1", "localhost", "::1", "")
 _CODE_CELL = "vscode-"  # Prefix of the addresses of its cells.
-_CODE_SERVER = "CODE_SERVER_PARENT_PID"  # Others that name port addresses need a login that VS Code's page lacks.
+_CODE_SERVER = "CODE_SERVER_PARENT_PID"  # Other servers with port addresses need a login that VS Code's page lacks.
 _CODE_PORTS, _PORT = "VSCODE_PROXY_URI", "{{port}}"
-_CODE_ELSEWHERE = ("SSH_CONNECTION", "REMOTE_CONTAINERS", "CODESPACES")
+_CODE_REMOTE_SIGNS = ("SSH_CONNECTION", "REMOTE_CONTAINERS", "CODESPACES")
 _CODE_REMOTE = "VSCODE_IPC_HOOK_CLI"  # Its kernels have it if VS Code's backend is that of a server.
-_CODE_SAME = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
+_CODE_WSL = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KernelReachability:
     """How the browser reaches a page that the kernel serves on loopback."""
 
-    way: Way
+    way: Route
     """loopback: by its own address; proxy: through the notebook server; static: not at all."""
     base: str = "/"
     """Path of the notebook server, with slashes at both ends."""
     ports: str = ""
-    """Address at which code-server shows the ports of its machine, with {{port}} for the number; empty without one."""
+    """Address at which code-server serves the ports of its machine, with {{port}} for the number; empty without one."""
     proxy_helps: bool = True
     """Whether jupyter-server-proxy on the notebook server would turn static into live."""
 
@@ -72,7 +72,7 @@ class Server:
     base: str
 
 
-def find_place(
+def find_reachability(
     environment: Mapping[str, str] | None = None,
     server: Server | None = None,
     has_proxy: bool | None = None,
@@ -92,10 +92,12 @@ def find_place(
     found = _find_server(known) if server is None else server
     hub = known.get("JUPYTERHUB_SERVICE_PREFIX")
     base = hub or (found.base if found is not None else "/")
-    is_far = "SSH_CONNECTION" in known
-    is_proxied = hub is not None or (found is not None and (found.hostname not in _LOOPBACK or base != "/" or is_far))
+    is_over_ssh = "SSH_CONNECTION" in known
+    is_proxied = hub is not None or (
+        found is not None and (found.hostname not in _LOOPBACK or base != "/" or is_over_ssh)
+    )
     if _is_code(known, found, _find_cell() if cell is None else cell):
-        return _find_code_place(known, is_proxied)
+        return _find_code_reachability(known, is_proxied)
     if is_proxied:
         installed = find_spec("jupyter_server_proxy") is not None if has_proxy is None else has_proxy
         return KernelReachability(way="proxy" if installed else "static", base=base)
@@ -109,12 +111,12 @@ def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) 
     return server is None and any(name.startswith("VSCODE_") for name in known)
 
 
-def _find_code_place(known: Mapping[str, str], is_proxied: bool) -> KernelReachability:
+def _find_code_reachability(known: Mapping[str, str], is_proxied: bool) -> KernelReachability:
     ports = known.get(_CODE_PORTS, "")
     if _CODE_SERVER in known and _PORT in ports:
         return KernelReachability(way="proxy", ports=ports)
-    is_remote = _CODE_REMOTE in known and _CODE_SAME not in known
-    is_elsewhere = is_proxied or is_remote or any(name in known for name in _CODE_ELSEWHERE)
+    is_remote = _CODE_REMOTE in known and _CODE_WSL not in known
+    is_elsewhere = is_proxied or is_remote or any(name in known for name in _CODE_REMOTE_SIGNS)
     return KernelReachability(way="static", proxy_helps=False) if is_elsewhere else KernelReachability(way="loopback")
 
 

@@ -23,7 +23,7 @@ def lab_command(
     Args:
         directory: Directory of the notebooks.
         port: TCP port; None takes Jupyter's default, 8888 or the next free one.
-        browser: Whether to open a browser, too.
+        browser: Whether to open a browser.
         allow_root: Whether root may run it, as in a container; Jupyter refuses otherwise.
 
     A directory with a page `index.md` is opened on that page.
@@ -49,7 +49,7 @@ def lab_command(
 
 
 def _workspaces(directory: Path) -> Path:
-    """Returns the workspace of a directory; with a shared one, JupyterLab would open its tabs in every other one."""
+    """Returns the workspace of a directory; a shared one would show its tabs in every other directory."""
     from jupyter_core.paths import jupyter_config_dir
 
     digest = sha256(str(directory.resolve()).encode()).hexdigest()[:8]
@@ -73,10 +73,10 @@ def require_lab(*, allow_root: bool = False) -> None:
 def lab_environment(environment: Mapping[str, str]) -> dict[str, str]:
     """Returns the environment of JupyterLab: our defaults below the user's own settings.
 
-    Without them it asks at the first start whether it may fetch news.
+    Without our defaults it asks at the first start whether it may fetch news.
 
     Args:
-        environment: Of this process.
+        environment: Environment of this process.
     """
     ours = str(Path(__file__).parent / "assets" / "jupyter")
     others = environment.get(_CONFIG_PATH)

@@ -13,12 +13,12 @@ from rcilab.notebook.jog_panel import JogPanel
 from rcilab.notebook.kernel_reachability import KernelReachability
 from rcilab.notebook.motion_plot import MotionPlot
 from rcilab.notebook.part import Part
-from rcilab.notebook.robot_words import name_phase
 from rcilab.notebook.scene import Scene, View
+from rcilab.notebook.status_texts import name_phase
 from rcilab.notebook.style import PHASE_TONES, Tone, block, esc, write
-from rcilab.notebook.subshell_routing import hear_at_once
+from rcilab.notebook.subshell_routing import handle_during_cells
 from rcilab.notebook.timeline import Timeline
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 if TYPE_CHECKING:
     from rcilab.notebook.fault_panel import FaultPanel
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from rcilab.notebook.target_panel import TargetPanel
 
 _FRAME = 20  # [px] By which a tab's frame is higher than the timeline below the scene.
-_LOWEST_TAB = 420  # [px] Minimum height of the tabs next to a small scene.
+_MIN_TAB_HEIGHT = 420  # [px] Minimum height of the tabs next to a small scene.
 _TABS = {"jog": "jog", "target": "target", "plan": "plan", "check": "report", "run": "run", "faults": "faults"}
 """Text key of each tab, and the attribute with its part."""
 
 
 class Lab(Part):
-    """Everything in one cell; Stop is always visible.
+    """All parts in one cell; Stop is always visible.
 
     The parts are attributes (`lab.jog`, `lab.plan`, `lab.run`, ...), so that a cell can set what a click can. The part
     of a tab is created when the tab is opened, or the attribute is read: the cell does not wait for hidden tabs.
@@ -67,36 +67,38 @@ class Lab(Part):
         self.plot = MotionPlot(self)
         self.jog = JogPanel(self)
         self._parts: list[Part] = [self.scene, self.timeline, self.plot, self.jog]
-        # Not higher than the scene with its timeline: what is below keeps its place from tab to tab.
-        tab = {"max_height": f"{max(height - _FRAME, _LOWEST_TAB)}px", "overflow": "hidden auto"}
-        self._places: dict[str, Any] = {
-            name: lean(ipywidgets.VBox, layout=tab, classes=("rl-tab",)) for name in _TABS.values()
+        # Not higher than the scene with its timeline: what is below stays in place from tab to tab.
+        tab = {"max_height": f"{max(height - _FRAME, _MIN_TAB_HEIGHT)}px", "overflow": "hidden auto"}
+        self._tab_boxes: dict[str, Any] = {
+            name: shared_style_widget(ipywidgets.VBox, layout=tab, classes=("rl-tab",)) for name in _TABS.values()
         }
-        self._places["jog"].children = (self.jog.widget,)
-        self.tabs: Any = lean(
+        self._tab_boxes["jog"].children = (self.jog.widget,)
+        self.tabs: Any = shared_style_widget(
             ipywidgets.Tab,
-            children=list(self._places.values()),
+            children=list(self._tab_boxes.values()),
             titles=[text(f"tab.{name}") for name in _TABS],
             selected_index=0,
             layout={"flex": "1 1 410px", "min_width": "400px"},
         )
         self.tabs.observe(self._on_tab, names="selected_index")
-        self.stop = lean(
+        self.stop = shared_style_widget(
             ipywidgets.Button, description=text("run.stop"), tooltip=text("run.stop_hint"), button_style="danger",
             icon="stop", classes=("rl-stop",), layout={"width": "8em", "flex": "0 0 auto"},
         )  # fmt: skip
-        hear_at_once(self.stop)
+        handle_during_cells(self.stop)
         self.stop.on_click(lambda _: self.halt())
         self._title = block(flex="1 1 auto")
-        bar = lean(ipywidgets.HBox, [self._title, self.stop], layout={"align_items": "center"})
-        left = lean(
+        bar = shared_style_widget(ipywidgets.HBox, [self._title, self.stop], layout={"align_items": "center"})
+        left = shared_style_widget(
             ipywidgets.VBox,
             [self.scene.widget, self.timeline.widget],
             layout={"flex": "1.4 1 360px", "min_width": "350px"},
         )
-        body = lean(ipywidgets.HBox, [left, self.tabs], layout={"flex_flow": "row wrap", "grid_gap": "10px"})
+        body = shared_style_widget(
+            ipywidgets.HBox, [left, self.tabs], layout={"flex_flow": "row wrap", "grid_gap": "10px"}
+        )
         self.build([bar, body, self.plot.widget], width="100%")
-        self._ends.append(self.state.subscribe("plan", self._show))
+        self._cleanups.append(self.state.subscribe("plan", self._show))
         self.subscribe("robot", self._show)
         if self.state.session is not None:
             self._open("run")  # It connects to the robot of a session.
@@ -140,7 +142,7 @@ class Lab(Part):
             raise UsageError(f"this lab was closed, and {name} with it: run its cell again")
         part = getattr(import_module("rcilab.notebook"), kind)(self)
         self._parts.append(part)
-        self._places[name].children = (part.widget,)
+        self._tab_boxes[name].children = (part.widget,)
         return part
 
     def _on_tab(self, change: Any) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from rcilab.i18n.locale import Language
 from rcilab.i18n.notebook_language import language
+from rcilab.i18n.translator import Text
 
 __all__ = ["answer", "language"]
-
-_WORDS: dict[Language, tuple[str, str]] = {"en": ("not yet", "right"), "zh": ("还没有", "正确")}
 
 
 def answer(is_right: bool, fact: str) -> None:
@@ -17,5 +15,5 @@ def answer(is_right: bool, fact: str) -> None:
         is_right: Whether it is solved.
         fact: The result, in symbols and units, which need no translation: "T = 1.952 s".
     """
-    word = _WORDS[language()][bool(is_right)]
-    print(f"{'✓' if is_right else '✗'} {word}: {fact}")
+    verdict = Text(language(), "rcilab.notebook")("exercise.right" if is_right else "exercise.wrong")
+    print(f"{'✓' if is_right else '✗'} {verdict}: {fact}")

@@ -28,13 +28,13 @@ class CopiedLessons:
     """Folder of the copies."""
     written: tuple[str, ...]
     """Files that are new, or newer versions of unedited copies."""
-    beside: tuple[str, ...]
+    new_versions: tuple[str, ...]
     """Newer versions of copies that had been edited, under new names."""
 
     def __str__(self) -> str:
         text = f"lessons: your copies are in {self.folder}"
-        if self.beside:
-            text += f"; newer versions beside those that you have edited: {', '.join(self.beside)}"
+        if self.new_versions:
+            text += f"; newer versions next to those that you have edited: {', '.join(self.new_versions)}"
         return text
 
 
@@ -49,7 +49,8 @@ def find_lessons() -> Path:
         if (folder / INDEX).is_file():
             return folder
     raise UsageError(
-        f"there are no lessons beside {package}: install rcilab again, or name a folder of notebooks, rcilab lab FOLDER"
+        f"there are no lessons next to {package}: "
+        "install rcilab again, or name a folder of notebooks, rcilab lab FOLDER"
     )
 
 
@@ -65,38 +66,38 @@ def copy_lessons(folder: Path, source: Path | None = None) -> CopiedLessons:
     """
     source = find_lessons() if source is None else source
     try:
-        given = _read_record(folder)
+        recorded = _read_record(folder)
         written: list[str] = []
-        beside: list[str] = []
+        new_versions: list[str] = []
         for lesson in sorted([*source.glob("*.ipynb"), source / INDEX]):
             text = lesson.read_text(encoding="utf-8")
-            name = _place(folder, lesson.name, text, given)
+            name = _choose_name(folder, lesson.name, text, recorded)
             if name is not None:
                 write_atomic(folder / name, text)
-                given[name] = _digest(text)
-                (written if name == lesson.name else beside).append(name)
-        write_atomic(folder / _RECORD, json.dumps(given, indent=1, sort_keys=True))
+                recorded[name] = _digest(text)
+                (written if name == lesson.name else new_versions).append(name)
+        write_atomic(folder / _RECORD, json.dumps(recorded, indent=1, sort_keys=True))
     except OSError as error:
         raise UsageError(
             f"the lessons cannot be copied into {folder}: {error.strerror}; name a folder that you may write to"
         ) from error
-    return CopiedLessons(folder=folder, written=tuple(written), beside=tuple(beside))
+    return CopiedLessons(folder=folder, written=tuple(written), new_versions=tuple(new_versions))
 
 
-def _place(folder: Path, name: str, text: str, given: dict[str, str]) -> str | None:
+def _choose_name(folder: Path, name: str, text: str, recorded: dict[str, str]) -> str | None:
     """Returns the file name for a lesson, or None if it has been copied already."""
     digest = _digest(text)
     for candidate in _names(name):
         file = folder / candidate
         if not file.exists():
-            was_declined = candidate != name and given.get(candidate) == digest  # Copied once, and deleted.
+            was_declined = candidate != name and recorded.get(candidate) == digest  # Copied once, and deleted.
             return None if was_declined else candidate
         found = _digest(_read_copy(file))
-        if digest in (found, given.get(candidate)):
+        if digest in (found, recorded.get(candidate)):
             return None
-        if found == given.get(candidate):
+        if found == recorded.get(candidate):
             return candidate
-    raise AssertionError("the names have no end")
+    raise AssertionError("unreachable: the names are endless")
 
 
 def _read_copy(file: Path) -> str:

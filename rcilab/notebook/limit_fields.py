@@ -22,7 +22,7 @@ from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.signal_fields import SendRequest
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, verdict, why_html, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 from rcilab.robots import describe_robot
 
 _WIDTHS = ("9.2em", "3.4em", "2.6em")  # With both ends of a joint in one row.
@@ -47,32 +47,37 @@ class LimitFields:
         """Lower and upper end of every joint, once the group was opened."""
         self._typed: list[list[float]] = []  # Lower ends and upper ends, [rad].
         self._shown: JointLimits | None = None
-        self._asked: SoftJointLimits | None = None
+        self._pending: SoftJointLimits | None = None
         self._writing = False
         self.send = button("softlimits.send", lambda: self._propose(*self._typed))
         self.whole = button("softlimits.whole", self._propose_whole)
-        self.yes = button("softlimits.confirm", self._give, style="danger")
-        self.no = button("run.cancel", self._forget)
-        self.auto: Any = lean(
+        self.yes = button("softlimits.confirm", self._send_limits, style="danger")
+        self.no = button("run.cancel", self._cancel_question)
+        self.auto: Any = shared_style_widget(
             ipywidgets.Checkbox, value=False, indent=False, description=text("softlimits.auto"),
             tooltip=text("softlimits.auto_hint"), layout={"width": "auto"},
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
-        self._inside: Any = lean(ipywidgets.VBox, [])
+        self._inside: Any = shared_style_widget(ipywidgets.VBox, [])
         self.sentence, self._missing = block(), block()
-        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        self._answers = shared_style_widget(
+            ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
+        )
         rows = [
             block(soft(text("softlimits.hint"))),
             self._missing,
             self._inside,
-            lean(ipywidgets.HBox, [self.send, self.whole]),
+            shared_style_widget(ipywidgets.HBox, [self.send, self.whole]),
             self.sentence,
             self._answers,
             self.auto,
             block(soft(text("softlimits.note"))),
         ]
-        self.folder: Any = lean(
-            ipywidgets.Accordion, [lean(ipywidgets.VBox, rows)], titles=(text("softlimits.title"),), selected_index=None
+        self.folder: Any = shared_style_widget(
+            ipywidgets.Accordion,
+            [shared_style_widget(ipywidgets.VBox, rows)],
+            titles=(text("softlimits.title"),),
+            selected_index=None,
         )
         self.folder.observe(self._on_open, names="selected_index")
 
@@ -86,12 +91,12 @@ class LimitFields:
         self.send.disabled = not is_ready or not self.fields
         self.whole.disabled = not is_ready
         if not is_ready:
-            self._forget()
+            self._cancel_question()
         now = self._state.now
         is_virtual = self._state.robot is not None and now.is_virtual
         self.auto.disabled = not is_ready or not is_virtual
         self._writing = True
-        # A group that was never opened needs no status of the controller.
+        # A group that was never opened shows no status of the controller.
         self.auto.value = bool(self.fields) and is_virtual and now.world.auto_limit
         self._writing = False
         limits = self._state.model.limits.joint
@@ -100,7 +105,7 @@ class LimitFields:
 
     def take(self, error: RcilabError | None) -> None:
         """Takes the answer: model, plan and checks use the limits that a controller has accepted."""
-        asked, self._asked = self._asked, None
+        asked, self._pending = self._pending, None
         if error is None and asked is not None:
             self._state.limit_joints(asked.lower, asked.upper)
             write(self.sentence, soft(self._text("softlimits.taken")))
@@ -110,10 +115,10 @@ class LimitFields:
         if isinstance(joints, Message):
             write(self.sentence, problem(self._text.render(joints)))
             return
-        self._asked = joints
+        self._pending = joints
         now = self._state.now
         if now.is_virtual:
-            self._give()
+            self._send_limits()
             return
         write(self.sentence, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
         self._answers.layout.display = None
@@ -122,16 +127,16 @@ class LimitFields:
         own = describe_robot(self._state.model.name).limits.joint
         self._propose(own.lower.tolist(), own.upper.tolist())
 
-    def _give(self) -> None:
+    def _send_limits(self) -> None:
         self._answers.layout.display = "none"
         write(self.sentence, "")
-        asked = self._asked
+        asked = self._pending
         if asked is not None:
             self._send("limits", lambda robot: robot.configure(RobotConfiguration(joints=asked)))
 
-    def _forget(self) -> None:
+    def _cancel_question(self) -> None:
         if self._answers.layout.display is None:
-            self._asked = None
+            self._pending = None
             self._answers.layout.display = "none"
             write(self.sentence, "")
 
@@ -149,7 +154,7 @@ class LimitFields:
         for joint, (least, largest) in enumerate(zip(np.degrees(own.lower), np.degrees(own.upper), strict=True)):
             low, high = self._field("lower", joint, least, largest), self._field("upper", joint, least, largest)
             self.fields.append((low, high))
-            rows += [lean(ipywidgets.HBox, [*low.cells, *high.cells]), low.sentence, high.sentence]
+            rows += [shared_style_widget(ipywidgets.HBox, [*low.cells, *high.cells]), low.sentence, high.sentence]
         self._fill(self._state.model.limits.joint)
         self._inside.children = tuple(rows)
         self.show(self._state.status)

@@ -1,4 +1,4 @@
-"""The choice of the mode, and the parameters that have an effect in it, each with its unit and range."""
+"""The control mode, and the parameters that have an effect in it, each with its unit and range."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rcilab.makers.parameters import ParameterGroup
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, esc, head, problem, soft, table, verdict, why_html, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _WIDTHS = ("8em", "3.4em", "4.2em")  # With two fields in one row inside `Lab`.
 
@@ -36,25 +36,25 @@ class ModeFields:
     def __init__(self, state: LabState, text: Text, modes: ModeActions) -> None:
         self._state, self._text, self._modes = state, text, modes
         self._groups = parameters_of(state.model)
-        self.mode: Any = lean(
+        self.mode: Any = shared_style_widget(
             ipywidgets.Dropdown, description=text("mode.choose"),
             options=[(text(f"mode.{mode}"), mode) for mode in MODES],
             value=state.now.drive.mode, tooltip=text("mode.hint"), layout={"width": "24em"},
         )  # fmt: skip
-        self._note, self._missing, self._held, self._said = block(), block(), block(), block()
+        self._note, self._missing, self._held, self._sentence = block(), block(), block(), block()
         self.fields: dict[str, list[NumberField]] = {}
         """Fields by group, of the groups that were opened."""
         self.folders: dict[str, Any] = {group.name: self._folder(group) for group in self._groups}
         self.send = self._button("control.send", self._on_send)
         self.reset = self._button("control.reset", partial(self._ask, PressControl(what="reset")))
         self._shown: ControllerParameters | None = None
-        self.choice = lean(ipywidgets.VBox, [self.mode, self._note])
-        self.parameters = lean(ipywidgets.VBox, [
+        self.choice = shared_style_widget(ipywidgets.VBox, [self.mode, self._note])
+        self.parameters = shared_style_widget(ipywidgets.VBox, [
             block(head(text("control.title"))),
             self._missing,
             *self.folders.values(),
-            lean(ipywidgets.HBox, [self.send, self.reset]),
-            self._said,
+            shared_style_widget(ipywidgets.HBox, [self.send, self.reset]),
+            self._sentence,
             self._held,
         ])  # fmt: skip
         self.mode.observe(self._on_mode, names="value")
@@ -102,7 +102,7 @@ class ModeFields:
         self._ask(PressControl(what="send"))
         notice = self._state.now.notice
         write(
-            self._said,
+            self._sentence,
             "" if notice is None or notice is before else verdict("warn", "▲", self._text.render(notice.text)),
         )
 
@@ -116,22 +116,25 @@ class ModeFields:
 
     def _folder(self, group: ParameterGroup) -> Any:
         """Returns a group whose fields are created when it is opened: forty of them would delay the cell."""
-        inside = lean(ipywidgets.Box, layout={"flex_flow": "row wrap"})
-        folder = lean(
+        inside = shared_style_widget(ipywidgets.Box, layout={"flex_flow": "row wrap"})
+        folder = shared_style_widget(
             ipywidgets.Accordion, children=[inside], titles=(name_group(self._text, group),),
             selected_index=None,
             layout=ipywidgets.Layout(display="none"),
         )  # fmt: skip
 
-        def open_it(change: Any) -> None:
+        def on_open(change: Any) -> None:
             if change["new"] == 0 and group.name not in self.fields:
                 fields = self.fields[group.name] = [self._field(group, index) for index in range(len(group.parameters))]
                 self._fill(group)
                 inside.children = tuple(
-                    lean(ipywidgets.VBox, [lean(ipywidgets.HBox, field.cells), field.sentence]) for field in fields
+                    shared_style_widget(
+                        ipywidgets.VBox, [shared_style_widget(ipywidgets.HBox, field.cells), field.sentence]
+                    )
+                    for field in fields
                 )
 
-        folder.observe(open_it, names="selected_index")
+        folder.observe(on_open, names="selected_index")
         return folder
 
     def _field(self, group: ParameterGroup, index: int) -> NumberField:
@@ -146,7 +149,7 @@ class ModeFields:
             field.show(number)
 
     def _button(self, code: str, act: Any) -> Any:
-        button = lean(
+        button = shared_style_widget(
             ipywidgets.Button,
             description=self._text(code),
             tooltip=self._text(f"{code}_hint"),

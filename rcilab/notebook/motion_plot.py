@@ -12,7 +12,7 @@ from rcilab.i18n.plot_scale import plot_scale
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, soft, write
 from rcilab.notebook.svg_plot import Panel, draw, share_of
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 from rcilab.recording.run import Run
 from rcilab.views.plots import (
     QUANTITIES,
@@ -31,7 +31,7 @@ _UNITS: dict[Quantity, str] = {"q": "deg", "dq": "deg/s", "ddq": "deg/s²", "jer
 
 
 class MotionPlot(Part):
-    """Position, velocity, acceleration and jerk of the plan, thinned out without losing any extreme value.
+    """Position, velocity, acceleration and jerk of the plan; every interval shows its smallest and largest value.
 
     The area beyond a limit is grey; a violation of the plan is shaded red. After an execution the plan is dashed over
     the run, with the difference below. The cursor is at the time of `Timeline`.
@@ -54,7 +54,7 @@ class MotionPlot(Part):
         super().__init__(subject, language)
         self._quantities = quantities
         names = [self.text("timeline.all"), *(self.text("jog.joint", joint=j + 1) for j in range(self.model.n))]
-        self.joint: Any = lean(
+        self.joint: Any = shared_style_widget(
             ipywidgets.Dropdown,
             description=self.text("timeline.joint"),
             options=[(name, number) for number, name in enumerate(names)],
@@ -65,12 +65,12 @@ class MotionPlot(Part):
         self._curves, self._cursor = block(), block()
         self._end = 1.0
         self._name = f"rl-plot-{id(self)}"
-        bar = lean(ipywidgets.HBox, [self.joint, self._kinds], layout={"align_items": "center"})
+        bar = shared_style_widget(ipywidgets.HBox, [self.joint, self._kinds], layout={"align_items": "center"})
         self.build([bar, self._curves, self._cursor], self._name, width="100%")
         self.joint.observe(lambda _: self._draw(), names="value")
-        self._ends.append(self.state.subscribe("run", self._draw))
+        self._cleanups.append(self.state.subscribe("run", self._draw))
         self.subscribe("plan", self._draw)
-        self.subscribe("moment", self._point)
+        self.subscribe("moment", self._move_cursor)
 
     @property
     def html(self) -> str:
@@ -79,13 +79,13 @@ class MotionPlot(Part):
 
     def _draw(self) -> None:
         state = self.state
-        plan = None if state.seen is None else state.seen.motion
+        plan = None if state.shown_plan is None else state.shown_plan.motion
         if plan is None:
             write(self._curves, soft(self.text("timeline.nothing")))
             write(self._kinds, "")
-            self._point()
+            self._move_cursor()
             return
-        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.seen_run
+        joint, limits, run = int(self.joint.value), self.model.limits.joint, state.shown_run
         is_paced = run is not None and run.has_speed_override
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
@@ -106,7 +106,7 @@ class MotionPlot(Part):
         delay = 0 if run is None else run.delay
         kinds = "plot.kinds" if run is None or not run.has_speed_override else "plot.kinds_paced"
         write(self._kinds, "" if run is None else soft(self.text(kinds, delay=delay)))
-        self._point()
+        self._move_cursor()
 
     def _error(self, run: Run, times: Any, last: float) -> Panel:
         joint = int(self.joint.value)
@@ -115,9 +115,9 @@ class MotionPlot(Part):
         frame = build_error_frame(times, chosen, last, plot_scale("error").least, _BUCKETS)
         return Panel(title=self.text("plot.error"), unit="deg", frame=frame)
 
-    def _point(self) -> None:
+    def _move_cursor(self) -> None:
         moment = self.state.moment
-        if moment is None or self.state.seen is None:
+        if moment is None or self.state.shown_plan is None:
             write(self._cursor, "")
             return
         place = f"display:block;left:{100.0 * share_of(moment, self._end):.2f}%"

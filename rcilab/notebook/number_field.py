@@ -7,11 +7,11 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.i18n.number_parsing import parse_number
+from rcilab.i18n.number_parsing import format_short, parse_number
 from rcilab.i18n.rounding import format_fixed
 from rcilab.i18n.translator import Text
 from rcilab.notebook.style import block, problem, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _LABELLED, _BARE = ("9.5em", "4em", "2.6em"), ("5.2em", "", "2.6em")
 
@@ -27,7 +27,7 @@ class NumberField:
         high: Largest one.
         take: Called with a valid number.
         digits: Digits after the point; None: as many as needed.
-        of: Name of the number, if it stands in the field's row instead of before it.
+        of: Name of the number for the tooltip, if the field has no label.
         value: Initial number.
         widths: Widths of the field with its label, of the label, and of the unit.
     """
@@ -49,19 +49,19 @@ class NumberField:
         self._text, self._unit, self._low, self._high, self._take = text, unit, low, high, take
         self._digits = digits
         self._shown = self._write(value)
-        hint = text("field.hint", low=_short(low), high=_short(high), unit=unit)
+        hint = text("field.hint", low=format_short(low), high=format_short(high), unit=unit)
         box, before, behind = widths or (_LABELLED if label else _BARE)
-        self.box: Any = lean(
+        self.box: Any = shared_style_widget(
             ipywidgets.Text, value=self._shown, description=label, tooltip=f"{of}: {hint}" if of else hint,
             continuous_update=False, layout={"width": box}, style={"description_width": before},
         )  # fmt: skip
-        self.unit: Any = lean(ipywidgets.Label, unit, layout={"width": behind})
+        self.unit: Any = shared_style_widget(ipywidgets.Label, unit, layout={"width": behind})
         self.sentence: Any = block()
         self.box.observe(self._on_typed, names="value")
 
     @property
     def cells(self) -> list[Any]:
-        """The field and its unit, to stand in a row."""
+        """The field and its unit, for one row."""
         return [self.box, self.unit]
 
     @property
@@ -90,9 +90,5 @@ class NumberField:
             write(self.sentence, problem(self._text.render(parsed.problem)))
             return
         write(self.sentence, "")
-        self._shown = change["new"]  # This text was meant: a rounded number may follow.
+        self._shown = change["new"]  # The field shows the typed text until `show` replaces it by the rounded number.
         self._take(parsed.value)
-
-
-def _short(number: float) -> str:
-    return f"{number:.3f}".rstrip("0").rstrip(".")

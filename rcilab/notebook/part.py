@@ -1,4 +1,4 @@
-"""The base of every part of the lab: it shows a shared state, displays itself, and ends with its cell."""
+"""The base class of every part of the lab: it shows a shared state, displays itself, and is closed with its cell."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.cells import kernel_cells
 from rcilab.notebook.state import LabState, Topic, state_of
 from rcilab.notebook.style import close_tree, style_sheet
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _PACKAGE = "rcilab.notebook"
 
 
 class Part(Closeable):
-    """A part: displays itself as the last line of a cell, combines with others, ends when its cell runs again.
+    """A part: displays itself as the last line of a cell, combines with others, is closed when its cell runs again.
 
     Args:
         subject: A model, a session, or another part of the same arm.
@@ -35,7 +35,7 @@ class Part(Closeable):
         neighbour = subject.text.language if isinstance(subject, Part) else None
         self.text = Text(chosen_language(language, neighbour), _PACKAGE)
         self.state: LabState = state_of(subject)
-        self._ends: list[Callable[[], None]] = []
+        self._cleanups: list[Callable[[], None]] = []
         self._root: Any = None
         self._closed = False
         kernel_cells().adopt(self)
@@ -57,28 +57,30 @@ class Part(Closeable):
 
     @property
     def widget(self) -> Any:
-        """The ipywidgets widget, for boxes of your own."""
+        """The ipywidgets widget, for your own boxes."""
         return self._root
 
     def subscribe(self, topic: Topic, act: Callable[[], None]) -> None:
-        """Subscribes to a topic of the state until this part is closed; `act` is called once at once."""
-        self._ends.append(self.state.subscribe(topic, act))
+        """Subscribes to a topic of the state until this part is closed; `act` is also called immediately."""
+        self._cleanups.append(self.state.subscribe(topic, act))
         act()
 
     def build(self, children: Sequence[Any], *classes: str, **layout: str) -> None:
         """Takes the widgets of this part, one below the other."""
         own = ipywidgets.Layout(**layout)
-        self._root = lean(ipywidgets.VBox, [style_sheet(), *children], layout=own, classes=("rl-root", *classes))
+        self._root = shared_style_widget(
+            ipywidgets.VBox, [style_sheet(), *children], layout=own, classes=("rl-root", *classes)
+        )
 
     def halt(self) -> None:
         """Stops the motion that this part has started; most parts start none."""
 
     def close(self) -> None:
-        """Removes the part and ends what it started. May be called twice."""
+        """Removes the part and ends what it started; may be called twice."""
         if self._closed:
             return
         self._closed = True
-        for end in self._ends:
+        for end in self._cleanups:
             end()
         self.end()
         close_tree(self._root)

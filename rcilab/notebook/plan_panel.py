@@ -20,11 +20,11 @@ from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.notebook.state import WAYS
+from rcilab.notebook.state import PATH_TYPES
 from rcilab.notebook.style import block, problem, soft, verdict, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
-_UNSEEN = 0.3  # [s] Quicker plans, which most are, show no progress bar.
+_PROGRESS_DELAY = 0.3  # [s] Plans that take less, as most do, show no progress bar.
 
 
 class PlanPanel(Part):
@@ -39,51 +39,54 @@ class PlanPanel(Part):
         super().__init__(subject, language)
         state, text = self.state, self.text
         wide = {"width": "24em"}
-        self.way = lean(
-            ipywidgets.Dropdown, description=text("plan.way"), options=[(text(f"way.{way}"), way) for way in WAYS],
+        self.way = shared_style_widget(
+            ipywidgets.Dropdown, description=text("plan.way"),
+            options=[(text(f"way.{way}"), way) for way in PATH_TYPES],
             value=state.now.path_type,
             layout=wide,
         )  # fmt: skip
-        self.law = lean(
+        self.law = shared_style_widget(
             ipywidgets.Dropdown, description=text("target.law"), value=state.now.law,
             options=[(text(f"law.{law}"), law) for law in JOINT_LAWS],
             tooltip=text("target.law_hint"), layout=wide,
         )  # fmt: skip
-        self.speed = lean(
+        self.speed = shared_style_widget(
             ipywidgets.FloatSlider, description=text("target.speed"), min=100.0 * SLOWEST, max=100.0, step=1.0,
             value=100.0 * state.now.speed,
             readout=False, tooltip=text("target.speed_hint"), layout={"width": "19em"},
         )  # fmt: skip
         self._speed_field = NumberField(text, "", "%", 100.0 * SLOWEST, 100.0, self._set_speed)
-        self.plan = lean(
+        self.plan = shared_style_widget(
             ipywidgets.Button,
             description=text("target.plan"),
             icon="check",
             button_style="primary",
             tooltip=text("target.plan_hint"),
         )
-        self.slow_down = lean(
+        self.slow_down = shared_style_widget(
             ipywidgets.Button, description=text("plan.slow_down"), tooltip=text("plan.slow_down_hint"),
             layout=ipywidgets.Layout(width="auto", display="none"),
         )  # fmt: skip
-        self._said = block()
+        self._sentence = block()
         self._work: LongTask[Plan | None, Plan | Message | SlowDown] = LongTask(
-            text, "rcilab-plan", self._take, self._show, shown_after=_UNSEEN
+            text, "rcilab-plan", self._take, self._show, shown_after=_PROGRESS_DELAY
         )
         self.progress, self.cancel = self._work.progress, self._work.cancel
         self._slowed: tuple[Plan, SlowDown] | None = None  # Result of the last slow-down, with the plan it applies to.
         self.build([
             self.way,
-            lean(ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}),
+            shared_style_widget(
+                ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}
+            ),
             self._speed_field.sentence,
             self.law,
             block(soft(text("target.law_hint"))),
-            lean(
+            shared_style_widget(
                 ipywidgets.HBox,
                 [self.plan, self.slow_down, self.progress, self.cancel],
                 layout={"align_items": "center"},
             ),
-            self._said,
+            self._sentence,
         ], min_width="360px")  # fmt: skip
         self.way.observe(self._on_way, names="value")
         self.law.observe(self._on_law, names="value")
@@ -92,18 +95,18 @@ class PlanPanel(Part):
         self.plan.on_click(lambda _: self._make_plan())
         self.slow_down.on_click(lambda _: self._slow_down())
         self._speed_field.show(100.0 * state.now.speed)
-        self._ends.append(state.subscribe("goal", self._show))
+        self._cleanups.append(state.subscribe("goal", self._show))
         self.subscribe("plan", self._show)
 
     def _set_speed(self, percent: float) -> None:
         self.state.ask(SetSpeed(speed=percent / 100.0))
         if self.speed.value != percent:
-            self._echo.give(percent)
+            self._echo.register(percent)
             self.speed.value = percent
         self._speed_field.show(percent)
 
     def _on_speed(self, change: Any) -> None:
-        if self._echo.is_hand(change["new"]):
+        if self._echo.is_drag(change["new"]):
             self._set_speed(change["new"])
 
     def _on_way(self, change: Any) -> None:
@@ -114,7 +117,7 @@ class PlanPanel(Part):
 
     def halt(self) -> None:
         """Cancels the task in progress."""
-        self._work.give_up()
+        self._work.request_cancel()
 
     def end(self) -> None:
         """Ends the task in progress."""
@@ -155,7 +158,7 @@ class PlanPanel(Part):
         self.slow_down.layout.display = None if plan is not None and self._is_to_slow_down(plan) else "none"
         if plan is None:
             sentence = "" if state.now.no_plan is None else verdict("warn", "▲", text.render(state.now.no_plan))
-            write(self._said, sentence or soft(text("plan.none", button=text("target.plan"))))
+            write(self._sentence, sentence or soft(text("plan.none", button=text("target.plan"))))
             return
         report = plan.report
         tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
@@ -169,12 +172,12 @@ class PlanPanel(Part):
             sentence += " " + text("target.leads_short", short=text.render(plan.short))
         if not state.is_goal_of_plan and plan.short is None:
             sentence += " " + text("plan.moved")
-        write(self._said, verdict(tone, text(word), sentence) + self._describe_slowing(plan))
+        write(self._sentence, verdict(tone, text(word), sentence) + self._describe_slowing(plan))
 
     def _is_to_slow_down(self, plan: Plan) -> bool:
-        """Whether the plan violates a condition, or a recommendation that was not left over by a slow-down."""
-        is_rest = self._slowed is not None and self._slowed[0] is plan
-        return not plan.report.ok or (bool(plan.report.warnings) and not is_rest)
+        """Returns whether the plan violates a condition, or a recommendation and was not slowed down yet."""
+        is_slowed = self._slowed is not None and self._slowed[0] is plan
+        return not plan.report.ok or (bool(plan.report.warnings) and not is_slowed)
 
     def _describe_slowing(self, plan: Plan) -> str:
         if self._slowed is None or self._slowed[0] is not plan:

@@ -21,7 +21,7 @@ from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
-from rcilab.notebook.fonts import writing
+from rcilab.notebook.fonts import select_font
 from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.recording.run import Run
 from rcilab.views.plots import QUANTITIES, recorded_curves
@@ -38,7 +38,7 @@ BEYOND_LIMIT_COLOR = "#808080"
 
 _RESOLUTION = 110  # [dots an inch] Sharp in a notebook, small in a file.
 _HEADROOM = 1.12
-"""Share of the limit that a panel shows: all of it and a little more."""
+"""Range of a panel as a factor of the limit."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,8 +87,8 @@ def plot(
     motion, run = _motion_and_run(motion, run)
     require_model(model)
     indices = _joint_indices(joints, model.n)
-    with writing(chosen) as written:
-        return _draw(motion, model, run, indices, Text(written, "rcilab.notebook"))
+    with select_font(chosen) as shown_language:
+        return _draw(motion, model, run, indices, Text(shown_language, "rcilab.notebook"))
 
 
 def _draw(motion: Motion, model: RobotModel, run: Run | None, chosen: Sequence[int], text: Text) -> Figure:
@@ -233,7 +233,7 @@ def _motion_and_run(motion: object, run: object) -> tuple[Motion, Run | None]:
     if isinstance(motion, Run):
         return motion.plan or motion.commanded(), motion
     if run is not None and not isinstance(run, Run):
-        raise InvalidValueError("run", run, "is no run; execute returns one")
+        raise InvalidValueError("run", run, "is not a run; execute returns one")
     return require_motion(motion), run
 
 

@@ -20,7 +20,7 @@ from rcilab.i18n.notebook_language import chosen_language
 from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion
-from rcilab.notebook.kernel_reachability import find_place
+from rcilab.notebook.kernel_reachability import find_reachability
 from rcilab.robots.upright import upright_joints
 from rcilab.views.arm_view import ArmView
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 HEIGHT = 420  # [px]
 _RATE = 30  # [1/s] Keyframes; the viewer interpolates between them.
 _HOLD = 1.0  # [s] Pause at the goal before the motion starts again.
-_REPETITIONS = 1000  # Practically without end.
+_REPETITIONS = 1000  # Practically endless.
 _MIDDLE = (0.2, 0.0, 0.5)  # [m] Point that the camera turns about.
 _CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] From that point.
 
@@ -76,7 +76,7 @@ class Preview(Closeable):
         self._model = model
         self._height = height
         self._live = live
-        self._place = find_place()
+        self._place = find_reachability()
         self._arm = ArmView(self._scene, "arm", model, quality="fine" if live else "coarse")
         self._arm.show(pose)
         self._moving = False
@@ -188,7 +188,7 @@ def preview(
         InvalidValueError: The pose is not n finite numbers.
     """
     if live is None:
-        live = find_place().way != "static"
+        live = find_reachability().way != "static"
     return Preview(motion, model, live=live, height=height, language=language)
 
 

@@ -24,26 +24,26 @@ from rcilab.core.errors import SAFETY_STOP, PlanningError, RcilabError
 from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import parse_address
 from rcilab.makers.maker import require_driver
-from rcilab.notebook.browser_heartbeat import kernel_heart
-from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
+from rcilab.notebook.browser_heartbeat import kernel_heartbeat
+from rcilab.notebook.browser_watchdog import PAGE_GONE
 from rcilab.notebook.limit_fields import LimitFields
 from rcilab.notebook.mode_fields import ModeFields
 from rcilab.notebook.part import Part
-from rcilab.notebook.robot_words import describe_refusal, describe_trouble, health_html, name_phase, outcome_html
 from rcilab.notebook.signal_fields import SignalFields
 from rcilab.notebook.speed_fields import SpeedFields
 from rcilab.notebook.state import LabState
+from rcilab.notebook.status_texts import describe_refusal, describe_trouble, health_html, name_phase, outcome_html
 from rcilab.notebook.style import PHASE_TONES, block, problem, soft, verdict, write
-from rcilab.notebook.subshell_routing import hear_at_once
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.subshell_routing import handle_during_cells
+from rcilab.notebook.widget_sharing import shared_style_widget
 from rcilab.recording.run import Run
 
-_LOOK = 0.1  # [s] Between two reads of the robot's status.
+_POLL_INTERVAL = 0.1  # [s] Between two reads of the robot's status.
 _TARGETS = ("ideal", "mujoco", "address")
 
 
 class _Connection:
-    """The robot of a lab, with the interface that the application uses.
+    """The connection to the robot of a lab, with the interface that the application uses.
 
     Args:
         state: State of the lab.
@@ -53,7 +53,7 @@ class _Connection:
         self._state = state
 
     def status(self) -> SupervisorStatus:
-        """Returns its status; "closed" without a connection."""
+        """Returns the robot's status; "closed" without a connection."""
         return self._state.status or SupervisorStatus()
 
     def robot(self) -> Robot:
@@ -73,7 +73,7 @@ class _Connection:
 
 
 class RunPanel(Part):
-    """All controls that move a robot; no drag on it moves one.
+    """All controls that move a robot; a robot is moved by buttons only, not by sliders.
 
     With a model it connects to its own virtual controller, or to an address; a control process outside of the kernel
     runs the 1 kHz loop. With a session it uses that one. Modes and parameters are those of the page. A robot that is
@@ -88,15 +88,15 @@ class RunPanel(Part):
     def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
         text = self.text
-        self._heart = kernel_heart()
+        self._heartbeat = kernel_heartbeat()
         self._ending = threading.Event()
         self._watcher: threading.Thread | None = None
-        self.target = lean(
+        self.target = shared_style_widget(
             ipywidgets.Dropdown, description=text("run.robot"),
             options=[(text(f"robot.{name}"), name) for name in _TARGETS],
             layout={"width": "24em"},
         )  # fmt: skip
-        self.address = lean(
+        self.address = shared_style_widget(
             ipywidgets.Text, description=text("run.address"), placeholder="rci://192.168.0.160:1337",
             tooltip=text("run.address_hint"),
             layout=ipywidgets.Layout(width="24em", display="none"),
@@ -111,15 +111,15 @@ class RunPanel(Part):
         self.execute = self._button("run.execute", self._on_execute, icon="play", style="success")
         self.stop = self._button("run.stop", self.halt, icon="stop", style="danger")
         self.stop.add_class("rl-stop")
-        hear_at_once(self.stop)
+        handle_during_cells(self.stop)
         self.yes = self._button("run.confirm", self._move, style="danger")
         self.no = self._button("run.cancel", self._forget_question)
-        self.progress = lean(
+        self.progress = shared_style_widget(
             ipywidgets.FloatProgress, min=0.0, max=1.0, layout=ipywidgets.Layout(width="100%", visibility="hidden")
         )
-        self._said, self._where, self._plan, self._question = block(), block(), block(), block()
+        self._sentence, self._note, self._plan, self._question = block(), block(), block(), block()
         self._health, self._outcome = block(), block()
-        self._was_cells = False
+        self._was_cell_motion = False
         self._running = 0.0  # [s] Planned duration of the motion in progress.
         connection = _Connection(self.state)
         self._requests = RobotRequests(self.state.store, connection)
@@ -129,17 +129,19 @@ class RunPanel(Part):
         self.modes = ModeFields(self.state, text, self._mode_actions)
         self.signals = SignalFields(self.model, text, self._send, self._button)
         self.limits = LimitFields(self.state, text, self._world, self._send, self._button)
-        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
-        self._choice = lean(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
+        self._answers = shared_style_widget(
+            ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
+        )
+        self._choice = shared_style_widget(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
         self.build([
             self._choice,
-            lean(ipywidgets.HBox, [self.connect, self.disconnect]),
-            self._said,
-            self._where,
-            lean(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
+            shared_style_widget(ipywidgets.HBox, [self.connect, self.disconnect]),
+            self._sentence,
+            self._note,
+            shared_style_widget(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
             self.modes.choice,
             self._plan,
-            lean(ipywidgets.HBox, [self.execute, *self.speed_override.buttons, self.stop]),
+            shared_style_widget(ipywidgets.HBox, [self.execute, *self.speed_override.buttons, self.stop]),
             *self.speed_override.fields,
             self._question,
             self._answers,
@@ -153,8 +155,8 @@ class RunPanel(Part):
         self.target.observe(lambda _: self._show(), names="value")
         if self.state.session is not None:
             self._take(SessionConnection(self.state.session))
-        self._ends.append(self.state.subscribe("plan", self._on_plan))
-        self._ends.append(self.state.subscribe("goal", self._show))
+        self._cleanups.append(self.state.subscribe("plan", self._on_plan))
+        self._cleanups.append(self.state.subscribe("goal", self._show))
         self.subscribe("robot", self._show)
 
     def halt(self) -> None:
@@ -183,7 +185,7 @@ class RunPanel(Part):
         choice = str(self.target.value)
         typed = self.address.value.strip()
         if choice == "address" and not typed:
-            write(self._said, problem(self.text("run.address_needed")))
+            write(self._sentence, problem(self.text("run.address_needed")))
             return
         target, plant = (typed, "ideal") if choice == "address" else (VIRTUAL, choice)
         self._release()
@@ -196,7 +198,7 @@ class RunPanel(Part):
 
     def _on_failure(self, error: RcilabError) -> None:
         """Shows why there is no connection; called in the connecting thread."""
-        self._take_in(Outcome(what="connect", error=error))
+        self._show_outcome(Outcome(what="connect", error=error))
 
     def _on_disconnect(self) -> None:
         self._release()
@@ -222,29 +224,29 @@ class RunPanel(Part):
         if robot is not None:
             last = robot.status().q_c
             if last is not None:
-                self.state.leave_arm(last)
+                self.state.store_position(last)
             self._world.close()
             self._requests.forget()
             robot.close()
             self.state.free_joints()
 
     def _watch(self, robot: RobotConnection | SessionConnection) -> None:
-        """Shows the robot, reports an operator at the page, and stops the robot when the page is closed."""
-        while not self._ending.wait(_LOOK):
-            self._heart.beat()
-            if self._heart.is_gone:
+        """Shows the robot's status, forwards the page's heartbeat, and stops the robot when the page is closed."""
+        while not self._ending.wait(_POLL_INTERVAL):
+            self._heartbeat.beat()
+            if self._heartbeat.is_gone:
                 if isinstance(robot, SessionConnection):
-                    robot.stop(OPERATOR_ABSENT)
+                    robot.stop(PAGE_GONE)
                 else:
                     robot.stop()
-            elif self._heart.was_seen:
+            elif self._heartbeat.was_seen:
                 robot.heartbeat()
             with self.state.lock:
                 outcomes = self._requests.collect()
             if isinstance(robot, SessionConnection):
                 outcomes += [Outcome(what="cell", run=run, error=error) for run, error in robot.take_cell_runs()]
             for outcome in outcomes:
-                self._take_in(outcome)
+                self._show_outcome(outcome)
             self._follow_world(robot.status())
             with self.state.lock:
                 self._mode_actions.tick(robot.status())
@@ -258,12 +260,12 @@ class RunPanel(Part):
         if notice is not None and notice is not before:
             write(self._outcome, problem(self.text.render(notice.text)))
 
-    def _take_in(self, outcome: Outcome) -> None:
+    def _show_outcome(self, outcome: Outcome) -> None:
         if outcome.what == "limits":
             self.limits.take(outcome.error)
         if outcome.what in ("execute", "cell"):
             self.state.take(outcome)
-        sentence = outcome_html(outcome, self.state.status, self.text, is_operator_absent=self._heart.is_gone)
+        sentence = outcome_html(outcome, self.state.status, self.text, is_page_gone=self._heartbeat.is_gone)
         if outcome.what == "cell":
             sentence += soft(self.text("run.of_cell"))
         write(self._outcome, sentence)
@@ -275,7 +277,7 @@ class RunPanel(Part):
     def _on_execute(self) -> None:
         reason, plan = _obstacle(self.state), self.state.now.plan
         if reason is not None:
-            write(self._said, problem(self.text.render(reason)))
+            write(self._sentence, problem(self.text.render(reason)))
             return
         if self.state.now.is_virtual:
             self._move()
@@ -332,16 +334,19 @@ class RunPanel(Part):
             else text("run.at", name=text("run.virtual") if state.robot.name == VIRTUAL else state.robot.name)
         )
         tone = PHASE_TONES.get(phase, "none" if status is None else "bad")
-        write(self._said, verdict(tone, name_phase(status, text), name))
+        write(self._sentence, verdict(tone, name_phase(status, text), name))
         trouble = describe_trouble(status, text) or ("" if reason is None else text.render(reason))
-        is_cells = isinstance(state.robot, SessionConnection) and state.robot.is_cells
-        if is_cells and not self._was_cells:
+        is_cell_motion = isinstance(state.robot, SessionConnection) and state.robot.is_cells
+        if is_cell_motion and not self._was_cell_motion:
             write(self._outcome, "")
-        self._was_cells = is_cells
-        if is_cells:
-            write(self._where, problem(text("run.deaf")) if self._heart.is_deaf else soft(text("run.by_cell")))
+        self._was_cell_motion = is_cell_motion
+        if is_cell_motion:
+            write(
+                self._note,
+                problem(text("run.kernel_busy")) if self._heartbeat.is_kernel_busy else soft(text("run.by_cell")),
+            )
         else:
-            write(self._where, "" if is_moving or not trouble else soft(trouble))
+            write(self._note, "" if is_moving or not trouble else soft(trouble))
         plan = state.now.plan
         if plan is None:
             write(self._plan, "")
@@ -367,7 +372,7 @@ class RunPanel(Part):
         self, code: str, act: Callable[[], object], *, icon: str = "", style: str = "", own: bool = False
     ) -> Any:
         hint = f"{code}_hint"
-        button = lean(
+        button = shared_style_widget(
             ipywidgets.Button,
             description=self.text(code),
             tooltip=self.text(hint) if self.text.has(hint) else self.text(code),

@@ -12,7 +12,7 @@ from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.optional_deps import require_installed
-from rcilab.notebook.kernel_reachability import KernelReachability, find_place
+from rcilab.notebook.kernel_reachability import KernelReachability, find_reachability
 from rcilab.notebook.part import Part
 from rcilab.notebook.preview import Preview, aim_camera
 from rcilab.notebook.style import block, soft, write
@@ -28,7 +28,7 @@ VIEWS: tuple[View, ...] = ("auto", "meshcat", "viser", "static")
 _REACHED: Color = (70, 190, 130)
 _REFUSED: Color = (230, 80, 70)
 _ZOOM = 1.35
-_SAME_POSE = 1e-4  # [rad] At a smaller distance a ghost would only flicker in the arm.
+_SAME_POSE = 1e-4  # [rad] At a smaller distance a ghost would flicker inside the arm.
 
 
 class Scene(Part):
@@ -62,13 +62,12 @@ class Scene(Part):
             raise InvalidValueError("view", view, f"is unknown; known: {', '.join(VIEWS)}")
         require_installed("meshcat", "Scene")
         super().__init__(subject, language)
-        place = place or find_place()
+        place = place or find_reachability()
         self.height = height
         reachable = place.way == "loopback" or (place.way == "proxy" and view != "viser")
         self.is_live = view != "static" and reachable
         self._frame, self._note = block(), block()
         self._picture: _LivePicture | None = None
-        self._film: Preview | None = None
         self.build([self._frame, self._note], flex="0 0 auto", min_width="300px")
         if self.is_live:
             self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
@@ -79,7 +78,7 @@ class Scene(Part):
         else:
             helps = "scene.static" if place.way == "static" and place.proxy_helps else "scene.static_here"
             write(self._note, soft(self.text("scene.asked" if view == "static" else helps)))
-            self.subscribe("plan", self._show_film)
+            self.subscribe("plan", self._show_animation)
 
     @property
     def url(self) -> str | None:
@@ -93,7 +92,7 @@ class Scene(Part):
 
     def save(self, file: str) -> None:
         """Writes the scene as one HTML page that needs neither kernel nor network: an animation, or the pose."""
-        self._make_film().save(file)
+        self._make_animation().save(file)
 
     def end(self) -> None:
         """Stops the server."""
@@ -104,11 +103,11 @@ class Scene(Part):
         title = html.escape(self.text("scene.title", model=self.model.name))
         write(self._frame, f'<iframe class="rl-frame" title="{title}" {source} height="{self.height}"></iframe>')
 
-    def _show_film(self) -> None:
-        self._write_frame(f'srcdoc="{html.escape(self._make_film().html())}"')
+    def _show_animation(self) -> None:
+        self._write_frame(f'srcdoc="{html.escape(self._make_animation().html())}"')
 
-    def _make_film(self) -> Preview:
-        plan = self.state.seen_arm
+    def _make_animation(self) -> Preview:
+        plan = self.state.shown_scene_plan
         what = self.state.now.goal.q if plan is None else plan.motion
         return Preview(what, self.model, live=False, height=self.height, language=self.text.language)
 
@@ -127,28 +126,28 @@ class _LivePicture:
         self._goal = ArmView(canvas, "goal", model, "candidate")
         self._ghost = ArmView(canvas, "plan", model, "plan")
         self._shown = {"goal": True, "plan": True}
-        self._tint = _REACHED
+        self._ghost_color = _REACHED
         self._path: Plan | None = None
 
     def draw(self) -> None:
         """Moves the three arms to their current positions."""
         state, status = self._state, self._state.status
-        seen = state.seen_arm
+        seen = state.shown_scene_plan
         moment = None if state.moment is None or seen is None else seen.motion.at(state.moment).q
         robot = None if status is None else status.q
         solid = state.now.goal.q if robot is None and moment is None else moment if robot is None else robot
         assert solid is not None
         self._arm.show(solid)
-        self._see("goal", self._goal, state.now.goal.q, solid)
-        self._see("plan", self._ghost, None if robot is None else moment, solid)
+        self._show_ghost("goal", self._goal, state.now.goal.q, solid)
+        self._show_ghost("plan", self._ghost, None if robot is None else moment, solid)
         tint = _REFUSED if state.now.goal.reach.tone == "bad" else _REACHED
-        if tint != self._tint:
-            self._tint = tint
+        if tint != self._ghost_color:
+            self._ghost_color = tint
             self._goal.set_look(color=tint)
 
     def draw_path(self) -> None:
         """Draws the path of the tool, coloured by the utilisation of the joints' limits."""
-        plan = self._state.seen_arm
+        plan = self._state.shown_scene_plan
         if plan is self._path:
             return
         if self._path is not None:
@@ -169,7 +168,7 @@ class _LivePicture:
         if self._meshcat is not None:
             self._meshcat.close()
 
-    def _see(self, name: str, arm: ArmView, q: JointVector | None, solid: JointVector) -> None:
+    def _show_ghost(self, name: str, arm: ArmView, q: JointVector | None, solid: JointVector) -> None:
         visible = q is not None and float(np.abs(q - solid).max()) > _SAME_POSE
         if visible:
             assert q is not None

@@ -16,7 +16,7 @@ from rcilab.i18n.translator import Text
 from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import RobotModel
 from rcilab.notebook.style import block, esc, head, soft, verdict, why_html, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 SendRequest = Callable[[str, Callable[[Robot], PendingRequest]], None]
 """Sends a request to the robot; the end of the request is reported by this name."""
@@ -34,7 +34,7 @@ class SignalFields:
 
     def __init__(self, model: RobotModel, text: Text, send: SendRequest, button: Callable[..., Any]) -> None:
         self._model, self._text, self._send = model, text, send
-        self.output: Any = lean(
+        self.output: Any = shared_style_widget(
             ipywidgets.Dropdown, description=text("signals.output"),
             options=[(name, signal) for signal, name in enumerate(capabilities_of(model).outputs)],
             tooltip=text("signals.output_hint"), layout={"width": "14em"},
@@ -47,10 +47,12 @@ class SignalFields:
         self.no = button("run.cancel", lambda: self._ask(False))
         self._missing, self._reboot_missing, self._levels, self._question = block(), block(), block(), block()
         self._address = ""
-        self._answers = lean(ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none"))
+        self._answers = shared_style_widget(
+            ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
+        )
         rows = [
             self._missing,
-            lean(ipywidgets.HBox, [self.output, self.on, self.off, self.read]),
+            shared_style_widget(ipywidgets.HBox, [self.output, self.on, self.off, self.read]),
             self._levels,
             block(soft(text("signals.note"))),
             block(head(text("reboot.title"))),
@@ -59,8 +61,11 @@ class SignalFields:
             self._question,
             self._answers,
         ]
-        self.folder: Any = lean(
-            ipywidgets.Accordion, [lean(ipywidgets.VBox, rows)], titles=(text("signals.title"),), selected_index=None
+        self.folder: Any = shared_style_widget(
+            ipywidgets.Accordion,
+            [shared_style_widget(ipywidgets.VBox, rows)],
+            titles=(text("signals.title"),),
+            selected_index=None,
         )
 
     def show(self, status: SupervisorStatus | None) -> None:

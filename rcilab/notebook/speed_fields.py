@@ -16,8 +16,8 @@ from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.state import LabState
 from rcilab.notebook.style import block, problem, soft, write
-from rcilab.notebook.subshell_routing import hear_at_once
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.subshell_routing import handle_during_cells
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _STEP = 5.0  # [%]
 
@@ -37,19 +37,19 @@ class SpeedFields:
         self.pause = self._button("run.pause", partial(self._ask, modes.pause), icon="pause", style="warning")
         self.resume = self._button("run.resume", partial(self._ask, modes.resume), icon="play", style="info")
         percent, slowest = 100.0 * state.now.drive.speed_override, 100.0 * MIN_SPEED_OVERRIDE
-        self.slider: Any = lean(
+        self.slider: Any = shared_style_widget(
             ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
             readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},
         )  # fmt: skip
         self.field = NumberField(text, "", "%", slowest, 100.0, self._choose, of=text("run.pace"), value=percent)
-        self._way = block()
+        self._progress = block()
         self.buttons = [self.pause, self.resume]
         self.fields: list[Any] = [
-            lean(ipywidgets.HBox, [self.slider, *self.field.cells], layout={"align_items": "center"}),
+            shared_style_widget(ipywidgets.HBox, [self.slider, *self.field.cells], layout={"align_items": "center"}),
             self.field.sentence,
-            self._way,
+            self._progress,
         ]
-        hear_at_once(*self.buttons, self.slider, self.field.box)
+        handle_during_cells(*self.buttons, self.slider, self.field.box)
         self.slider.observe(self._on_slider, names="value")
 
     def show(self, status: SupervisorStatus | None) -> None:
@@ -68,16 +68,18 @@ class SpeedFields:
             finally:
                 self._writing = False
         refusal = self._state.now.drive.override_refusal
-        sentence = "" if not running or status is None else soft(self._describe_way(status, is_held))
-        write(self._way, sentence + ("" if refusal is None or not running else problem(self._text.render(refusal))))
+        sentence = "" if not running or status is None else soft(self._describe_progress(status, is_held))
+        write(
+            self._progress, sentence + ("" if refusal is None or not running else problem(self._text.render(refusal)))
+        )
 
-    def _describe_way(self, status: SupervisorStatus, is_held: bool) -> str:
+    def _describe_progress(self, status: SupervisorStatus, is_held: bool) -> str:
         speed_override = f"{100.0 * status.speed_override:.0f}"
-        place = f"{status.motion_plan_time or 0.0:.1f}"
+        plan_time = f"{status.motion_plan_time or 0.0:.1f}"
         return (
-            self._text("run.held", place=place)
+            self._text("run.held", place=plan_time)
             if is_held
-            else self._text("run.way", place=place, speed_override=speed_override)
+            else self._text("run.way", place=plan_time, speed_override=speed_override)
         )
 
     def _on_slider(self, change: Any) -> None:
@@ -94,7 +96,7 @@ class SpeedFields:
             self._state.notify("robot")
 
     def _button(self, code: str, act: Any, *, icon: str, style: str) -> Any:
-        button = lean(
+        button = shared_style_widget(
             ipywidgets.Button, description=self._text(code), tooltip=self._text(f"{code}_hint"), icon=icon,
             button_style=style, layout=ipywidgets.Layout(width="auto"),
         )  # fmt: skip

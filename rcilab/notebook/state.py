@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
 """goal: joint angles or pose; plan: a motion and its report; moment: the displayed time of the plan; robot: its
 status; run: the result of an execution."""
-Way = Literal["joint", "line"]
-WAYS: tuple[Way, ...] = ("joint", "line")
+PathType = Literal["joint", "line"]
+PATH_TYPES: tuple[PathType, ...] = ("joint", "line")
 _PLANNED = 0.5  # Progress at the end of planning, before the check; as measured.
 
 
@@ -66,8 +66,8 @@ class LabState:
         self.session = session
         self.lock = threading.RLock()
         self.robot: RobotConnection | SessionConnection | None = None
-        self._rest: JointVector = readonly_copy(model.home)  # Position of the arm while no robot reports one.
-        self.store: StateStore[AppState] = StateStore(AppState(model=model, goal=goal_at(model, self._rest)))
+        self._last_position: JointVector = readonly_copy(model.home)  # Position of the arm while no robot reports one.
+        self.store: StateStore[AppState] = StateStore(AppState(model=model, goal=goal_at(model, self._last_position)))
         self.goals = GoalActions(self.store, _Arm(self), plans_at_once=False)
         self._handlers: Handlers = {**self.goals.handlers, PlanGoal: lambda _: self.make_plan()}
         self.moment: float | None = None
@@ -76,18 +76,20 @@ class LabState:
         """A fault, or the run of a cell, displayed in place of the plan until the next plan, goal or execution."""
         self.outcome: Outcome | None = None
         """The end of the last execution, of the plan or of a cell; None: none yet, or one is in progress."""
-        self._as_run: Plan | None = None  # The plan as it was run, if its speed override was changed during the run.
-        self._hearers: dict[Topic, list[Callable[[], None]]] = {}
+        self._cached_executed_plan: Plan | None = (
+            None  # The plan as it was run, if its speed override was changed during the run.
+        )
+        self._subscribers: dict[Topic, list[Callable[[], None]]] = {}
 
     def subscribe(self, topic: Topic, act: Callable[[], None]) -> Callable[[], None]:
         """Calls `act` after every change of a topic; returns a function that ends the subscription."""
         with self.lock:
-            self._hearers.setdefault(topic, []).append(act)
+            self._subscribers.setdefault(topic, []).append(act)
 
         def end() -> None:
             with self.lock:
-                if act in self._hearers[topic]:
-                    self._hearers[topic].remove(act)
+                if act in self._subscribers[topic]:
+                    self._subscribers[topic].remove(act)
 
         return end
 
@@ -95,7 +97,7 @@ class LabState:
         """Calls the subscribers of topics."""
         with self.lock:
             for topic in topics:
-                for act in list(self._hearers.get(topic, ())):
+                for act in list(self._subscribers.get(topic, ())):
                     act()
 
     @property
@@ -111,12 +113,12 @@ class LabState:
         return self.now.model
 
     def ask(self, request: Request) -> None:
-        """Carries out a request of a feature at once; all parts that show its result follow."""
+        """Carries out a request of the application immediately; all parts that show its result follow."""
         with self.lock:
             goal = self.now.goal
             self._handlers[type(request)](request)
             if self.now.goal is not goal:
-                self._leave_preview()
+                self._end_preview()
                 self.notify("goal")
 
     def set_drive(self, **changes: Any) -> None:
@@ -133,20 +135,20 @@ class LabState:
     def here(self) -> JointVector:
         """Start of plans: the robot's commanded angles, or without a robot the arm's last position, [rad]."""
         status = self.status
-        return self._rest if status is None or status.q_c is None else readonly_copy(status.q_c)
+        return self._last_position if status is None or status.q_c is None else readonly_copy(status.q_c)
 
     @property
-    def seen(self) -> Plan | None:
+    def shown_plan(self) -> Plan | None:
         """The plan of timeline and curves: as it was run, or what is displayed in its place."""
-        return self._played if self.displayed is None else self.displayed.plan
+        return self._executed_plan if self.displayed is None else self.displayed.plan
 
     @property
-    def seen_arm(self) -> Plan | None:
-        """The arm's position in the scene at a time."""
-        return self._played if self.displayed is None else self.displayed.scene
+    def shown_scene_plan(self) -> Plan | None:
+        """The plan whose position at the displayed time the scene shows."""
+        return self._executed_plan if self.displayed is None else self.displayed.scene
 
     @property
-    def seen_run(self) -> Run | None:
+    def shown_run(self) -> Run | None:
         """The run that belongs to the displayed plan."""
         if self.displayed is not None:
             return self.displayed.run
@@ -154,14 +156,14 @@ class LabState:
         return None if recording is None else recording.run
 
     @property
-    def _played(self) -> Plan | None:
+    def _executed_plan(self) -> Plan | None:
         """The plan; as it was run, if its speed override was changed during the run."""
-        plan, run = self.now.plan, self.seen_run
+        plan, run = self.now.plan, self.shown_run
         if plan is None or run is None or run.plan is None or not run.has_speed_override:
             return plan
-        if self._as_run is None or self._as_run.motion is not run.plan:
-            self._as_run = build_plan_view(self.model, run.plan, plan.report, plan.box)
-        return self._as_run
+        if self._cached_executed_plan is None or self._cached_executed_plan.motion is not run.plan:
+            self._cached_executed_plan = build_plan_view(self.model, run.plan, plan.report, plan.box)
+        return self._cached_executed_plan
 
     def pose(self, q: ArrayLike) -> None:
         """Sets the goal to joint angles, shape (n,), [rad]; the plan is kept until the next one.
@@ -179,7 +181,7 @@ class LabState:
         with self.lock:
             self.store.push_undo()
             self.goals.set_joints(readonly_copy(angles))
-            self._leave_preview()
+            self._end_preview()
             self.notify("goal")
 
     def aim(self, target: Pose) -> None:
@@ -187,7 +189,7 @@ class LabState:
         with self.lock:
             self.store.push_undo()
             self.goals.set_target(target)
-            self._leave_preview()
+            self._end_preview()
             self.notify("goal")
 
     def make_plan(self) -> None:
@@ -195,9 +197,9 @@ class LabState:
         self.show(self.planning()(lambda part: None))
 
     def planning(self) -> Callable[[ProgressCallback], Plan | Message]:
-        """Returns a function that plans from the arm's position to the goal of now, and checks, with collisions.
+        """Returns a function that plans from the arm's position to the present goal, and checks, with collisions.
 
-        It takes long: do not call it in a thread that others wait for.
+        The function takes long: do not call it in a thread that others wait for.
         """
         with self.lock:
             make, mode = self.goals.prepare_plan(self.here), self.now.drive.mode
@@ -250,13 +252,13 @@ class LabState:
                 self.take_motion(self.now.plan.motion)
 
     def free_joints(self) -> None:
-        """Restores the arm's range without the soft limits of a disconnected controller."""
+        """Restores the arm's own joint limits, without the soft limits of a disconnected controller."""
         own, now = self._own_limits, self.model.limits.joint
         if now is not own:
             self.limit_joints(own.lower, own.upper)
 
     def take(self, outcome: Outcome) -> None:
-        """Shows the end of an execution: with the plan, or for a cell in place of the plan."""
+        """Shows the end of an execution: with the plan, or for a cell, in place of the plan."""
         with self.lock:
             run = outcome.run
             if outcome.what == "cell":
@@ -276,10 +278,10 @@ class LabState:
     def look_at(self, moment: float | None) -> None:
         """Displays a time of the plan, [s]; None displays the arm's position."""
         with self.lock:
-            if self.seen is None:
+            if self.shown_plan is None:
                 moment = None
             elif moment is not None:
-                moment = min(max(moment, 0.0), self.seen.motion.duration)
+                moment = min(max(moment, 0.0), self.shown_plan.motion.duration)
             if moment != self.moment:
                 self.moment = moment
                 self.notify("moment")
@@ -293,10 +295,10 @@ class LabState:
             self.moment = None if displayed is None else displayed.moment
             self.notify("plan", "moment")
 
-    def leave_arm(self, q: ArrayLike) -> None:
+    def store_position(self, q: ArrayLike) -> None:
         """Takes the robot's position at its disconnection; the plan is kept."""
         with self.lock:
-            self._rest = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
+            self._last_position = readonly_copy(as_vector(q, self.model.n, "q", "rad"))
 
     @property
     def is_goal_of_plan(self) -> bool:
@@ -304,7 +306,7 @@ class LabState:
         plan, goal = self.now.plan, self.now.goal
         return plan is not None and bool(abs(plan.motion.goal - goal.q).max() < 1e-6)
 
-    def _leave_preview(self) -> None:
+    def _end_preview(self) -> None:
         self.display(None)
         if self.moment is not None:
             self.moment = None
@@ -312,7 +314,7 @@ class LabState:
 
 
 @dataclass(frozen=True, slots=True)
-class _Standing:
+class _StationaryArm:
     q_c: JointVector
     phase: str = "closed"
 
@@ -328,7 +330,7 @@ class _Arm:
         state = self._state()
         assert state is not None
         status = state.status
-        return status if status is not None and status.q_c is not None else _Standing(state.here)
+        return status if status is not None and status.q_c is not None else _StationaryArm(state.here)
 
 
 _of_session: weakref.WeakValueDictionary[int, LabState] = weakref.WeakValueDictionary()

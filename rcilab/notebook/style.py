@@ -1,4 +1,4 @@
-"""The look of the parts, in light and dark notebooks: one style sheet and a few common shapes."""
+"""The style of the parts, in light and dark notebooks: one style sheet and a few common HTML elements."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Literal
 import ipywidgets
 
 from rcilab.i18n.translator import Message, Text, with_space
-from rcilab.notebook.widget_sharing import is_shared, lean, once
+from rcilab.notebook.widget_sharing import cached_widget, is_shared, shared_style_widget
 
 Tone = Literal["good", "warn", "bad", "none"]
 
@@ -33,12 +33,14 @@ def _sheet() -> str:
 
 def style_sheet() -> Any:
     """Returns the widget with the style sheet, one for all parts; it is invisible."""
-    return once("sheet", lambda: lean(ipywidgets.HTML, f"<style>{_sheet()}</style>", layout={"display": "none"}))
+    return cached_widget(
+        "sheet", lambda: shared_style_widget(ipywidgets.HTML, f"<style>{_sheet()}</style>", layout={"display": "none"})
+    )
 
 
 def block(content: str = "", **layout: str) -> Any:
     """Returns a widget that shows HTML."""
-    return lean(ipywidgets.HTML, f'<div class="rl">{content}</div>' if content else "", layout=layout)
+    return shared_style_widget(ipywidgets.HTML, f'<div class="rl">{content}</div>' if content else "", layout=layout)
 
 
 def write(widget: Any, content: str) -> None:
@@ -82,7 +84,7 @@ def table(heads: list[str], rows: list[list[str]], *, right: bool = False) -> st
 
 
 def close_tree(widget: Any) -> None:
-    """Closes a widget with all its parts; ipywidgets keeps open ones as long as the kernel runs."""
+    """Closes a widget with all its children; ipywidgets keeps open ones as long as the kernel runs."""
     for child in getattr(widget, "children", ()):
         close_tree(child)
     for name in ("layout", "style"):

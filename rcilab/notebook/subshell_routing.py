@@ -12,25 +12,26 @@ from functools import cache, partial
 from typing import Any
 
 _ROUTE = "_reply_subshell_for"
-"""ipykernel 7.4 asks it for the subshell of a message: by default the last sender, the busy cell. Others lack it."""
+"""ipykernel 7.4 calls it for the subshell of a message; by default that of the last sender, the busy cell.
+Other versions lack it."""
 
 
-def hear_at_once(*widgets: Any) -> None:
-    """Routes widget messages where the notebook sends them, or to our subshell: they are handled while a cell runs."""
+def handle_during_cells(*widgets: Any) -> None:
+    """Routes the messages of widgets to the subshell that they name, else to ours, also while a cell runs."""
     for widget in widgets:
         if hasattr(widget.comm, _ROUTE):
             setattr(widget.comm, _ROUTE, partial(_route, widget.comm.kernel))
 
 
 def _route(kernel: Any, data: object, subshell: str | None) -> str | None:
-    """In the thread that dispatches messages."""
-    return _make_ear(kernel) if subshell is None else subshell
+    """Called in the thread that dispatches messages."""
+    return _create_subshell(kernel) if subshell is None else subshell
 
 
 @cache
-def _make_ear(kernel: Any) -> str | None:
+def _create_subshell(kernel: Any) -> str | None:
     """Returns the id of our own subshell; None, the thread of the cells, if none can be created."""
     try:
         return kernel.shell_channel_thread.manager._create_subshell()
-    except (AttributeError, AssertionError):  # Another ipykernel: a late answer is better than none.
+    except (AttributeError, AssertionError):  # Another ipykernel: messages are then handled at the end of the cell.
         return None

@@ -19,7 +19,7 @@ from rcilab.views.plots import Frame
 
 _WIDTH, _HEIGHT = 420.0, 168.0  # Units of a panel; the browser scales it.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 40.0, 6.0, 20.0, 20.0
-_ACROSS, _HIGH = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
+_PLOT_WIDTH, _PLOT_HEIGHT = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
 INK = "var(--jp-ui-font-color1, var(--vscode-editor-foreground, #1d2a3c))"
 SOFT = "var(--jp-ui-font-color2, var(--vscode-descriptionForeground, #51607a))"
 LINE = "var(--jp-border-color2, var(--vscode-panel-border, #d5dbe4))"
@@ -57,7 +57,7 @@ def draw(panels: Sequence[Panel], joints: Sequence[int], time: str, limit: str) 
 
 def share_of(t: float, end: float) -> float:
     """Returns the position of a time on a panel, 0 to 1."""
-    return (_LEFT + _ACROSS * t / end) / _WIDTH
+    return (_LEFT + _PLOT_WIDTH * t / end) / _WIDTH
 
 
 def ticks(low: float, high: float, count: int) -> list[float]:
@@ -75,12 +75,12 @@ def number(value: float) -> str:
 
 def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     frame = panel.frame
-    middle, half, bottom, right = _TOP + _HIGH / 2.0, _HIGH / 2.0, _TOP + _HIGH, _WIDTH - _RIGHT
+    middle, half, bottom, right = _TOP + _PLOT_HEIGHT / 2.0, _PLOT_HEIGHT / 2.0, _TOP + _PLOT_HEIGHT, _WIDTH - _RIGHT
 
     def y(values: Array | float) -> Array:
         return middle - half * np.asarray(values) / frame.bound
 
-    x = _LEFT + _ACROSS * frame.t / frame.end
+    x = _LEFT + _PLOT_WIDTH * frame.t / frame.end
     out = [
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{esc(panel.title)}" font-size="10.5">',
         f'<text x="{_LEFT:g}" y="13" fill="{INK}" font-weight="600">{esc(panel.title)} '
@@ -92,7 +92,7 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
             f'<text x="{_LEFT - 4:g}" y="{y(tick) + 3.5:.1f}" text-anchor="end" fill="{SOFT}">{number(tick)}</text>'
         )
     for tick in ticks(0.0, frame.end, 6):
-        at = _LEFT + _ACROSS * tick / frame.end
+        at = _LEFT + _PLOT_WIDTH * tick / frame.end
         side = "end" if at > right - 12.0 else "middle"
         name = f"{tick:g} {time}" if side == "end" else f"{tick:g}"
         out.append(f'<text x="{at:.1f}" y="{bottom + 13:g}" text-anchor="{side}" fill="{SOFT}">{esc(name)}</text>')
@@ -103,7 +103,7 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     dash = ' stroke-dasharray="6 3"' if frame.actual else ""
     for curve, joint in zip(frame.plan, joints, strict=False):
         out.append(_curve(x, y(curve), _color(joint), f'stroke-width="1.5"{dash}'))
-    frame_line = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{_ACROSS:g}" height="{_HIGH:g}" fill="none" '
+    frame_line = f'<rect x="{_LEFT:g}" y="{_TOP:g}" width="{_PLOT_WIDTH:g}" height="{_PLOT_HEIGHT:g}" fill="none" '
     out.append(f'{frame_line}stroke="{LINE}"/></svg>')
     return "".join(out)
 
@@ -114,11 +114,11 @@ def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
         return ""
     upper, lower = float(y(frame.upper)), float(y(frame.lower))
     out = ""
-    for a, b in ((_TOP, upper), (lower, _TOP + _HIGH)):
-        size = f'width="{_ACROSS:g}" height="{max(b - a, 0.0):.1f}"'
+    for a, b in ((_TOP, upper), (lower, _TOP + _PLOT_HEIGHT)):
+        size = f'width="{_PLOT_WIDTH:g}" height="{max(b - a, 0.0):.1f}"'
         out += f'<rect x="{_LEFT:g}" y="{a:.1f}" {size} fill="{SOFT}" opacity=".14"/>'
     for edge in (upper, lower):
-        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_ACROSS:g}" stroke="{SOFT}" stroke-dasharray="2 3"/>'
+        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_PLOT_WIDTH:g}" stroke="{SOFT}" stroke-dasharray="2 3"/>'
     place = f'x="{_WIDTH - _RIGHT - 4:g}" y="{upper + 11.0:.1f}" text-anchor="end"'
     return out + f'<text {place} fill="{SOFT}" font-size="9.5">{esc(limit)}</text>'
 
@@ -126,7 +126,7 @@ def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
 def _span(left: float, right: float) -> str:
     return (
         f'<rect class="rl-violation" x="{left:.1f}" y="{_TOP:g}" width="{max(right - left, 2.0):.1f}" '
-        f'height="{_HIGH:g}" fill="{BAD}" opacity=".22"/>'
+        f'height="{_PLOT_HEIGHT:g}" fill="{BAD}" opacity=".22"/>'
     )
 
 
@@ -138,11 +138,11 @@ def _spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _curve(x: Array, y: Array, color: str, style: str) -> str:
     """Returns a line; outside the panel it follows the edge."""
     known = np.isfinite(y)
-    inside = np.clip(y[known], _TOP, _TOP + _HIGH)
+    inside = np.clip(y[known], _TOP, _TOP + _PLOT_HEIGHT)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[known].tolist(), inside.tolist(), strict=True))
     return f'<polyline points="{points}" fill="none" stroke="{color}" stroke-linejoin="round" {style}/>'
 
 
 def _color(joint: int) -> str:
-    place = joint % len(JOINT_COLORS)
-    return INK if place == _BLACK else JOINT_COLORS[place]
+    index = joint % len(JOINT_COLORS)
+    return INK if index == _BLACK else JOINT_COLORS[index]

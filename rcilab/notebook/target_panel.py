@@ -17,9 +17,9 @@ from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
 from rcilab.notebook.style import block, head, soft, verdict, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
-_FURTHEST = 1000.0 * FURTHEST  # [mm]
+_MAX_COORDINATE = 1000.0 * FURTHEST  # [mm]
 _WHOLE_TURN = 360.0  # [deg]
 
 
@@ -37,19 +37,21 @@ class TargetPanel(Part):
         self.fields = [
             NumberField(
                 text, text(f"target.{name}"), "mm" if index < 3 else "deg",
-                *((-_FURTHEST, _FURTHEST) if index < 3 else (-_WHOLE_TURN, _WHOLE_TURN)), self._taker(index),
+                *((-_MAX_COORDINATE, _MAX_COORDINATE) if index < 3 else (-_WHOLE_TURN, _WHOLE_TURN)),
+                self._setter(index),
             )
             for index, name in enumerate(POSE_FIELDS)
         ]  # fmt: skip
         self._reach, self._table, self._circle = block(), block(), block()
-        self.branches = lean(ipywidgets.Dropdown, description=text("target.branch"), tooltip=text("target.branch_hint"),
+        self.branches = shared_style_widget(
+            ipywidgets.Dropdown, description=text("target.branch"), tooltip=text("target.branch_hint"),
             layout=ipywidgets.Layout(width="22em"), style={"description_width": "8em"},
         )  # fmt: skip
         self.branches.observe(self._on_branch, names="value")
         pairs = [
-            lean(
+            shared_style_widget(
                 ipywidgets.VBox,
-                [lean(ipywidgets.HBox, [*first.cells, *second.cells]), first.sentence, second.sentence],
+                [shared_style_widget(ipywidgets.HBox, [*first.cells, *second.cells]), first.sentence, second.sentence],
             )
             for first, second in zip(self.fields[:3], self.fields[3:], strict=True)
         ]
@@ -64,7 +66,7 @@ class TargetPanel(Part):
 
     def _arm_angle_rows(self) -> list[Any]:
         text = self.text
-        self.psi = lean(
+        self.psi = shared_style_widget(
             ipywidgets.FloatSlider, description="ψ", min=-180.0, max=180.0, step=1.0, readout=False,
             tooltip=text("target.psi_hint"),
             layout={"width": "98%"}, style={"description_width": "1.5em"},
@@ -72,16 +74,18 @@ class TargetPanel(Part):
         self._psi_echo = SliderEcho(self.psi)
         self.psi.observe(self._on_psi, names="value")
         self._psi_field = NumberField(text, "", "deg", -180.0, 180.0, self._turn)
-        side = lean(ipywidgets.VBox, [
+        side = shared_style_widget(ipywidgets.VBox, [
             self.psi,
-            lean(ipywidgets.HBox, self._psi_field.cells, layout={"align_items": "center"}),
+            shared_style_widget(ipywidgets.HBox, self._psi_field.cells, layout={"align_items": "center"}),
             self._psi_field.sentence,
             block(soft(text("target.psi_hint"))),
         ], layout={"flex": "1 1 170px", "min_width": "170px"})  # fmt: skip
-        row = lean(ipywidgets.HBox, [self._circle, side], layout={"align_items": "center", "flex_flow": "row wrap"})
+        row = shared_style_widget(
+            ipywidgets.HBox, [self._circle, side], layout={"align_items": "center", "flex_flow": "row wrap"}
+        )
         return [block(head(text("target.psi_title", in_deg="deg"))), row]
 
-    def _taker(self, index: int) -> Any:
+    def _setter(self, index: int) -> Any:
         def take(value: float) -> None:
             target = self.state.now.goal.target
             position, rpy = np.array(target.position), np.array(target.rpy)
@@ -97,7 +101,7 @@ class TargetPanel(Part):
         self.state.ask(SetArmAngle(psi=math.radians(degrees)))
 
     def _on_psi(self, change: Any) -> None:
-        if not self._writing and self._psi_echo.is_hand(change["new"]):
+        if not self._writing and self._psi_echo.is_drag(change["new"]):
             self._turn(change["new"])
 
     def _on_branch(self, change: Any) -> None:
@@ -128,7 +132,7 @@ class TargetPanel(Part):
         if psi is not None:
             degrees = math.degrees(psi)
             if abs(self.psi.value - degrees) > 1e-6:
-                self._psi_echo.give(degrees)
+                self._psi_echo.register(degrees)
                 self.psi.value = degrees
             self._psi_field.show(degrees)
         try:
@@ -151,9 +155,9 @@ class TargetPanel(Part):
         joints = distinguishing_joints(np.asarray(list(solutions)))
         for number, q in enumerate(solutions):
             least = margin(self.model, q)
-            away = float(np.abs(q - here).max())
-            way = text("target.way", number=number + 1, margin=least.angle, joint=least.joint, away=away)
-            rows.append(" · ".join([way, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
+            distance = float(np.abs(q - here).max())
+            label = text("target.way", number=number + 1, margin=least.angle, joint=least.joint, away=distance)
+            rows.append(" · ".join([label, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
             if float(np.abs(np.angle(np.exp(1j * (q - goal.q)))).max()) < 1e-6:
                 chosen = number
         options = [(row, number) for number, row in enumerate(rows)]

@@ -8,7 +8,7 @@ import ipywidgets
 
 from rcilab.notebook.part import Part
 from rcilab.notebook.style import block, write
-from rcilab.notebook.widget_sharing import lean
+from rcilab.notebook.widget_sharing import shared_style_widget
 
 _INTERVAL = 50  # [ms] Between two pictures; faster than a software-rendered scene.
 _RATES = (1.0, 0.5, 0.25, 0.1)
@@ -24,7 +24,7 @@ class Timeline(Part):
 
     def __init__(self, subject: object, *, language: str | None = None) -> None:
         super().__init__(subject, language)
-        self.play = lean(
+        self.play = shared_style_widget(
             ipywidgets.Play,
             min=0,
             max=1,
@@ -34,7 +34,7 @@ class Timeline(Part):
             tooltip=self.text("timeline.play_hint"),
             layout={"flex": "0 0 auto", "width": "6em"},
         )
-        self.slider = lean(
+        self.slider = shared_style_widget(
             ipywidgets.IntSlider,
             min=0,
             max=1,
@@ -42,14 +42,14 @@ class Timeline(Part):
             tooltip=self.text("timeline.scrub_hint"),
             layout={"flex": "1 1 64px", "width": "auto", "min_width": "64px"},
         )
-        self.rate = lean(
+        self.rate = shared_style_widget(
             ipywidgets.Dropdown,
             tooltip=self.text("timeline.rate"),
             options=[(f"{rate:g} ×", rate) for rate in _RATES],
             value=1.0,
             layout={"width": "4.4em", "flex": "0 0 auto"},
         )
-        self.live = lean(
+        self.live = shared_style_widget(
             ipywidgets.Button,
             description=self.text("timeline.live"),
             tooltip=self.text("timeline.live_hint"),
@@ -57,7 +57,7 @@ class Timeline(Part):
         )
         self._clock = block(flex="0 0 auto", min_width="7em")
         self._link = ipywidgets.jslink((self.play, "value"), (self.slider, "value"))
-        row = lean(
+        row = shared_style_widget(
             ipywidgets.HBox,
             [self.play, self.slider, self._clock, self.rate, self.live],
             layout={"align_items": "center", "flex_flow": "row wrap"},
@@ -66,7 +66,7 @@ class Timeline(Part):
         self._writing = False
         self.slider.observe(self._on_slider, names="value")
         self.rate.observe(self._on_rate, names="value")
-        self.live.on_click(lambda _: self._look_away())
+        self.live.on_click(lambda _: self._show_now())
         self.subscribe("plan", self._on_plan)
         self.subscribe("moment", self._show)
 
@@ -84,7 +84,7 @@ class Timeline(Part):
         self._link.close()
 
     def _on_plan(self) -> None:
-        plan = self.state.seen
+        plan = self.state.shown_plan
         last = 1 if plan is None else max(round(1000.0 * plan.motion.duration), 1)
         self._writing = True
         try:
@@ -103,13 +103,13 @@ class Timeline(Part):
         if not self._writing:
             self.state.look_at(change["new"] / 1000.0)
 
-    def _look_away(self) -> None:
+    def _show_now(self) -> None:
         self.play.playing = False
         self.state.display(None)
         self.state.look_at(None)
 
     def _show(self) -> None:
-        plan, moment = self.state.seen, self.state.moment
+        plan, moment = self.state.shown_plan, self.state.moment
         self.live.disabled = moment is None
         if plan is None:
             write(self._clock, "")

@@ -19,7 +19,7 @@ from rcilab.views.viser_server import GuardedServer, listen
 from rcilab.views.viser_stage import add_environment, place_camera
 
 LOOPBACK = "127.0.0.1"
-_TICK = 1.0 / 30.0  # [s] The rate of a slider's messages, faster than software rendering.
+_PERIOD = 1.0 / 30.0  # [s] The rate of a slider's messages, faster than software rendering.
 _HOLD = 1.0  # [s] Pause at the goal before the motion starts again.
 _HIDE_WARNING = """document.head.insertAdjacentHTML("beforeend",
 "<style>#webgl-software-rendering { display: none }</style>")"""  # viser's box covers the arm in a small frame.
@@ -54,7 +54,7 @@ class PreviewPage(Closeable):
         self._arm.show(motion.start)
         text = Text(chosen_language(language), "rcilab.notebook")
         gui = self._guarded_server.viser.gui
-        last = max(math.ceil(1e3 * motion.duration) / 1e3, _TICK)
+        last = max(math.ceil(1e3 * motion.duration) / 1e3, _PERIOD)
         self._play = gui.add_checkbox(text("timeline.play"), True)
         self._slider = gui.add_slider(text("timeline.time"), min=0.0, max=last, step=0.001, initial_value=0.0)
         self._speed = gui.add_dropdown(text("timeline.rate"), ("1", "0.5", "0.25", "0.1"))
@@ -88,15 +88,15 @@ class PreviewPage(Closeable):
     def _run(self) -> None:
         """Plays, and follows the slider: a time that differs from the last one set here was set on the page."""
         t, shown, resting = 0.0, 0.0, 0.0
-        while not self._closed.wait(_TICK):
+        while not self._closed.wait(_PERIOD):
             wanted = self._slider.value
             if wanted != shown:
                 self._play.value, resting = False, 0.0
                 t = min(max(wanted, 0.0), self._motion.duration) if math.isfinite(wanted) else shown
             elif self._play.value and t < self._motion.duration:
-                t = min(t + _TICK * float(self._speed.value), self._motion.duration)
+                t = min(t + _PERIOD * float(self._speed.value), self._motion.duration)
             elif self._play.value:
-                resting += _TICK
+                resting += _PERIOD
                 if resting >= _HOLD:
                     t, resting = 0.0, 0.0
             self._arm.show(self._motion.at(t).q)
@@ -135,9 +135,9 @@ def open_page(port: int) -> tuple[GuardedServer, int]:
             f"cannot listen on {LOOPBACK} port {port} ({error.strerror}); port=0 takes a free one"
         ) from error
     number = int(bound.getsockname()[1])
-    door = GuardedServer(bound, AccessPolicy(host=LOOPBACK, port=number))
-    door.viser.gui.configure_theme(show_logo=False, show_share_button=False)
-    place_camera(door.viser)
-    add_environment(door.viser, full=False)
-    door.viser.on_client_connect(lambda client: run_javascript(client, _HIDE_WARNING))
-    return door, number
+    server = GuardedServer(bound, AccessPolicy(host=LOOPBACK, port=number))
+    server.viser.gui.configure_theme(show_logo=False, show_share_button=False)
+    place_camera(server.viser)
+    add_environment(server.viser, full=False)
+    server.viser.on_client_connect(lambda client: run_javascript(client, _HIDE_WARNING))
+    return server, number

@@ -47,7 +47,7 @@ class JointSliders:
         language: str | None = None,
     ) -> None:
         self._model = require_model(model)
-        kernel_cells()  # From now on it watches the page while an arm moves.
+        kernel_cells()  # Starts the watchdog of the page.
         self._text = text = Text(chosen_language(language), "rcilab.notebook")
         self._show = show
         self._setting = False
@@ -89,7 +89,7 @@ class JointSliders:
         self._setting = True
         try:
             for slider, echo, angle in zip(self.sliders, self._echoes, np.degrees(self._q).tolist(), strict=True):
-                echo.give(angle)
+                echo.register(angle)
                 slider.value = angle
         finally:
             self._setting = False
@@ -97,7 +97,7 @@ class JointSliders:
 
     def _on_slider(self, change: Any) -> None:
         joint = self.sliders.index(change["owner"])
-        if self._setting or not self._echoes[joint].is_hand(change["new"]):
+        if self._setting or not self._echoes[joint].is_drag(change["new"]):
             return
         limits = self._model.limits.joint
         q = self._q.copy()

@@ -1,4 +1,4 @@
-"""When silence means that nobody is there: only where somebody listens for the answer."""
+"""When missing answers mean that the page is gone: only while the listener is free."""
 
 from __future__ import annotations
 
@@ -7,87 +7,86 @@ from collections.abc import Iterator
 
 import pytest
 
-from rcilab.notebook import browser_heartbeat as heart
-from rcilab.notebook import cells
-from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
+from rcilab.notebook import browser_heartbeat, cells
+from rcilab.notebook.browser_heartbeat import MAX_MISSED, BrowserHeartbeat
 
 
 @pytest.fixture
-def ear() -> Iterator[asyncio.AbstractEventLoop]:
-    loop = asyncio.new_event_loop()
-    yield loop
-    loop.close()
+def loop() -> Iterator[asyncio.AbstractEventLoop]:
+    event_loop = asyncio.new_event_loop()
+    yield event_loop
+    event_loop.close()
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> BrowserHeartbeat:
-    monkeypatch.setattr(heart, "INTERVAL", 0.0)  # Every beat is a question.
+    monkeypatch.setattr(browser_heartbeat, "INTERVAL", 0.0)  # Every beat is a question.
     return BrowserHeartbeat()
 
 
-def answer(asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop) -> None:
-    async def say() -> None:
+def answer(asked: BrowserHeartbeat, loop: asyncio.AbstractEventLoop) -> None:
+    async def reply() -> None:
         asked._on_answer({})
 
-    ear.run_until_complete(say())
+    loop.run_until_complete(reply())
 
 
-def listen(ear: asyncio.AbstractEventLoop) -> None:
-    ear.run_until_complete(asyncio.sleep(0))
+def listen(loop: asyncio.AbstractEventLoop) -> None:
+    loop.run_until_complete(asyncio.sleep(0))
 
 
 def test_a_page_that_never_answered_is_not_missed(asked: BrowserHeartbeat) -> None:
-    for _ in range(2 * PATIENCE):
+    for _ in range(2 * MAX_MISSED):
         asked.beat()
     assert not asked.was_seen
     assert not asked.is_gone
 
 
-def test_a_page_is_gone_after_as_many_questions_as_patience_has_and_back_with_an_answer(
-    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
+def test_a_page_is_gone_after_the_allowed_missed_heartbeats_and_back_with_an_answer(
+    asked: BrowserHeartbeat, loop: asyncio.AbstractEventLoop
 ) -> None:
-    answer(asked, ear)
-    for count in range(PATIENCE):
+    answer(asked, loop)
+    for count in range(MAX_MISSED):
         assert not asked.is_gone, count
         asked.beat()
-        listen(ear)
+        listen(loop)
     assert asked.is_gone
-    answer(asked, ear)
+    answer(asked, loop)
     assert not asked.is_gone
 
 
-def test_what_is_asked_while_nobody_listens_counts_once(
-    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
+def test_heartbeats_without_a_free_listener_count_once(
+    asked: BrowserHeartbeat, loop: asyncio.AbstractEventLoop
 ) -> None:
-    answer(asked, ear)
-    for _ in range(10 * PATIENCE):
+    answer(asked, loop)
+    for _ in range(10 * MAX_MISSED):
         asked.beat()
-    listen(ear)
+    listen(loop)
     assert not asked.is_gone
 
 
-def test_an_ear_that_the_page_has_taken_along_is_silence(asked: BrowserHeartbeat) -> None:
-    ear = asyncio.new_event_loop()
-    answer(asked, ear)
-    ear.close()
-    for _ in range(PATIENCE):
+def test_a_listener_that_the_page_has_closed_counts_as_no_answer(asked: BrowserHeartbeat) -> None:
+    loop = asyncio.new_event_loop()
+    answer(asked, loop)
+    loop.close()
+    for _ in range(MAX_MISSED):
         asked.beat()
     assert asked.is_gone
 
 
-def test_the_thread_of_cells_hears_nothing_while_a_cell_runs(
-    asked: BrowserHeartbeat, ear: asyncio.AbstractEventLoop
+def test_the_thread_of_cells_handles_no_answer_while_a_cell_runs(
+    asked: BrowserHeartbeat, loop: asyncio.AbstractEventLoop
 ) -> None:
     running = cells.CellRegistry(None)
     running._running.set()
     asked.is_cell_running = lambda: running.is_running
-    answer(asked, ear)
-    for _ in range(2 * PATIENCE):
+    answer(asked, loop)
+    for _ in range(2 * MAX_MISSED):
         asked.beat()
-        listen(ear)  # As in a cell that awaits.
+        listen(loop)  # As in a cell that awaits.
     assert not asked.is_gone
     running._running.clear()
-    for _ in range(PATIENCE):
+    for _ in range(MAX_MISSED):
         asked.beat()
-        listen(ear)
+        listen(loop)
     assert asked.is_gone

@@ -82,11 +82,11 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
         assert planned is not None
         wait_for(lambda: not panel.execute.disabled, what="Execute")
         cell = execute(robot)
-        wait_for(lambda: "A cell moves the arm" in panel._where.value and panel.progress.value > 0.0, what="the motion")
+        wait_for(lambda: "A cell moves the arm" in panel._note.value and panel.progress.value > 0.0, what="the motion")
         assert panel.progress.layout.visibility == "visible"
         assert panel.execute.disabled
         panel._on_execute()  # A press that was on its way.
-        assert "The arm is moving" in panel._said.value
+        assert "The arm is moving" in panel._sentence.value
         panel.stop.click()
         run = cell.end()
         assert run.stopped == "on request"
@@ -99,7 +99,7 @@ def test_a_motion_of_a_cell_is_shown_and_stopped_and_its_recording_is_there(
         assert timeline.slider.max == round(1000.0 * run.plan.duration)
         panel.state.pose(robot.state.q_c)
         assert timeline.slider.max == round(1000.0 * planned.motion.duration)
-        assert panel.state.seen_run is None  # The cell's is no run of this plan.
+        assert panel.state.shown_run is None  # The run of the cell does not belong to this plan.
 
 
 def test_a_motion_of_a_cell_is_held_and_goes_on_from_the_panel(robot: RobotSession, panel: RunPanel) -> None:
@@ -117,7 +117,7 @@ def test_a_callback_of_a_cell_is_shown_as_moving_without_an_end_that_nobody_know
     robot: RobotSession, panel: RunPanel
 ) -> None:
     cell = Cell(lambda: sway(robot, until=60.0))
-    wait_for(lambda: "A cell moves the arm" in panel._where.value, what="the motion")
+    wait_for(lambda: "A cell moves the arm" in panel._note.value, what="the motion")
     assert panel.progress.layout.visibility == "hidden"
     assert panel.speed_override.pause.disabled
     assert panel.execute.disabled
@@ -126,7 +126,7 @@ def test_a_callback_of_a_cell_is_shown_as_moving_without_an_end_that_nobody_know
     run = cell.end()
     assert run.stopped == "on request"
     wait_for(lambda: (ended := panel.state.outcome) is not None and ended.run is run, what="the recording")
-    seen = panel.state.seen
+    seen = panel.state.shown_plan
     assert seen is not None
     np.testing.assert_allclose(seen.motion.q[0], run.command[0], atol=1e-9)
     assert run.plan is None
@@ -158,5 +158,5 @@ def test_a_stop_pressed_while_a_motion_is_still_checked_keeps_the_arm_where_it_i
 def test_a_session_that_is_closed_is_told_to_be() -> None:
     with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         robot.close()
-        wait_for(lambda: "The session was closed" in panel._where.value, what="the words")
+        wait_for(lambda: "The session was closed" in panel._note.value, what="the words")
         assert panel.execute.disabled

@@ -56,7 +56,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
             assert panel.cancel.layout.display is None
             wait_for(lambda: panel.demo is not None and not panel.provoke.disabled, 30.0, "the demo")
             assert panel.demo is not None
-            said = text_of(panel._shown_text)
+            said = text_of(panel._details)
             assert "kCommandJointAccelerationDiscontinuity" in said
             assert f"{math.degrees(5000.0):.0f}°/s³" in said  # Five thousand rad/s^3, in the degrees of every widget.
             for part in (
@@ -65,8 +65,8 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
                 panel.demo.script,
             ):
                 assert part in said
-            assert "<circle" in panel._shown_text.value
-            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._shown_text.value)
+            assert "<circle" in panel._details.value
+            ticks = re.findall(r'text-anchor="end"[^>]*>([-0-9.e+]+)<', panel._details.value)
             assert max(map(float, ticks)) > 1e4  # So are the ticks of its curve.
             assert panel.progress.layout.display == "none"
             with notebook.Timeline(panel) as timeline, notebook.MotionPlot(panel) as plot:
@@ -84,7 +84,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
                 panel.fault.value = Fault.COLLISION
                 assert timeline.moment is None
             assert panel.moment.layout.display == "none"
-            assert "<circle" not in panel._shown_text.value
+            assert "<circle" not in panel._details.value
             assert len(processes() - own) == 1
         assert processes() == own
         after = robot.receive_state()
@@ -108,7 +108,7 @@ def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
     with notebook.FaultPanel(rcilab.load_model("xMate7")) as panel:
         panel.fault.value = Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION
         assert panel.provoke.disabled
-        assert "7 axes" in text_of(panel._shown_text)
+        assert "7 axes" in text_of(panel._details)
         panel.fault.value = Fault.COLLISION
         assert not panel.provoke.disabled
 
@@ -117,7 +117,7 @@ def test_an_arm_without_scenarios_shows_its_makers_faults_and_says_why_they_cann
     with notebook.FaultPanel(rcilab.load_model("Panda")) as panel:
         assert len(panel.fault.options) == 41
         assert panel.provoke.disabled
-        told = text_of(panel._shown_text)
+        told = text_of(panel._details)
         assert panel.fault.value.cause in told
         assert "no fault scenarios for Panda" in told
 

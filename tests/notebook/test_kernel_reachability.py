@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rcilab.notebook.kernel_reachability import KernelReachability, Server, Way, find_place
+from rcilab.notebook.kernel_reachability import KernelReachability, Route, Server, find_reachability
 
 LOCAL = Server(hostname="127.0.0.1", base="/")
 
@@ -32,9 +32,9 @@ LOCAL = Server(hostname="127.0.0.1", base="/")
     ],
 )
 def test_the_rule_of_where_the_browser_is(
-    environment: dict[str, str], server: Server | None, has_proxy: bool, way: Way
+    environment: dict[str, str], server: Server | None, has_proxy: bool, way: Route
 ) -> None:
-    assert find_place(environment, server, has_proxy).way == way
+    assert find_reachability(environment, server, has_proxy).way == way
 
 
 CODE_CELL = "vscode-notebook-cell:/home/ann/arm.ipynb#W0sZmlsZQ%3D%3D"
@@ -58,8 +58,10 @@ CODE_SERVER = {
         (LAB_CELL, {"VSCODE_PID": "7", "SSH_CONNECTION": "x"}, LOCAL, "proxy"),  # Started in VS Code's terminal.
     ],
 )
-def test_who_asks_is_told_by_the_cell(cell: str, environment: dict[str, str], server: Server | None, way: Way) -> None:
-    assert find_place(environment, server, True, cell).way == way
+def test_who_asks_is_told_by_the_cell(
+    cell: str, environment: dict[str, str], server: Server | None, way: Route
+) -> None:
+    assert find_reachability(environment, server, True, cell).way == way
 
 
 @pytest.mark.parametrize(
@@ -70,26 +72,26 @@ def test_who_asks_is_told_by_the_cell(cell: str, environment: dict[str, str], se
     ],
 )
 def test_code_server_says_where_a_port_is(ports: str, address: str) -> None:
-    place = find_place({**CODE_SERVER, "VSCODE_PROXY_URI": ports}, None, True, CODE_CELL)
+    place = find_reachability({**CODE_SERVER, "VSCODE_PROXY_URI": ports}, None, True, CODE_CELL)
     assert place.address("http://127.0.0.1:4711/static/?plain") == address
 
 
 def test_where_ports_are_shown_to_a_login_only_nothing_is_framed() -> None:
     known = {"VSCODE_PROXY_URI": CODE_SERVER["VSCODE_PROXY_URI"], "SSH_CONNECTION": "x", "VSCODE_PID": "7"}
-    assert find_place(known, None, True, CODE_CELL) == KernelReachability(way="static", proxy_helps=False)
+    assert find_reachability(known, None, True, CODE_CELL) == KernelReachability(way="static", proxy_helps=False)
 
 
 def test_the_cell_that_runs_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     told: dict[str, Any] = {"metadata": {"cellId": CODE_CELL}}
     monkeypatch.setattr("rcilab.notebook.kernel_reachability.shell", lambda: SimpleNamespace(get_parent=lambda: told))
     server = Server(hostname="127.0.0.1", base="/arm/")
-    assert find_place({}, server, True).way == "static"
+    assert find_reachability({}, server, True).way == "static"
     told["metadata"] = {}  # A press.
-    assert find_place({}, server, True).way == "proxy"
+    assert find_reachability({}, server, True).way == "proxy"
 
 
 def test_an_address_goes_below_the_notebook_server_behind_a_proxy() -> None:
-    place = find_place({"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, True)
+    place = find_reachability({"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, True)
     assert place.address("http://127.0.0.1:4711/static/?plain") == "/user/ann/proxy/4711/static/?plain"
     assert (
         KernelReachability(way="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
@@ -104,7 +106,7 @@ def test_the_server_that_started_the_kernel_is_known_by_what_it_wrote(
     file = tmp_path / "jpserver-4711.json"
     file.write_text('{"hostname": "0.0.0.0", "base_url": "/arm/", "pid": 4711}', encoding="utf-8")
     started = {"JPY_PARENT_PID": "4711"}
-    assert find_place(started, None, True) == KernelReachability(way="proxy", base="/arm/")
-    assert find_place({"JPY_PARENT_PID": "1"}, None, True).way == "loopback"  # Some other program started it.
+    assert find_reachability(started, None, True) == KernelReachability(way="proxy", base="/arm/")
+    assert find_reachability({"JPY_PARENT_PID": "1"}, None, True).way == "loopback"  # Some other program started it.
     file.write_text('{"hostname": "0.0', encoding="utf-8")
-    assert find_place(started, None, True).way == "loopback"
+    assert find_reachability(started, None, True).way == "loopback"

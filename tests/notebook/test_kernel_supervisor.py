@@ -70,15 +70,15 @@ until(lambda: robot.is_moving)
 """
 PAGE = """
 from rcilab.notebook import browser_heartbeat
-from rcilab.notebook.subshell_routing import hear_at_once
+from rcilab.notebook.subshell_routing import handle_during_cells
 from ipywidgets import Button
 browser_heartbeat.INTERVAL = 0.2  # A second of silence is enough.
-kernel_heart = browser_heartbeat.kernel_heart()
-kernel_heart.open()
+kernel_heartbeat = browser_heartbeat.kernel_heartbeat()
+kernel_heartbeat.open()
 slow = Button()
-hear_at_once(slow)
+handle_during_cells(slow)
 slow.on_click(lambda _: time.sleep(2.0))
-[widget.comm.comm_id for widget in (*kernel_heart._widgets[:2], slow)]
+[widget.comm.comm_id for widget in (*kernel_heartbeat._widgets[:2], slow)]
 """
 CLICK: dict[str, Any] = {"method": "custom", "content": {"event": "click"}}
 STANDS = """

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import rcilab
-from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
+from rcilab.notebook.browser_watchdog import PAGE_GONE
 from tests.notebook.jupyter_servers import serving
 from tests.waiting import wait_for
 
@@ -216,7 +216,7 @@ def test_a_tab_that_is_closed_stops_what_panel_and_cell_move_but_not_one_without
     assert not ended.exists()
     page.close()
     deadline = time.monotonic() + 20.0
-    while not ended.exists() or ended.read_text() != OPERATOR_ABSENT:
+    while not ended.exists() or ended.read_text() != PAGE_GONE:
         assert time.monotonic() < deadline, "the cell's arm goes on although nobody is there"
         time.sleep(0.1)
     told = {

@@ -11,7 +11,7 @@ from rcilab.conformance.check import check
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
-from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
+from rcilab.notebook.browser_watchdog import PAGE_GONE
 from rcilab.notebook.lesson import answer, language
 from rcilab.recording.run import build_run
 
@@ -68,5 +68,5 @@ def test_what_shows_itself_speaks_as_any_notebook_does(monkeypatch, name: str, w
 def test_why_a_run_was_stopped_is_said_in_the_readers_language(monkeypatch) -> None:
     monkeypatch.setenv(SESSION, "mine.zh.ipynb")
     rows = np.zeros(0, cycle_dtype(7))
-    assert "笔记本页面已不在" in build_run(rows, plan=None, realtime=False, stopped=OPERATOR_ABSENT)._repr_html_()
+    assert "笔记本页面已不在" in build_run(rows, plan=None, realtime=False, stopped=PAGE_GONE)._repr_html_()
     assert "too hot" in build_run(rows, plan=None, realtime=False, stopped="too hot")._repr_html_()  # One's own reason.

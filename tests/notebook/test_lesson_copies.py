@@ -15,7 +15,7 @@ from rcilab.core.errors import UsageError
 from rcilab.notebook.lessons import INDEX, copy_lessons, find_lessons
 
 LESSON = "01_first.zh.ipynb"
-BESIDE = "01_first.new.zh.ipynb"
+NEW_VERSION = "01_first.new.zh.ipynb"
 
 
 @pytest.fixture
@@ -34,13 +34,13 @@ def test_an_unedited_copy_follows_the_lesson_and_an_edited_one_stays(tmp_path: P
     (source / LESSON).write_text("second", encoding="utf-8")
     assert copy_lessons(mine, source).written == (LESSON,)
     (mine / LESSON).write_text("my answers", encoding="utf-8")
-    assert copy_lessons(mine, source).beside == ()  # Nothing is newer than what was given out.
+    assert copy_lessons(mine, source).new_versions == ()  # Nothing is newer than what was given out.
     (source / LESSON).write_text("third", encoding="utf-8")
     copied = copy_lessons(mine, source)
-    assert copied.beside == (BESIDE,)
-    assert BESIDE in str(copied)
+    assert copied.new_versions == (NEW_VERSION,)
+    assert NEW_VERSION in str(copied)
     assert (mine / LESSON).read_text(encoding="utf-8") == "my answers"
-    assert (mine / BESIDE).read_text(encoding="utf-8") == "third"
+    assert (mine / NEW_VERSION).read_text(encoding="utf-8") == "third"
 
 
 def test_a_newer_lesson_that_was_deleted_is_not_offered_again(tmp_path: Path, source: Path) -> None:
@@ -48,21 +48,23 @@ def test_a_newer_lesson_that_was_deleted_is_not_offered_again(tmp_path: Path, so
     (tmp_path / LESSON).write_text("my answers", encoding="utf-8")
     (source / LESSON).write_text("second", encoding="utf-8")
     copy_lessons(tmp_path, source)
-    (tmp_path / BESIDE).unlink()
-    assert copy_lessons(tmp_path, source).beside == ()
+    (tmp_path / NEW_VERSION).unlink()
+    assert copy_lessons(tmp_path, source).new_versions == ()
     (tmp_path / LESSON).unlink()
     assert copy_lessons(tmp_path, source).written == (LESSON,)
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir, lambda path: path.write_bytes(b"\xff")])
-def test_a_lesson_is_offered_beside_what_is_no_copy(tmp_path: Path, source: Path, make: Callable[[Path], None]) -> None:
+def test_a_lesson_is_offered_next_to_a_file_that_is_not_a_copy(
+    tmp_path: Path, source: Path, make: Callable[[Path], None]
+) -> None:
     make(tmp_path / LESSON)
-    assert copy_lessons(tmp_path, source).beside == (BESIDE,)
+    assert copy_lessons(tmp_path, source).new_versions == (NEW_VERSION,)
 
 
 def test_a_copy_without_a_record_counts_as_edited(tmp_path: Path, source: Path) -> None:
     (tmp_path / LESSON).write_text("from long ago", encoding="utf-8")
-    assert copy_lessons(tmp_path, source).beside == (BESIDE,)
+    assert copy_lessons(tmp_path, source).new_versions == (NEW_VERSION,)
     assert (tmp_path / LESSON).read_text(encoding="utf-8") == "from long ago"
 
 

@@ -44,7 +44,7 @@ def lab() -> Iterator[Lab]:
 @pytest.fixture
 def fresh(lab: Lab) -> Lab:
     with lab.state.lock:
-        lab.state._rest = PRO7.home
+        lab.state._last_position = PRO7.home
         lab.state.store.update(plan=None, no_plan=None, recording=None)
         lab.state.moment, lab.state.displayed = None, None
         lab.state.notify("plan", "moment", "goal")
@@ -247,14 +247,14 @@ def test_plan_check_and_plot_show_the_same_motion_as_the_library(fresh: Lab) -> 
     assert plan.report.ok
     assert fresh.report.report is plan.report
     assert fresh.plot.html.count("<svg") == 4
-    assert "Passed" in text_of(fresh.plan._said)
+    assert "Passed" in text_of(fresh.plan._sentence)
     assert not plan.report.warnings
 
 
 def test_a_posed_goal_without_a_plan_says_which_button_is_missing() -> None:
     with notebook.PlanPanel(PRO7, language="en") as plan, notebook.ReportView(plan) as report:
         plan.state.pose(GOAL)
-        for said in (plan._said, report._verdict):
+        for said in (plan._sentence, report._verdict):
             assert "pose the goal, then press Plan there" in text_of(said)
 
 
@@ -262,7 +262,7 @@ def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
     fresh.jog.q = GOAL
     fresh.plan.plan.click()
     fresh.jog.sliders[0].value = 1.0
-    assert "has moved" in text_of(fresh.plan._said)
+    assert "has moved" in text_of(fresh.plan._sentence)
 
 
 def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: Lab) -> None:
@@ -320,7 +320,7 @@ def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
     assert broken is not None
     fresh.plan.slow_down.click()
     assert fresh.state.now.plan is broken
-    assert broken.report.slow_down().explain("en") in text_of(fresh.plan._said)
+    assert broken.report.slow_down().explain("en") in text_of(fresh.plan._sentence)
 
 
 def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
@@ -328,7 +328,7 @@ def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
     fresh.jog.q = PRO7.home + 0.1
     fresh.plan.plan.click()
     fresh.plan.way.value = "joint"
-    said = text_of(fresh.plan._said)
+    said = text_of(fresh.plan._sentence)
     assert "Passed" in said or "No plan" in said
 
 
@@ -374,7 +374,7 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
         assert "jupyter-server-proxy" in text_of(scene._note)
         before = scene._frame.value
         scene.state.take_motion(rcilab.plan_joint(XMATE3, XMATE3.home, XMATE3.home + 0.3))
-        assert "set_animation" in scene._make_film().html() or scene._frame.value != before
+        assert "set_animation" in scene._make_animation().html() or scene._frame.value != before
 
 
 def test_a_film_advises_nothing_that_does_not_help() -> None:
@@ -415,7 +415,7 @@ def test_every_part_shows_itself_in_chinese_and_closes_twice() -> None:
 def test_a_fault_is_told_with_its_cause_and_remedy() -> None:
     with notebook.FaultPanel(PRO7) as panel:
         panel.fault.value = Fault.COLLISION
-        told = text_of(panel._shown_text)
+        told = text_of(panel._details)
         assert "kCollision" in told
         assert Fault.COLLISION.cause in told
 

@@ -153,7 +153,7 @@ def test_one_jump_of_all_joints_is_one_place_in_the_title() -> None:
         ((MOTION, "xMatePro7"), r"use load_model\('xMatePro7'\)"),
         ((PRO7, MOTION), "motion must be a motion.*, got RobotModel"),
         ((None, PRO7), "motion must be a motion.*, got None"),
-        ((MOTION, PRO7, "x"), "run: 'x' is no run"),
+        ((MOTION, PRO7, "x"), "run: 'x' is not a run"),
     ],
 )
 def test_wrong_types_are_refused_in_words(arguments: tuple[Any, ...], sentence: str) -> None:

@@ -17,7 +17,7 @@ from tornado import httpclient, websocket
 
 import rcilab
 from rcilab import notebook
-from rcilab.notebook.kernel_reachability import find_place
+from rcilab.notebook.kernel_reachability import find_reachability
 from tests.notebook.jupyter_servers import serving
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]
 def test_a_scene_is_live_through_the_proxy(server: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     import_module("ipykernel")  # What makes this process look like a kernel.
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", server["runtime"])
-    place = find_place({"JPY_PARENT_PID": str(server["pid"])})
+    place = find_reachability({"JPY_PARENT_PID": str(server["pid"])})
     assert (place.way, place.base) == ("proxy", "/arm/")
     model = rcilab.load_model("xMate3")
     with notebook.Scene(model, place=place) as scene:

@@ -20,7 +20,7 @@ from rcilab.i18n.translator import Text
 from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
 from rcilab.makers.maker import parameters_of
 from rcilab.makers.parameters import default_parameters
-from rcilab.notebook import robot_words
+from rcilab.notebook import status_texts
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -133,10 +133,10 @@ def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> 
         assert not panel.execute.disabled
         panel.modes.fields["joint_stiffness"][0].box.value = "500"
         assert panel.execute.disabled
-        assert text("ready.control_unsent", address=robot.name) in text_of(panel._where)
+        assert text("ready.control_unsent", address=robot.name) in text_of(panel._note)
         panel.modes.send.click()
         assert robot.told == []
-        assert robot.name in text_of(panel.modes._said)
+        assert robot.name in text_of(panel.modes._sentence)
         panel.modes.send.click()
         stiffness = default_parameters(parameters_of(PRO7))["joint_stiffness"]
         assert [told["joint_stiffness"] for told in robot.told] == [(500.0, *stiffness[1:])]
@@ -154,7 +154,7 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
     for language in LANGUAGES:
         text = Text(language, "rcilab.notebook")
         for error in errors:
-            said = text.render(robot_words.describe_refusal(error))
+            said = text.render(status_texts.describe_refusal(error))
             assert str(error) not in said
             assert not re.search(r"\b(status|what|error|robot)\.[a-zA-Z_]+", said), said
     panda = rcilab.load_model("Panda")

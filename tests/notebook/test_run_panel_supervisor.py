@@ -17,8 +17,8 @@ from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.execution.simulation_control import SimulationControl
-from rcilab.notebook.browser_heartbeat import PATIENCE, BrowserHeartbeat
-from rcilab.notebook.browser_watchdog import OPERATOR_ABSENT
+from rcilab.notebook.browser_heartbeat import MAX_MISSED, BrowserHeartbeat
+from rcilab.notebook.browser_watchdog import PAGE_GONE
 from tests.waiting import wait_for
 
 if TYPE_CHECKING:
@@ -75,21 +75,21 @@ def test_power_execute_stop_and_what_came_of_it_in_a_process_of_its_own() -> Non
 
 
 def test_a_page_that_falls_silent_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
-    heart = BrowserHeartbeat()
-    monkeypatch.setattr("rcilab.notebook.run_panel.kernel_heart", lambda: heart)
+    heartbeat = BrowserHeartbeat()
+    monkeypatch.setattr("rcilab.notebook.run_panel.kernel_heartbeat", lambda: heartbeat)
     with rcilab.simulate(PRO7) as robot, notebook.RunPanel(robot) as panel:
         power_on(panel)
         panel.state.pose(PRO7.home + 0.3)
         panel.state.ask(SetSpeed(speed=0.05))
         panel.state.make_plan()
-        heart._on_answer({})  # A browser was there.
+        heartbeat._on_answer({})  # A browser was there.
         panel.execute.click()
         wait_for(lambda: phase(panel) == "moving", what="a motion")
-        monkeypatch.setattr(heart, "_missed", PATIENCE)  # And is not any more.
+        monkeypatch.setattr(heartbeat, "_missed", MAX_MISSED)  # And is not any more.
         wait_for(lambda: panel.state.outcome is not None, what="the run")
         run = panel.state.outcome.run
         assert run is not None
-        assert run.stopped == OPERATOR_ABSENT
+        assert run.stopped == PAGE_GONE
         wait_for(lambda: "page did not answer" in panel._outcome.value, what="why, in words")
     assert repr(robot).endswith("closed>")
 
@@ -126,7 +126,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         speed_override.pause.click()
         wait_for(lambda: speed_override.resume.layout.display is None, what="the arm held")
         wait_for(
-            lambda: re.search(r"Paused at \d+\.\d s of the plan", speed_override._way.value),
+            lambda: re.search(r"Paused at \d+\.\d s of the plan", speed_override._progress.value),
             what="where it is held, in words",
         )
         speed_override.field.box.value = "50"
@@ -134,7 +134,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         assert panel.state.status is not None
         assert panel.state.status.speed_override == 0.0  # It keeps waiting.
         speed_override.resume.click()
-        wait_for(lambda: "50 %" in speed_override._way.value, what="half the speed")
+        wait_for(lambda: "50 %" in speed_override._progress.value, what="half the speed")
         wait_for(
             lambda: (
                 (now := panel.state.status).motion_plan_time is not None
@@ -148,7 +148,7 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
         panel.stop.click()
         wait_for(lambda: speed_override.pause.disabled, what="the end of the motion")
         wait_for(
-            lambda: not speed_override._way.value, what="the end of what is said of it"
+            lambda: not speed_override._progress.value, what="the end of what is said of it"
         )  # Another thread writes it, a moment later.
         wait_for(lambda: panel.state.outcome is not None, what="the run")
         run = panel.state.outcome.run
@@ -161,8 +161,8 @@ def test_a_motion_is_held_gone_on_with_and_slowed_down_as_by_the_session(own: bo
             assert timeline.slider.max == round(1000.0 * run.plan.duration)
             timeline.moment = 1.0
             assert "left:" in plot._cursor.value
-            assert panel.state.seen_arm is not None
-            np.testing.assert_array_equal(panel.state.seen_arm.motion.at(1.0).q, run.plan.at(1.0).q)
+            assert panel.state.shown_scene_plan is not None
+            np.testing.assert_array_equal(panel.state.shown_scene_plan.motion.at(1.0).q, run.plan.at(1.0).q)
             panel.state.make_plan()
             assert timeline.slider.max < round(1000.0 * run.plan.duration)
 
@@ -173,9 +173,9 @@ def test_what_cannot_be_held_any_more_goes_on_and_says_so() -> None:
         robot.error = PlanningError("it arrives before")
         panel._take(robot)  # type: ignore[arg-type]
         panel.speed_override.pause.click()
-        wait_for(lambda: "Too late to pause" in panel.speed_override._way.value, what="why not")
+        wait_for(lambda: "Too late to pause" in panel.speed_override._progress.value, what="why not")
         assert robot.overrides == [0.0]
-        assert "rl-problem" in panel.speed_override._way.value
+        assert "rl-problem" in panel.speed_override._progress.value
 
 
 def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
@@ -250,7 +250,7 @@ def test_an_address_that_is_none_is_refused_beside_the_button() -> None:
     with notebook.RunPanel(PRO7) as panel:
         panel.target.value = "address"
         panel.connect.click()
-        assert "rl-problem" in panel._said.value
+        assert "rl-problem" in panel._sentence.value
         panel.address.value = "nonsense"
         panel.connect.click()
         assert "rl-problem" in panel._outcome.value

@@ -13,7 +13,7 @@ from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.text import Text as PageText
 from rcilab.control_process import SupervisorStatus
 from rcilab.i18n.translator import Text
-from rcilab.notebook.robot_words import outcome_html as notebook_outcome
+from rcilab.notebook.status_texts import outcome_html as notebook_outcome
 from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.run_html import run_html
 from rcilab.recording.tracking_text import tracking_notes

@@ -22,7 +22,7 @@ from rcilab.i18n import translator
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
-from rcilab.notebook.robot_words import outcome_html as notebook_outcome
+from rcilab.notebook.status_texts import outcome_html as notebook_outcome
 from rcilab.recording.html_facts import describe_stop
 from rcilab.recording.run import build_run, describe_end
 from rcilab.sim.api import WorldStatus

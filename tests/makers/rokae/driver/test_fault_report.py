@@ -24,7 +24,7 @@ from rcilab.i18n.error_messages import describe_note
 from rcilab.makers.rokae.driver.fault_report import describe_faults
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
-from rcilab.notebook.robot_words import outcome_html as notebook_outcome
+from rcilab.notebook.status_texts import outcome_html as notebook_outcome
 from rcilab.recording.run import build_run
 from rcilab.workbench.panels.outcome import outcome_html
 

@@ -54,19 +54,17 @@ def health_html(status: SupervisorStatus, text: Text) -> str:
     return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
 
 
-def outcome_html(
-    outcome: Outcome, status: SupervisorStatus | None, text: Text, *, is_operator_absent: bool = False
-) -> str:
+def outcome_html(outcome: Outcome, status: SupervisorStatus | None, text: Text, *, is_page_gone: bool = False) -> str:
     """Returns the result of a request.
 
     Args:
         outcome: The result.
         status: Status of the robot.
         text: The catalogue.
-        is_operator_absent: Whether the motion was stopped because the page is closed.
+        is_page_gone: Whether the motion was stopped because the page is closed.
     """
     error, run = outcome.error, outcome.run
-    stopped = verdict("warn", "▲", text("run.operator_absent" if is_operator_absent else "run.stopped"))
+    stopped = verdict("warn", "▲", text("run.page_gone" if is_page_gone else "run.stopped"))
     if isinstance(error, ControlError) and error.code == SAFETY_STOP:
         why = describe_stop(describe_end(error), error.faults, text)
         return verdict("bad", "✗", text("run.safety_stop", why=why))
