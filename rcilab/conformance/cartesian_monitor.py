@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.common_conditions import TOOL_CONDITIONS
-from rcilab.conformance.divided_differences import difference_times
+from rcilab.conformance.divided_differences import difference_times, tool_norms
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
@@ -101,9 +101,9 @@ class CartesianMonitor:
         return (
             excess,
             *angle,
-            *_norms(self.twist),
-            *_norms(self.acceleration),
-            *_norms(self.jerk),
+            *tool_norms(self.twist),
+            *tool_norms(self.acceleration),
+            *tool_norms(self.jerk),
         )
 
 
@@ -111,11 +111,6 @@ def _difference(new: Six, old: Six, h: float) -> Six:
     a, b, c, d, e, f = new
     p, q, r, s, t, u = old
     return (a - p) / h, (b - q) / h, (c - r) / h, (d - s) / h, (e - t) / h, (f - u) / h
-
-
-def _norms(values: Six) -> tuple[float, float]:
-    a, b, c, d, e, f = values
-    return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)
 
 
 def _arm_angle_differences(previous: Four | None, psi: float | None, times: tuple[float, float, float]) -> Four | None:

@@ -1,6 +1,9 @@
-"""Newton's divided differences of unevenly spaced commands."""
+"""Newton's divided differences of unevenly spaced commands, and the norms of those of a tool."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
 
 from rcilab.core.clock import CYCLE_TIME
 
@@ -22,3 +25,9 @@ def difference_times(cycles: int, previous: tuple[int, int]) -> tuple[float, flo
     if cycles == last == oldest == 1:
         return EVEN_TIMES
     return cycles * CYCLE_TIME, (cycles + last) * CYCLE_TIME / 2.0, (cycles + last + oldest) * CYCLE_TIME / 3.0
+
+
+def tool_norms(values: Sequence[float]) -> tuple[float, float]:
+    """Returns the norms of the linear and the angular part of a twist or of one of its derivatives, 6 numbers."""
+    a, b, c, d, e, f = values
+    return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from rcilab.conformance.bounds_table import BoundsTable
 from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, MEASURED_CONDITIONS
+from rcilab.conformance.divided_differences import tool_norms
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -16,6 +17,7 @@ from rcilab.core.safety_box import EntryBox, SafetyBox, active_box
 
 _FILTER_GAIN = CYCLE_TIME / (CYCLE_TIME + 1.0 / (2.0 * math.pi * ACCELERATION_CUTOFF))
 """Gain of the first-order low-pass filter for a new difference in one cycle."""
+_SMALLEST_THRESHOLD = 1e-3  # [N m] Divisor for a collision threshold of zero.
 
 
 class MeasuredMonitor:
@@ -95,8 +97,8 @@ class MeasuredMonitor:
         self._dq, self._psi = list(dq), psi
         self._twist = None if twist is None else list(twist)
         excess = -1.0 if self._box is None else self._box.excess(position)
-        velocity = (0.0, 0.0) if twist is None else _norms(twist)
-        acceleration = _norms(self.tool_acceleration)
+        velocity = (0.0, 0.0) if twist is None else tool_norms(twist)
+        acceleration = tool_norms(self.tool_acceleration)
         self._values = [*q, excess, speed, *dq, *velocity, *self.acceleration, *acceleration]
         return self._rows.evaluate(self._values)
 
@@ -113,6 +115,17 @@ def _filter_difference(state: list[float], new: Sequence[float] | None, old: Seq
     return [x + _FILTER_GAIN * ((a - b) / CYCLE_TIME - x) for x, a, b in triples]
 
 
-def _norms(values: Sequence[float]) -> tuple[float, float]:
-    a, b, c, d, e, f = values
-    return math.sqrt(a * a + b * b + c * c), math.sqrt(d * d + e * e + f * f)
+def find_collision_joint(torques: Sequence[float], thresholds: Sequence[float]) -> int:
+    """Returns the index of the joint whose external torque is farthest above its collision threshold, as a ratio.
+
+    If no torque is above its threshold, it is the joint nearest to its threshold.
+
+    Args:
+        torques: External joint torques, n numbers, [N m].
+        thresholds: Collision thresholds, n numbers, [N m].
+    """
+    ratios = [
+        (abs(torque) > threshold, abs(torque) / max(threshold, _SMALLEST_THRESHOLD))
+        for torque, threshold in zip(torques, thresholds, strict=True)
+    ]
+    return max(range(len(ratios)), key=ratios.__getitem__)

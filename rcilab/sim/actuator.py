@@ -1,8 +1,8 @@
 """The control laws that turn a reference into the setpoint of the drives, once a cycle.
 
     POSITION              the servo follows the commanded angles, also for a stop and at standstill
-    JOINT_IMPEDANCE       springs at the joints pull towards the commanded angles
-    CARTESIAN_IMPEDANCE   springs at the tool pull towards the commanded pose, and the desired wrench is
+    JOINT_IMPEDANCE       springs at the joints act towards the commanded angles
+    CARTESIAN_IMPEDANCE   springs at the tool act towards the commanded pose, and the desired wrench is
                           added; both along the force axes, at the tool's origin
     TORQUE                the commanded torques act, gravity and friction are compensated
     GUIDE                 the arm is weightless and is guided by hand
@@ -46,12 +46,12 @@ class ControlLaw(Enum):
     GUIDE = "guide"
     BRAKED = "braked"
 
-    def __init__(self, words: str) -> None:
-        self.is_compliant: Final = words not in ("position", "braked")
+    def __init__(self, name: str) -> None:
+        self.is_compliant: Final = name not in ("position", "braked")
         """Whether the arm may deviate from its reference, so that a stop begins at the measured position."""
-        self.drive: Final = _DRIVES.get(words, Drive.TORQUE)
+        self.drive: Final = _DRIVES.get(name, Drive.TORQUE)
         """Mode of the drives."""
-        self.is_force_driven: Final = words in ("torque", "guide")
+        self.is_force_driven: Final = name in ("torque", "guide")
         """Whether forces move the arm, and commanded angles follow the measured ones."""
 
 
@@ -65,7 +65,7 @@ class Actuator:
 
     def __init__(self, model: RobotModel, parameters: ArmParameters) -> None:
         self._axes = ForceAxes(model, parameters)
-        self._wrench = (0.0,) * 6  # The present one.
+        self._wrench = (0.0,) * 6  # The present desired wrench.
         self.configure(model, parameters)
         self._freedom = GuidedFreedom.ALL
 
@@ -142,7 +142,7 @@ class Actuator:
 
 
 def _approach(wrench: tuple[float, ...], desired: tuple[float, ...]) -> tuple[float, ...]:
-    """Returns the next wrench on a ramp to the desired one: a step would jerk the arm."""
+    """Returns the next wrench on a ramp to the desired one: a step would accelerate the arm suddenly."""
     if wrench == desired:
         return desired
     return tuple(

@@ -30,7 +30,7 @@ from rcilab.sim.arrivals import (
     DatagramArrived,
     ExtraSocketsReady,
     FrameArrived,
-    StrangerDetected,
+    UnknownSenderDetected,
 )
 from rcilab.sim.channels import Peer
 from rcilab.sim.clock_stalls import StallSchedule
@@ -39,7 +39,7 @@ from rcilab.sim.cycle_timer import CycleTimer
 from rcilab.sim.endpoint import Endpoint
 from rcilab.sim.environment import Environment, ServerCounters
 from rcilab.sim.faulty_network import FaultyNetwork
-from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
+from rcilab.sim.log_lines import LineHandler, LogLines, RateLimitedLog
 from rcilab.sim.maker_server import MakerServer
 from rcilab.sim.simulation_port import SimulationPort
 
@@ -54,7 +54,7 @@ SLIP = 20  # [cycles] A motion that took this much longer than planned is logged
 GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
-_MOST_LINES = 20  # Of a kind that a client causes, before they are summed up: as many as a person reads.
+_MOST_LINES = 20  # Of a kind that a client causes, before they are only counted. A tuning value.
 _CHECK_PERIOD = 0.1  # [s] Between checks for the end of the parent process, or for a requested end during a stall.
 
 
@@ -91,10 +91,10 @@ class ArmServer:
         self._timer = CycleTimer(self._clock.now())
         self._is_ending = False
         self._next_check = 0.0
-        self._cores = CpuLatencyLock()
+        self._cpu_latency_lock = CpuLatencyLock()
         self._missed_before = 0
         self._logged_faults: tuple[FaultCode, ...] = ()
-        self._rare_lines = SeldomLines(log, self._clock.now)
+        self._log_limiter = RateLimitedLog(log, self._clock.now)
         client = None if config.client_host is None else (config.client_host, config.client_port)
         self._endpoint = Endpoint(config.host, server.channels, client)
         states_network = config.network if config.states_network is None else config.states_network
@@ -153,7 +153,7 @@ class ArmServer:
             self._loop(on_ready)
         finally:
             _parts_log.removeHandler(parts)
-            self._cores.switch(False)
+            self._cpu_latency_lock.switch(False)
             if use_realtime:
                 leave_realtime()
             self.close()
@@ -203,7 +203,7 @@ class ArmServer:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
                     self._serve_until(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
-                if self._timer.puts_off(self.controller.is_starved):
+                if self._timer.postpones(self.controller.is_starved):
                     continue
             has_served = self._step(self._timer.deadline)
             if not is_ready:
@@ -244,7 +244,7 @@ class ArmServer:
             remaining = min(deadline - self._clock.now(), _CHECK_PERIOD)
             remaining = resend - self._clock.now() if is_first else remaining
             self._poll(0.0 if len(controller.arm.playout) else remaining)
-            self._check_now_and_then()
+            self._check_periodically()
             if len(controller.arm.playout) or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
                 return
@@ -253,7 +253,7 @@ class ArmServer:
             if self._has_timed_out and controller.arm.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
-            if is_first:  # Not after every foreign datagram: the states would fill the client's buffer.
+            if is_first:  # Not after every unknown datagram: the states would fill the client's buffer.
                 if self._clock.now() >= resend:
                     self._server.send_states()
                     resend = self._clock.now() + RESEND_TIME
@@ -296,13 +296,13 @@ class ArmServer:
         if self.controller.is_moving is not was_moving and not self.config.lockstep:
             self._log_slip()
         self._server.settle()
-        self._check_now_and_then()
+        self._check_periodically()
         return is_idle
 
-    def _check_now_and_then(self) -> None:
+    def _check_periodically(self) -> None:
         if self._clock.now() >= self._next_check:
             self._next_check = self._clock.now() + _CHECK_PERIOD
-            self._rare_lines.write_counts()
+            self._log_limiter.write_counts()
             if self.config.parent_pid is not None and os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
@@ -319,20 +319,22 @@ class ArmServer:
                 self._advance(is_seen=False)
 
     def _log_refusal(self, line: str) -> None:
-        self._rare_lines.write("refused request", line, "requests were refused", _MOST_LINES)
+        self._log_limiter.write("refused request", line, "requests were refused", _MOST_LINES)
 
     def _log_slip(self) -> None:
         """Logs by how much a motion took longer than planned, after its end."""
         if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
-            line = f"that motion took {slipped:.0f} ms longer than it should: this machine, or a stall, held us up"
-            self._rare_lines.write("slip", line, "motions took longer", _MOST_LINES)
+            line = (
+                f"that motion took {slipped:.0f} ms longer than planned: the machine was busy or a stall was simulated"
+            )
+            self._log_limiter.write("slip", line, "motions took longer", _MOST_LINES)
         self._missed_before = self.missed
 
     def _advance(self, *, is_seen: bool = True) -> None:
         """Advances by one cycle."""
         if self.config.realtime and not self.config.lockstep:
-            self._cores.switch(self.controller.is_moving)
+            self._cpu_latency_lock.switch(self.controller.is_moving)
         self._server.step(is_seen=is_seen)
         self._environment.step()
         faults = self.controller.faults
@@ -344,10 +346,10 @@ class ArmServer:
         self._logged_faults = faults
         if faults:
             line = f"{name_faults(faults)}: {self.controller.reason}; the arm stops"
-            self._rare_lines.write("fault", line, "faults stopped the arm", _MOST_LINES)
+            self._log_limiter.write("fault", line, "faults stopped the arm", _MOST_LINES)
             if self.controller.lacks_commands and self.controller.arm.playout.lost:
                 line = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
-                self._rare_lines.write("playout", line, "motions lacked commands")
+                self._log_limiter.write("playout", line, "motions lacked commands")
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
@@ -364,26 +366,26 @@ class ArmServer:
                 case ExtraSocketsReady(sockets):
                     if self._simulation_port is not None:
                         self._simulation_port.serve(sockets)
-                case StrangerDetected(address, client):
+                case UnknownSenderDetected(address, client):
                     whose = f"the client is at {client}" if client else "no client is connected"
-                    line = f"left out a UDP datagram from {address}, and will all others: {whose}"
-                    self._rare_lines.write("unknown sender", line, "were left out")
+                    line = f"ignored a UDP datagram from {address} and will ignore further ones: {whose}"
+                    self._log_limiter.write("unknown sender", line, "were ignored")
                 case ClientRefused(address, holder):
                     line = f"refused another client from {address}: {holder} is connected"
-                    self._rare_lines.write("refused", line, "clients were refused")
+                    self._log_limiter.write("refused", line, "clients were refused")
 
     def _warn_of_other_target(self, address: str) -> None:
         target = self._endpoint.fixed_host
         if target not in (None, address):
             line = (
-                f"{address} connected, but states go to {target}, as --client says: it will not see any; start with "
-                f"--client {address}, or without"
+                f"{address} connected, but states go to {target}, because of --client: it will receive none; start "
+                f"with --client {address}, or without"
             )
-            self._rare_lines.write("elsewhere", line, "connected")
+            self._log_limiter.write("elsewhere", line, "connected")
 
     def _handle_disconnect(self, peer: Peer, reason: str) -> None:
         if self._server.disconnect(peer):
-            line = f"the client {reason} in mid-motion: the arm stops"
-            self._rare_lines.write("left in motion", line, "clients were lost in mid-motion", _MOST_LINES)
+            line = f"the client {reason} during a motion: the arm stops"
+            self._log_limiter.write("left in motion", line, "clients were lost during a motion", _MOST_LINES)
         elif reason != "closed the connection":
-            self._rare_lines.write("left", f"the client {reason}", "clients were lost")
+            self._log_limiter.write("left", f"the client {reason}", "clients were lost")

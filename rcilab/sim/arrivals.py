@@ -40,7 +40,7 @@ class DatagramArrived:
 
 
 @dataclass(frozen=True, slots=True)
-class StrangerDetected:
+class UnknownSenderDetected:
     """The first UDP datagram that is not from the client; it is ignored, like all later ones."""
 
     address: str
@@ -68,7 +68,7 @@ Arrival: TypeAlias = (
     | ClientDisconnected
     | FrameArrived
     | DatagramArrived
-    | StrangerDetected
+    | UnknownSenderDetected
     | ClientRefused
     | ExtraSocketsReady
 )

@@ -1,7 +1,7 @@
-"""What a virtual controller listens on, and what it can do with its clients: the words between a maker and the sockets.
+"""TCP and UDP channels of a virtual controller, and the link between a maker's server and the sockets.
 
-A maker lists its channels. The sockets (`endpoint`) read them, `arm_server` hands what arrives to the maker's
-`MakerServer`, and the maker sends through a `Link`.
+A maker lists its channels. The sockets (`endpoint`) read them, `arm_server` passes received data to the maker's
+`MakerServer`, and the maker sends through a `ClientLink`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
-LOWEST_CLIENT_PORT = 1024  # Where datagrams may be sent to: ports below are other programs', and privileged.
+LOWEST_CLIENT_PORT = 1024  # Lowest port that datagrams are sent to; ports below are privileged.
 
 
 class Framer(Protocol):
-    """Cuts the bytes of one TCP connection into frames."""
+    """Splits the bytes of one TCP connection into frames."""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Takes bytes and returns the frames that are complete.
+        """Processes bytes and returns the complete frames.
 
         Raises:
             DecodeError: They are not of this protocol; the connection ends.
@@ -35,31 +35,31 @@ class IgnoredBytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TcpChannel:
-    """A TCP port. The first of a controller is its main one: its clients hold the controller."""
+    """A TCP port. The first one of a controller is its main channel: its client controls the robot."""
 
     name: str = "port"
-    """Its name as an option of an address, `?NAME=PORT`; that of the first channel is not written."""
+    """Its name as an option of an address, `?NAME=PORT`; that of the first channel is omitted."""
     protocol: str
     """Its protocol as written in a message, such as "RCI"."""
     port: int
     """0 takes any free one."""
-    usual_port: int | None = None
-    """The port that addresses need not name; None: the main channel's."""
+    default_port: int | None = None
+    """The port that an address may omit; None: the main channel's."""
     open_framer: Callable[[], Framer] = IgnoredBytes
     """Returns the framer of a new connection."""
-    most_clients: int = 1
-    """At once; further ones are refused."""
+    max_clients: int = 1
+    """Largest number of simultaneous clients; further ones are refused."""
     option: str = "--port"
-    """What to change when the port cannot be used."""
+    """Command line option that changes the port, for an error message."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UdpChannel:
     """A UDP port, for datagrams from and to one client of the main channel. A controller has one, or none.
 
-    Datagrams count that come from the address of that client, or of the configured one, and from the port that states
-    go to. A client that sends from another port is taken at its first datagram's, until one comes from where states go.
-    Others are unknown senders: they are ignored and counted.
+    Only datagrams from the client's address (or the configured one) and its state port are accepted. If the client
+    sends from another port, the port of its first datagram is accepted until one arrives from the state port. Others
+    are unknown senders: they are ignored and counted.
     """
 
     name: str = "udp_port"
@@ -67,10 +67,10 @@ class UdpChannel:
     port: int | None = None
     """None: the number of the main channel; 0: any free one."""
     target_port: int | None = None
-    """The client's port that states go to; None: the number of the main channel; 0: unknown until
-    `Link.direct_datagrams`."""
+    """The client's port for states; None: the number of the main channel; 0: unknown until
+    `ClientLink.direct_datagrams`."""
     option: str = "--udp-port"
-    """What to change when the port cannot be used."""
+    """Command line option that changes the port, for an error message."""
 
 
 Channel: TypeAlias = TcpChannel | UdpChannel
@@ -84,19 +84,19 @@ class Peer:
     channel: TcpChannel
 
 
-class Link(Protocol):
-    """How a maker's server reaches its clients. Nothing here waits."""
+class ClientLink(Protocol):
+    """Sends data from a maker's server to its clients. No method blocks."""
 
     def send_frame(self, peer: Peer, frame: bytes) -> None:
-        """Sends bytes with a single call. A client that does not read them is dropped."""
+        """Sends bytes with a single call. A client that does not read them is disconnected."""
         ...
 
     def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram to where they go; without a client, nowhere."""
+        """Sends a datagram to the current destination; does nothing without a client."""
         ...
 
     def direct_datagrams(self, peer: Peer, port: int) -> bool:
-        """Has datagrams go to a port of this client's, as long as it is connected; returns False for a bad port."""
+        """Directs datagrams to a port of this client while it is connected; returns False for an invalid port."""
         ...
 
     def drop(self, peer: Peer, reason: str) -> None:
@@ -104,5 +104,5 @@ class Link(Protocol):
         ...
 
     def log(self, line: str, /) -> None:
-        """Takes the line about a refused request for the operator; after some lines, they are counted."""
+        """Logs the line about a refused request for the operator; after some lines, they are only counted."""
         ...

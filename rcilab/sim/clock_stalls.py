@@ -1,4 +1,4 @@
-"""Schedule of simulated stalls of the controller's clock. It reads no clock: the time is an argument."""
+"""Schedule of simulated stalls of the controller's clock. The time is an argument."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-_CLEARLY = 4.0  # Ratio of distances that decides, so that a jerk does not; a tuning value.
+_DISTANCE_RATIO = 4.0  # Between the nearer and the farther prediction, so that a jerk is not decisive; a tuning value.
 
 
 class CommandExtrapolator:
@@ -34,17 +34,17 @@ class CommandExtrapolator:
             target: A known command of a later cycle.
             target_steps: Cycles from now to the target.
         """
-        bend = steps * (steps + 1) / 2.0
-        even = [
-            x + steps * (x - y) + bend * (x - 2.0 * y + z)
+        curvature = steps * (steps + 1) / 2.0
+        extrapolated = [
+            x + steps * (x - y) + curvature * (x - 2.0 * y + z)
             for x, y, z in zip(self.last, self._before, self._oldest, strict=True)
         ]
         if target is None:
-            return even
+            return extrapolated
         # Newton's form of the cubic through the last three commands and the target, at cycles -2, -1, 0, target_steps.
         share = steps * (steps + 1) * (steps + 2) / (target_steps * (target_steps + 1) * (target_steps + 2))
-        there = self.predict(target_steps)
-        return [x + share * (goal - far) for x, goal, far in zip(even, target, there, strict=True)]
+        at_target = self.predict(target_steps)
+        return [x + share * (goal - y) for x, goal, y in zip(extrapolated, target, at_target, strict=True)]
 
     def is_next(self, values: Sequence[float], steps: int, in_doubt: bool = False) -> bool:
         """Returns whether a command continues the stream by one step rather than by `steps`.
@@ -58,4 +58,4 @@ class CommandExtrapolator:
         near, far = self.predict(1), self.predict(steps)
         off_near = sum(abs(a - b) for a, b in zip(values, near, strict=True))
         off_far = sum(abs(a - b) for a, b in zip(values, far, strict=True))
-        return off_near <= _CLEARLY * off_far if in_doubt else _CLEARLY * off_near <= off_far
+        return off_near <= _DISTANCE_RATIO * off_far if in_doubt else _DISTANCE_RATIO * off_near <= off_far

@@ -1,4 +1,4 @@
-"""Springs and dampers on a moving arm: every mode of vibration gets the same damping ratio.
+"""Springs and dampers on a moving arm: every vibration mode has the same damping ratio.
 
 A spring with joint-space stiffness K (symmetric, shape (n, n)) on an arm with mass matrix M vibrates in n modes. With
 M^-1 = F F^T (Cholesky) and the eigenvectors V of F^T K F, the columns of U = F V are these modes, and the eigenvalues
@@ -7,10 +7,9 @@ single mass on a spring with ratio zeta, whatever the pose: the "double diagonal
 al. (2003).
 
 The controller computes torques once a millisecond, so a spring must not be much faster than that: modes are slowed
-down to `FASTEST_MODE`. Only light links feel it, such as the last one behind a long tool at full stiffness.
+down to `FASTEST_MODE`. This only affects light links, such as the last one with a long tool at full stiffness.
 
-How an arm vibrates changes with its pose, and that takes longer than a cycle: a `ModalDamping` keeps its design for
-some.
+The modes change with the pose, but little within a few cycles: a `ModalDamping` keeps its design for that time.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from rcilab.model.dynamics.symmetric_solver import vibration_modes
 
 DAMPING_RATIO = 0.7  # of critical: some 5 % overshoot
 FASTEST_MODE = 600.0  # [rad/s] w times 1 ms stays at 0.6; computed torques become unstable at about 1.0
-SLOWEST_DAMPING = 1.0  # [rad/s] Modes without a spring are damped as if theirs were that slow; a tuning value
+SLOWEST_DAMPING = 1.0  # [rad/s] Modes without a spring are damped as if they had this frequency; a tuning value
 DESIGN_PERIOD = 10  # [cycles] How long a design is kept; a joint at full speed turns by 0.02 rad meanwhile
 
 
@@ -35,14 +34,14 @@ class Damping(NamedTuple):
     damper: Matrix
     """Torque per speed error, symmetric, shape (n, n), [N m s/rad]."""
     slowing: Matrix | None
-    """What is taken from the springs' torque where they are too fast, shape (n, n); None: they are not."""
+    """Share of the springs' torque to subtract where they are too fast, shape (n, n); None: they are not."""
 
     def torque(self, spring: JointVector, speed_error: JointVector) -> JointVector:
         """Returns the torque of springs with these dampers, shape (n,), [N m].
 
         Args:
             spring: Torque of the springs alone, shape (n,), [N m].
-            speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
+            speed_error: Desired minus measured joint velocities, shape (n,), [rad/s].
         """
         tau = spring + self.damper.dot(speed_error)
         return tau if self.slowing is None else tau - self.slowing.dot(spring)
@@ -52,9 +51,9 @@ def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLO
     """Returns the dampers of springs.
 
     Args:
-        mass_inverse: M^-1 of the arm as it is now, shape (n, n), [1/(kg m^2)].
+        mass_inverse: M^-1 at the present pose, shape (n, n), [1/(kg m^2)].
         stiffness: Of the springs, in joint space, symmetric, shape (n, n), [N m/rad].
-        slowest: Least angular frequency that damping is computed with, [rad/s].
+        slowest: Lower bound of the angular frequency that damping is computed with, [rad/s].
     """
     modes = vibration_modes(mass_inverse, stiffness)
     squares, back = modes.squares, modes.momenta
@@ -66,7 +65,7 @@ def design_damping(mass_inverse: Matrix, stiffness: Matrix, slowest: float = SLO
 
 
 class ModalDamping:
-    """Dampers that follow an arm, redesigned every few cycles. Owned by the caller that computes torques."""
+    """Dampers of a moving arm, redesigned every few cycles. Owned by the caller that computes torques."""
 
     def __init__(self) -> None:
         self._design: Damping | None = None
@@ -76,9 +75,9 @@ class ModalDamping:
         """Returns the torque of springs with their dampers, shape (n,), [N m].
 
         Args:
-            design: Designs the dampers for the arm as it is now, when that is due.
+            design: Designs the dampers at the present pose; called when a new design is due.
             spring: Torque of the springs alone, shape (n,), [N m].
-            speed_error: Wanted minus measured joint velocities, shape (n,), [rad/s].
+            speed_error: Desired minus measured joint velocities, shape (n,), [rad/s].
         """
         self._age += 1
         if self._design is None or self._age >= DESIGN_PERIOD:

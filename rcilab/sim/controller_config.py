@@ -1,4 +1,4 @@
-"""How a virtual controller is configured."""
+"""Configuration of a virtual controller."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ DEFAULT_HOST = "127.0.0.2"
 as that of the RCI does, and would otherwise receive its own commands as states."""
 
 SUPERVISED_PREFILL = 40
-"""`prefill` of the page's own controller, [cycles]: an open browser causes pauses of tens of ms. Beside `PREFILL` and
-`TORQUE_PREFILL`, which are for a client alone."""
+"""`prefill` of the page's own controller, [cycles]: an open browser causes pauses of tens of ms. `PREFILL` and
+`TORQUE_PREFILL` are for a client without one."""
 MODE_DELAY = 0.2
 """From StartMove to the requested modes, [s]; by then a vendor client's buffer is full of idle states, which it
 skips."""
@@ -32,7 +32,7 @@ FEWEST_LOST, MOST_LOST = 10, 20  # Manual 4.6: the packet-loss threshold is usua
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerConfig:
-    """Everything about a virtual controller that can be chosen.
+    """All options of a virtual controller.
 
     Raises:
         InvalidValueError: A value is out of range; the message says which and why.
@@ -47,41 +47,42 @@ class ControllerConfig:
     udp_port: int | None = None
     """UDP port for commands; None: the same number as the TCP port, as the vendor's client expects it; 0: any."""
     client_host: str | None = None
-    """Where states go from power-up on; None: to the client that connects, from then on."""
+    """Destination of states from power-up on; None: the client that connects, from then on."""
     client_port: int | None = None
-    """UDP port where states go; None: the number of our TCP port, as the vendor's client expects it."""
+    """UDP port for states; None: the number of the TCP port, as the vendor's client expects it."""
     plant: PlantKind = "ideal"
-    """What moves: an arm that follows exactly, or a simulated one."""
+    """Kind of plant: an arm that follows exactly, or a simulated one."""
     lockstep: bool = False
-    """Whether a motion advances only when the command for the current state has come, instead of at 1 kHz."""
+    """Whether a motion advances only when the command for the current state has arrived, instead of at 1 kHz."""
     mode_delay: float | None = None
     """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step."""
     prefill: int | None = None
-    """Cycles by which commands are played late, to absorb jitter; None: 10, and 2 for torques, or 0 in lock-step."""
+    """Cycles by which the playback of commands is delayed, to absorb jitter; None: 10, and 2 for torques, or 0 in
+    lock-step."""
     patience: float | None = None
-    """How long lock-step waits for a command before it counts as lost, [s]; None: 60, so that a client may stand still
-    for a while, or 0.05 while the network spoils datagrams on purpose."""
+    """Timeout of lock-step for a command before it counts as lost, [s]; None: 60, so that a client may be paused in a
+    debugger; 0.05 while corruption is simulated."""
     lost_limit: int | None = MOST_LOST
     """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
     auto_limit: bool = False
-    """Whether commanded joint angles are led to rest inside the soft limits, instead of raising a fault beyond them."""
+    """Whether commanded joint angles are stopped inside the soft limits, instead of raising a fault beyond them."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
     limit_table: str = "manual"
     """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
-    """What is wrong with the network, from power-up on."""
+    """Simulated network faults, from power-up on."""
     states_network: NetworkFaults | None = None
-    """The same for the way to the client alone, states and TCP; None: as `network`, which is for commands then."""
+    """The same for the direction to the client alone, states and TCP; None: as `network`. `network` then applies to
+    commands only."""
     stalls: tuple[Stall, ...] = ()
-    """Pauses of the controller's clock; their `after` counts from the beginning of `run`."""
+    """Pauses of the controller's clock; their `after` counts from the start of `run`."""
     world_port: int | None = 0
-    """TCP port on loopback through which things happen to the robot from outside; 0: any free one, None: there is
-    none."""
+    """TCP port of the simulation port, on loopback; 0: any free one; None: no simulation port."""
     realtime: bool = True
-    """Whether to ask for SCHED_FIFO and locked memory; never done in lock-step, where nothing is late."""
+    """Whether to request SCHED_FIFO and locked memory; never in lock-step, which has no deadlines."""
     parent_pid: int | None = None
-    """Process without which this one shall end, its parent; None: it lives by itself."""
+    """Id of the parent process, with which this one ends; None: it has no parent."""
 
     def __post_init__(self) -> None:
         """Checks every value."""
@@ -89,9 +90,9 @@ class ControllerConfig:
             port = getattr(self, name)
             lowest = 1 if name == "client_port" else 0
             if port is not None and not lowest <= port <= 65535:
-                raise InvalidValueError(name, port, f"is no port; needs {lowest} to 65535")
+                raise InvalidValueError(name, port, f"is not a valid port; must be {lowest} to 65535")
         if not self.host:
-            raise InvalidValueError("host", self.host, "is no address; use 127.0.0.2 for this machine only")
+            raise InvalidValueError("host", self.host, "is not a valid address; use 127.0.0.2 for this machine only")
         if self.plant not in PLANT_KINDS:
             raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
@@ -115,5 +116,5 @@ class ControllerConfig:
 
     @property
     def prefill_cycles(self) -> int:
-        """Cycles by which commands are played late."""
+        """Cycles by which the playback of commands is delayed."""
         return self.prefill if self.prefill is not None else 0 if self.lockstep else PREFILL

@@ -1,4 +1,4 @@
-"""Schedule of cycles, and handling of missed ones. It reads no clock: the time is an argument.
+"""Schedule of cycles, and handling of missed ones. The time is an argument.
 
 The clock of a real controller never stops; this one stops when the process gets no CPU time. Such cycles are skipped
 and counted. A client on the same machine has usually been stopped as well, and may resume later. Therefore, for as long
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from rcilab.core.clock import CYCLE_TIME
 
-LONGEST_PATIENCE = 250  # [cycles] Also after a longer pause: no client continues its stream after that.
+MAX_CATCH_UP = 250  # [cycles] Also after a longer pause: no client continues its stream after that.
 
 
 class CycleTimer:
@@ -28,7 +28,7 @@ class CycleTimer:
         self._period = period
         self.deadline = now
         self.missed = 0
-        self._patience = 0
+        self._catch_up_left = 0
 
     def restart(self, now: float) -> None:
         """Restarts the grid, after cycles that were not on it, as in lock-step."""
@@ -37,21 +37,21 @@ class CycleTimer:
     def next(self, now: float) -> float:
         """Returns the time at which the next cycle is due, [s], at most a cycle ago; earlier ones are skipped."""
         self.deadline += self._period
-        self._patience = max(0, self._patience - 1)
+        self._catch_up_left = max(0, self._catch_up_left - 1)
         skipped = int((now - self.deadline) / self._period)
         if skipped > 0:
             self.missed += skipped
             self.deadline += skipped * self._period
-            self._patience = max(self._patience, min(skipped, LONGEST_PATIENCE))
+            self._catch_up_left = max(self._catch_up_left, min(skipped, MAX_CATCH_UP))
         return self.deadline
 
-    def puts_off(self, is_starved: bool) -> bool:
+    def postpones(self, is_starved: bool) -> bool:
         """Returns whether this cycle is postponed.
 
         Args:
             is_starved: Whether a motion is in progress whose next command has not arrived.
         """
-        if not is_starved or self._patience == 0:
+        if not is_starved or self._catch_up_left == 0:
             return False
         self.missed += 1
         return True

@@ -1,4 +1,4 @@
-"""The sockets of a virtual controller: TCP channels and the UDP streams. Bytes in, bytes out, no meaning."""
+"""The sockets of a virtual controller: TCP channels and the UDP streams."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from rcilab.sim.arrivals import (
     DatagramArrived,
     ExtraSocketsReady,
     FrameArrived,
-    StrangerDetected,
+    UnknownSenderDetected,
 )
 from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpChannel, UdpChannel
 
-_LARGEST_DATAGRAM = 2048  # Larger than any that is right, so that a wrong length shows.
-_DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot hold up the cycle.
-_STRANGERS_AT_ONCE = 64  # The same once the client's come to a socket of their own: the rest fills the kernel's buffer.
-_UNKNOWN_TURN = 16  # [polls] From one look at what unknown senders sent to the next, from then on.
+_LARGEST_DATAGRAM = 2048  # Larger than any valid one, so that a wrong length is detected.
+_DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot delay the cycle.
+_UNKNOWN_AT_ONCE = 64  # The same for the shared socket once the client has its own: the rest fills the kernel's buffer.
+_UNKNOWN_POLL_INTERVAL = 16  # [polls] Between reads of the shared socket, from then on.
 _FRAME_BYTES_AT_ONCE = 4096
-_BACKLOG = 8  # [connections] That wait to be accepted.
-_ATTEMPTS = 20  # At a number that is free for TCP and UDP alike, when any will do.
+_BACKLOG = 8  # [connections] Waiting to be accepted.
+_ATTEMPTS = 20  # To find a port number that is free for both TCP and UDP.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,14 +43,14 @@ class Endpoint:
     Attributes:
         host: Address that it listens on.
         port: TCP port of the main channel.
-        unknown_senders: Datagrams that were ignored because they did not come from the client; of a flood, those that
-            were read: the kernel drops what its buffer has no room for.
+        unknown_senders: Datagrams that were ignored because they did not come from the client; of a flood, only those
+            that were read: the kernel drops the rest if its buffer is full.
 
     Args:
         host: Address to listen on.
         channels: At least one of TCP, the main one first; at most one of UDP.
-        client: Host and port that states go to from power-up on, for any peer; a port of None: the UDP channel's.
-            None: to the client that connects.
+        client: Host and port for states from power-up on, for any peer; a port of None: the UDP channel's.
+            None: states go to the client that connects.
 
     Raises:
         UsageError: An address or port cannot be used; the message says what to change.
@@ -70,35 +70,37 @@ class Endpoint:
         self._target = self._fixed_target
         self._connections: dict[socket.socket, _Connection] = {}
         self._sockets: dict[Peer, socket.socket] = {}
-        self._owner: Peer | None = None  # The client of the main channel whose datagrams count.
-        self._sender: tuple[str, int] | None = None  # Whose datagrams count, once one has come.
-        self._has_named_unknown = False
+        self._owner: Peer | None = None  # The client of the main channel whose datagrams are accepted.
+        self._sender: tuple[str, int] | None = None  # Its UDP address, once a datagram has arrived.
+        self._has_reported_unknown = False
         self.unknown_senders = 0
         self._arrivals: deque[Arrival] = deque()
-        self._apart: dict[socket.socket, tuple[str, int]] = {}  # Connected to the client: full of its datagrams only.
-        self._is_apart = False  # Whether the client's datagrams are known to come to one of those.
+        self._client_sockets: dict[socket.socket, tuple[str, int]] = {}  # Connected: receive its datagrams only.
+        self._has_client_socket = False  # Whether they receive the client's datagrams.
         self._polls = 0
         self._watched: list[socket.socket] = []
-        self._watched_mostly: list[socket.socket] = []  # Without the socket that then has unknown senders only.
+        self._watched_without_shared: list[socket.socket] = []  # Without the shared socket.
         self._separate_client()
 
     @property
     def options(self) -> str:
-        """What an address has to say about the other ports, such as "?udp_port=1338"; "" for usual ones."""
+        """Options of the address for non-default ports, such as "?udp_port=1338"; "" for default ones."""
         found = [
-            (channel.name, listener.getsockname()[1], channel.usual_port)
+            (channel.name, listener.getsockname()[1], channel.default_port)
             for listener, channel in self._listeners.items()
             if channel is not self._main
         ]
         if self._datagrams is not None:
             sock, channel = self._datagrams
             found.append((channel.name, sock.getsockname()[1], None))
-        words = [f"{name}={port}" for name, port, usual in found if port != (self.port if usual is None else usual)]
+        words = [
+            f"{name}={port}" for name, port, default in found if port != (self.port if default is None else default)
+        ]
         return "?" + "&".join(words) if words else ""
 
     @property
     def fixed_host(self) -> str | None:
-        """Where states go, whichever client connects; None: to the client that connects."""
+        """Host for states, independent of the client; None: states go to the client that connects."""
         return None if self._fixed_target is None else self._fixed_target[0]
 
     @property
@@ -112,24 +114,24 @@ class Endpoint:
         return list(self._sockets)
 
     def poll(self, timeout: float, extra_sockets: Sequence[socket.socket] = ()) -> list[Arrival]:
-        """Returns what has arrived; waits up to `timeout`, [s], for the first thing. Datagrams come before frames.
+        """Returns the arrivals; waits up to `timeout`, [s], for the first one. Datagrams come before frames.
 
         Args:
             timeout: Longest wait, [s].
-            extra_sockets: Sockets of other parts to be watched, too.
+            extra_sockets: Additional sockets to poll.
         """
         self._polls += 1
-        is_unknown_turn = self._polls % _UNKNOWN_TURN == 0 or not self._is_apart
-        watched = [*(self._watched if is_unknown_turn else self._watched_mostly), *extra_sockets]
+        reads_shared = self._polls % _UNKNOWN_POLL_INTERVAL == 0 or not self._has_client_socket
+        watched = [*(self._watched if reads_shared else self._watched_without_shared), *extra_sockets]
         readable = select.select(watched, (), (), 0.0 if self._arrivals else max(timeout, 0.0))[0]
         if not (readable or self._arrivals):
             return []
         extra: list[socket.socket] = []
         for sock in readable:  # In the order in which they are watched.
-            if sock in self._apart:
+            if sock in self._client_sockets:
                 self._receive_from_client(sock)
             elif self._datagrams is not None and sock is self._datagrams[0]:
-                self._receive_from_anybody(sock)
+                self._receive_shared(sock)
             elif sock in self._connections:
                 self._receive_frames(sock)
             elif sock in self._listeners:
@@ -143,11 +145,11 @@ class Endpoint:
         return arrivals
 
     def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram to where they go; nowhere while that is unknown. One that cannot be sent is lost."""
+        """Sends a datagram to the current destination, if one is known. If it cannot be sent, it is lost."""
         if self._target is not None and self._datagrams is not None:
             try:
                 self._datagrams[0].sendto(datagram, self._target)
-            except OSError:  # No route, no buffer: the client sees a missing state, as on any network.
+            except OSError:  # No route or no buffer: the state is lost, as on any network.
                 return
 
     def send_frame(self, peer: Peer, frame: bytes) -> None:
@@ -179,9 +181,9 @@ class Endpoint:
         self._arrivals.append(ClientDisconnected(peer, reason))
 
     def direct_datagrams(self, peer: Peer, port: int) -> bool:
-        """Has datagrams go to a UDP port of this client's until it leaves; returns False for a port that may not be.
+        """Directs datagrams to a UDP port of this client until it disconnects; returns False for an invalid port.
 
-        What `--client` says about the host holds all the same.
+        A host given with `--client` is kept.
         """
         if not LOWEST_CLIENT_PORT <= port <= 65535 or peer not in self._sockets:
             return False
@@ -198,51 +200,51 @@ class Endpoint:
             sock.close()
         self._connections.clear()
         self._sockets.clear()
-        self._apart.clear()
+        self._client_sockets.clear()
         self._watched = []
 
     def _own(self, peer: Peer) -> None:
-        """Makes a client the one whose datagrams count."""
+        """Makes a client the one whose datagrams are accepted."""
         self._owner = peer
-        self._sender, self._has_named_unknown = None, False
+        self._sender, self._has_reported_unknown = None, False
         if self._fixed_target is None and self._state_port:
             self._target = (peer.address, self._state_port)
         self._separate_client()
 
     def _separate_client(self) -> None:
-        """Has the client's datagrams come to sockets of their own: where states go, and where it sends from.
+        """Opens sockets for the client's datagrams alone: for the port that states go to, and the one it sends from.
 
         The kernel prefers a connected socket, so that no flood of unknown senders displaces a command.
         """
-        self._is_apart = False
+        self._has_client_socket = False
         wanted = {address for address in (self._target, self._sender) if address is not None}
-        for sock, address in list(self._apart.items()):
+        for sock, address in list(self._client_sockets.items()):
             if address in wanted:
                 wanted.remove(address)
             else:
-                del self._apart[sock]
+                del self._client_sockets[sock]
                 sock.close()
         for address in wanted:
-            self._open_apart(address)
+            self._open_client_socket(address)
         self._watch()
 
-    def _open_apart(self, address: tuple[str, int]) -> None:
+    def _open_client_socket(self, address: tuple[str, int]) -> None:
         if self._datagrams is None:
             return
         shared, channel = self._datagrams
         host, port = shared.getsockname()
         try:
             sock = _bind(socket.SOCK_DGRAM, host, port, channel.option)
-        except (OSError, UsageError):  # No descriptor is left: the client's stay among those of unknown senders.
+        except (OSError, UsageError):  # Out of descriptors: the client keeps using the shared socket.
             return
         try:
             sock.setblocking(False)
             sock.connect(address)
-        except OSError:  # No route leads there.
+        except OSError:  # No route to this address.
             sock.close()
             return
-        self._apart[sock] = address
-        for _ in range(_DATAGRAMS_AT_ONCE):  # Until it was connected, anybody's came here.
+        self._client_sockets[sock] = address
+        for _ in range(_DATAGRAMS_AT_ONCE):  # Until it was connected, it received those of any sender.
             try:
                 datagram, sender = sock.recvfrom(_LARGEST_DATAGRAM)
             except OSError:
@@ -254,8 +256,8 @@ class Endpoint:
 
     def _watch(self) -> None:
         shared = () if self._datagrams is None else (self._datagrams[0],)
-        self._watched_mostly = [*self._apart, *self._connections, *self._listeners]
-        self._watched = [*shared, *self._watched_mostly]  # In this order: what came before a client had its own socket.
+        self._watched_without_shared = [*self._client_sockets, *self._connections, *self._listeners]
+        self._watched = [*shared, *self._watched_without_shared]  # The shared one first: its datagrams are older.
 
     def _receive_from_client(self, sock: socket.socket) -> None:
         before = len(self._arrivals)
@@ -264,16 +266,16 @@ class Endpoint:
                 self._arrivals.append(DatagramArrived(sock.recv(_LARGEST_DATAGRAM)))
             except BlockingIOError:
                 break
-            except OSError:  # An earlier state met a closed port.
+            except OSError:  # An earlier state was sent to a closed port.
                 continue
-        is_known = self._is_apart and self._apart[sock] == self._sender
+        is_known = self._has_client_socket and self._client_sockets[sock] == self._sender
         if not is_known and len(self._arrivals) > before:
-            self._sender = self._apart[sock]
+            self._sender = self._client_sockets[sock]
             self._separate_client()
-            self._is_apart = True
+            self._has_client_socket = True
 
-    def _receive_from_anybody(self, sock: socket.socket) -> None:
-        for _ in range(_STRANGERS_AT_ONCE if self._is_apart else _DATAGRAMS_AT_ONCE):
+    def _receive_shared(self, sock: socket.socket) -> None:
+        for _ in range(_UNKNOWN_AT_ONCE if self._has_client_socket else _DATAGRAMS_AT_ONCE):
             try:
                 datagram, sender = sock.recvfrom(_LARGEST_DATAGRAM)
             except OSError:  # Nothing more, or an error report that concerns an earlier send.
@@ -282,16 +284,16 @@ class Endpoint:
                 self._arrivals.append(DatagramArrived(datagram))
 
     def _accepts(self, sender: tuple[str, int]) -> bool:
-        """Returns whether a sender other than the last one is the client; others are counted, one is named."""
+        """Returns whether a sender other than the last one is the client; others are counted, the first is reported."""
         client = "" if self._owner is None else self._owner.address
         if sender[0] in (client, self.fixed_host) and (self._sender is None or sender[1] == self._state_port):
             self._sender = sender
             self._separate_client()
             return True
         self.unknown_senders += 1
-        if not self._has_named_unknown:
-            self._has_named_unknown = True
-            self._arrivals.append(StrangerDetected("{}:{}".format(*sender), client))
+        if not self._has_reported_unknown:
+            self._has_reported_unknown = True
+            self._arrivals.append(UnknownSenderDetected("{}:{}".format(*sender), client))
         return False
 
     def _receive_frames(self, sock: socket.socket) -> None:
@@ -315,12 +317,12 @@ class Endpoint:
         channel = self._listeners[listener]
         try:
             sock, (address, _) = listener.accept()
-        except OSError:  # It was gone before we looked.
+        except OSError:  # It has already disconnected.
             return
-        holders = [peer for peer in self._sockets if peer.channel is channel]
-        if len(holders) >= channel.most_clients:
+        clients = [peer for peer in self._sockets if peer.channel is channel]
+        if len(clients) >= channel.max_clients:
             sock.close()
-            self._arrivals.append(ClientRefused(address, ", ".join(holder.address for holder in holders)))
+            self._arrivals.append(ClientRefused(address, ", ".join(client.address for client in clients)))
             return
         sock.setblocking(False)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -354,7 +356,7 @@ def _open(
 def _open_once(
     address: str, channels: Sequence[Channel], sockets: list[socket.socket]
 ) -> tuple[dict[socket.socket, TcpChannel], tuple[socket.socket, UdpChannel] | None]:
-    """Opens every channel; what is open is in `sockets`, also when one cannot be opened."""
+    """Opens every channel; `sockets` receives the open ones, also if a later one cannot be opened."""
     listeners: dict[socket.socket, TcpChannel] = {}
     datagrams: tuple[socket.socket, UdpChannel] | None = None
     for channel in channels:
@@ -368,7 +370,7 @@ def _open_once(
             if channel.port is None:
                 sock = _bind(socket.SOCK_DGRAM, address, main.getsockname()[1], listeners[main].option)
             else:
-                # SO_REUSEADDR below lets two sockets share a UDP port unseen; a number of its own must really be free.
+                # SO_REUSEADDR below lets two sockets share a UDP port unnoticed; this port must really be free.
                 _bind(socket.SOCK_DGRAM, address, channel.port, channel.option, shared=False).close()
                 sock = _bind(socket.SOCK_DGRAM, address, channel.port, channel.option)
             sockets.append(sock)
@@ -382,7 +384,7 @@ def _open_once(
 
 def _bind(kind: socket.SocketKind, address: str, port: int, option: str, *, shared: bool = True) -> socket.socket:
     sock = socket.socket(socket.AF_INET, kind)
-    # On UDP so that the vendor's client, which binds the same number on every address, can live on this machine too.
+    # On UDP so that the vendor's client, which binds the same port on every address, can run on this machine, too.
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(shared))
     try:
         sock.bind((address, port))

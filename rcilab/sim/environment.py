@@ -107,12 +107,12 @@ class Environment:
     def _change(self, request: WorldRequest) -> None:
         match request:
             case Push():
-                self._plant.push(request.wrench, request.link, request.point)  # Refuses a link that is not there.
+                self._plant.push(request.wrench, request.link, request.point)  # Raises if the link does not exist.
                 self._push.begin(request)
                 self._apply_push()
             case Release():
                 if self._controller.button != "none" and not self._push.is_on:
-                    raise UsageError("nothing pushes the arm; press button=none ends an emergency stop")
+                    raise UsageError("no external force acts on the arm; press button=none ends an emergency stop")
                 self._push.release()
                 self._apply_push()
             case Press(button):

@@ -1,7 +1,7 @@
 """The sockets of a virtual controller behind a simulated network that loses, delays and corrupts data.
 
-Without faults all data passes directly. Delays are in real time, also in lock-step: the simulated millisecond waits for
-a delayed command, but not for one that is known to be lost.
+Without faults all data passes directly. Delays are in real time, also in lock-step: a cycle waits for a delayed
+command, but not for one that is known to be lost.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rcilab.sim.network_impairment import DelayedDatagrams, SlowStream
 
 
 class FaultyNetwork:
-    """The simulated network between a controller and its sockets: a maker's `Link`. Owned by the controller's thread.
+    """The simulated network between a controller and its sockets: a maker's `ClientLink`. Owned by the server's thread.
 
     Attributes:
         has_lost: Whether the newest state, or a command since then, is lost: this state may never be answered.
@@ -77,7 +77,7 @@ class FaultyNetwork:
             now = self._clock.now()
             answers = (stream.next_due for stream in self._answers.values())
             due = min(deadline, self._commands.next_due, self._states.next_due, *answers)
-            arrivals = self._let_through(self._endpoint.poll(due - now, extra_sockets))
+            arrivals = self._pass_through(self._endpoint.poll(due - now, extra_sockets))
             if arrivals or self.has_lost is not had_lost or self._clock.now() >= deadline:
                 self._send_due()
                 return arrivals
@@ -119,8 +119,9 @@ class FaultyNetwork:
 
     @property
     def _is_tcp_clean(self) -> bool:
-        is_spared = self._tcp_faults.spares_tcp
-        return is_spared and (not self._answers or all(stream.is_clean for stream in self._answers.values()))
+        return self._tcp_faults.is_tcp_clean and (
+            not self._answers or all(stream.is_clean for stream in self._answers.values())
+        )
 
     def _answers_to(self, peer: Peer) -> SlowStream:
         if peer not in self._answers:
@@ -140,7 +141,7 @@ class FaultyNetwork:
             elif peer in self._drop_reasons and stream.next_due == float("inf"):
                 self._endpoint.drop(peer, self._drop_reasons.pop(peer))
 
-    def _let_through(self, arrivals: list[Arrival]) -> list[Arrival]:
+    def _pass_through(self, arrivals: list[Arrival]) -> list[Arrival]:
         """Returns the arrivals without datagrams that are delayed, and with delayed ones that are due."""
         now = self._clock.now()
         passed: list[Arrival] = []

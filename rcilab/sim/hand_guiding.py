@@ -20,12 +20,12 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.compliance import design_damping
 from rcilab.sim.plant import Measurement
 
-GUIDE_DAMPING = 1.5  # [rad/s] slowest mode that damping is computed with: a guided arm loses speed in some 0.5 s
-JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition: light links must not race; a tuning value
+GUIDE_DAMPING = 1.5  # [rad/s] slowest mode that damping is computed with: a guided arm slows down in about 0.5 s
+JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition, for light links; a tuning value
 STOP_ZONE = (
     0.05  # [rad] before a joint limit in which its spring grows from nothing to the torque limit; a tuning value
 )
-_DAMPED_OUTWARD = 1e-6  # [rad/s] walls damp nothing along themselves
+_DAMPED_OUTWARD = 1e-6  # [rad/s] no damping parallel to walls
 
 
 class GuidedFreedom(Enum):

@@ -68,23 +68,25 @@ class IdealPlant:
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Refuses: this plant does not simulate contact."""
-        raise UsageError(f"box {name!r}: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+        raise UsageError(f"box {name!r}: the ideal plant does not simulate contact; use plant='mujoco'").coded(
+            "no_contact"
+        )
 
     def remove_box(self, name: str) -> None:
         """Refuses: this plant does not simulate contact."""
-        raise UsageError(f"box {name!r}: the ideal plant knows no contact and has no boxes; use plant='mujoco'").coded(
-            "no_contact"
-        )
+        raise UsageError(
+            f"box {name!r}: the ideal plant does not simulate contact and has no boxes; use plant='mujoco'"
+        ).coded("no_contact")
 
     def set_floor(self, on: bool) -> None:
         """Refuses a floor."""
         if on:
-            raise UsageError("floor: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+            raise UsageError("floor: the ideal plant does not simulate contact; use plant='mujoco'").coded("no_contact")
 
     def set_walls(self, box: SafetyBox | None) -> None:
         """Refuses walls."""
         if box is not None:
-            raise UsageError("walls: the ideal plant knows no contact; use plant='mujoco'").coded("no_contact")
+            raise UsageError("walls: the ideal plant does not simulate contact; use plant='mujoco'").coded("no_contact")
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Advances by one cycle."""
@@ -122,8 +124,8 @@ class IdealPlant:
         by the new velocity, so that measured velocities are the backward differences of measured angles.
         """
         q, dq = self._measurement.q, self._measurement.dq
-        outside = self._push.torque(q) if self._push.is_active else None
-        tau = tau_c if outside is None else tau_c + outside
+        external = self._push.torque(q) if self._push.is_active else None
+        tau = tau_c if external is None else tau_c + external
         accelerate = self._body.weightless_acceleration if self._mounted is None else self._acceleration
         ddq = accelerate(q, dq, tau)
         ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)

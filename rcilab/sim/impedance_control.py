@@ -25,7 +25,7 @@ from rcilab.sim.plant import Measurement
 
 NULL_FREQUENCY = 5.0  # [rad/s] of the spring that holds the elbow of a 7-axis arm; soft, a tuning value
 NULL_DAMPING = 2.0 * DAMPING_RATIO * NULL_FREQUENCY  # [1/s]
-_PULL, _DRAG = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
+_NULL_STIFFNESS, _NULL_DAMPING = scalar(NULL_FREQUENCY**2), scalar(NULL_DAMPING)  # [1/s^2], [1/s]
 _DAMPED_INVERSE = 1e-4 * np.eye(6)  # [1/kg] Keeps feed-forward finite at a singularity; error elsewhere below 0.1 %.
 
 
@@ -139,7 +139,7 @@ def _reference(
     along = free = np.zeros(model.n)
     if model.n > 6:
         q_null, along, ddq_null = null
-        free = _PULL * (q_null - measured.q) + _DRAG * (along - measured.dq) + ddq_null
+        free = _NULL_STIFFNESS * (q_null - measured.q) + _NULL_DAMPING * (along - measured.dq) + ddq_null
         desired[:6] -= J.dot(along)
     desired[6:] -= terms.acceleration(free) if any(twist) or any(acc) else J.dot(free)
     back = terms.mass_inverse.dot(J.T)

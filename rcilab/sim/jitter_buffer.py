@@ -2,24 +2,24 @@
 
     waiting --first command, then `prefill` cycles--> playing --empty queue--> losing cycles --next command--> playing
 
-* The first command starts a countdown of `prefill` cycles; as many commands are then in stock and absorb the jitter of
-  client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) simply fills the
+* The first command starts a countdown of `prefill` cycles; as many commands are then queued and absorb the jitter of
+  client and network. A burst (the vendor's client may answer 90 old states at once after StartMove) fills the
   queue; its old message ids do not matter.
-* Where ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, when
-  it arrives after all, is dropped: the arm has already passed that position.
+* While ids advance one by one, they are cycle numbers. An empty queue is a lost cycle, and the command for it, if it
+  arrives later, is dropped: the arm has already passed that position.
 * Without a first command within `FIRST_COMMAND_TIMEOUT`, the cycles from then on are lost.
-* A repeated id is the next command: the vendor's client answers the last state again when none came in time. A
-  datagram that is the same in every number is a duplicate and dropped; it only shows that the client still runs.
-* A short gap in the ids is either a lost command, or a lost state whose cycle the client never saw; only the command
-  itself can tell, so the caller is asked whether it continues the motion by one step or by the whole gap. A repeated
-  id right before the gap speaks for the lost state.
-* A command that arrives out of order fills the gap. Where states are reordered, the ids of their answers are out of
+* A repeated id is the next command: the vendor's client answers the last state again if none arrived in time. An
+  identical datagram is a duplicate and dropped; it only shows that the client is still active.
+* A short gap in the ids is either a lost command, or a lost state; only the values of the command can tell. Therefore
+  the caller decides whether it continues the motion by one step or by the whole gap. A repeated id right before the
+  gap indicates a lost state.
+* A command that arrives out of order fills the gap. If states are reordered, the ids of their answers are out of
   order: then the command after the gap continues the motion, and those with the ids of the gap follow it, in the
   order of their arrival.
-* Many more commands than the prefill in stock for a long time mean that the client sent more commands than there were
-  cycles; the loop then runs some extra cycles, because their delay would otherwise grow without bound.
-* Commands that close a control loop (torques) must be fresh: more than the prefill in stock are skipped, oldest first.
-* A long gap, or ids that start again far behind, mean another numbering: the command is simply the next one.
+* If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
+  cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
+* Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
+* A long gap, or ids that start again far behind, mean another numbering: the command is treated as the next one.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from typing import NamedTuple
 from rcilab.sim.arm_command import ArmCommand
 
 CAPACITY = 256  # Commands in the queue; then the oldest is dropped. 2.5 of the vendor client's worst bursts (about 92).
-WINDOW = 1000  # Cycles that the success rate looks back over, 1 s.
-STOCK_WINDOW = 100  # Cycles over which the lowest stock is measured; longer than any jitter.
+WINDOW = 1000  # Cycles that the success rate covers, 1 s.
+QUEUE_WINDOW = 100  # Cycles over which the lowest queue length is measured; longer than any jitter.
 SLACK = 5  # Cycles of additional delay that are tolerated: a client may be late with its first answer.
 FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
-LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges at all (manual 4.6: 10 to 20).
+LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges (manual 4.6: 10 to 20).
 
 
 class Playback(NamedTuple):
     """The output of the buffer for one cycle."""
 
     command: ArmCommand | None
-    """The command to play; with `steps` > 1 the next one known, that many cycles ahead; None: no command."""
+    """The command to play; with `steps` > 1 the next known one, that many cycles ahead; None: no command."""
     steps: int
-    """Cycles from now to when `command` is due, 1 for now."""
+    """Cycles until `command` is due, 1 for now."""
     is_lost: bool
     """Whether a motion is in progress and this cycle has no command."""
     skipped: int = 0
@@ -61,10 +61,10 @@ class JitterBuffer:
     Attributes:
         lost: Lost cycles of this motion.
         lost_in_row: Lost cycles since the last command.
-        most_in_row: The most that were lost in a row in this motion.
+        most_in_row: Largest number of consecutive lost cycles of this motion.
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
-        copies: Datagrams dropped because they were the same as the one before.
+        copies: Datagrams dropped as duplicates.
 
     Args:
         prefill: Cycles between the first command's arrival and its play-out.
@@ -79,12 +79,12 @@ class JitterBuffer:
         """Resets everything for the first command of a motion.
 
         Args:
-            most: Largest stock next to the command that is played: it replaces the prefill, and older commands are
-                skipped. None: as many as fit.
+            most: Largest number of queued commands next to the one that is played: it replaces the prefill, and older
+                commands are skipped. None: as many as fit.
         """
         self._queue.clear()
-        self._max_stock = most
-        self._countdown = self._prefill if self._max_stock is None else self._max_stock
+        self._max_queued = most
+        self._countdown = self._prefill if self._max_queued is None else self._max_queued
         self._newest: ArmCommand | None = None
         self._is_repeating = False
         self._lowest, self._observed, self._excess = CAPACITY, 0, 0
@@ -92,7 +92,7 @@ class JitterBuffer:
         self._played_in_window = 0
         self._last_id = 0
         self._is_last_lost = False  # The cycle `_last_id` had no command.
-        self._surplus = 0  # Commands that had an id again, right before the next one in the queue.
+        self._surplus = 0  # Commands with a repeated id, right before the next one in the queue.
         self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still arrive.
         self._cycles_waited = 0
         self.is_playing = False
@@ -137,7 +137,7 @@ class JitterBuffer:
             queue.append(command)
 
     def pop_extra_cycle(self) -> bool:
-        """Returns whether an extra cycle is due: many more commands than the prefill were in stock in the last window.
+        """Returns whether an extra cycle is due: many more commands than the prefill were queued in the last window.
 
         That is not jitter; the client has sent more commands than there were cycles.
         """
@@ -150,8 +150,8 @@ class JitterBuffer:
         """Returns the output for this cycle.
 
         Args:
-            is_next: Asked about a command whose id is a few cycles ahead, `(command, steps, in_doubt)`: does it
-                continue the motion by one step (true) or by that many (false)? `in_doubt` is the answer where
+            is_next: Returns for a command whose id is a few cycles ahead, `(command, steps, in_doubt)`, whether it
+                continues the motion by one step (true) or by that many (false). `in_doubt` is the result if
                 neither is clear.
         """
         if self.is_finished:
@@ -168,7 +168,7 @@ class JitterBuffer:
             first = self._queue[0].number
             self._last_id = min(i for i in self._ids() if 0 <= first - i <= LONGEST_GAP) - 1
         self._find_excess()
-        skipped = 0 if self._max_stock is None else self._skip_old()
+        skipped = 0 if self._max_queued is None else self._skip_old()
         is_repeating, self._is_repeating = self._is_repeating, False
         if not self._queue:
             return self._bridge_repeat() if is_repeating else self._lose(_EMPTY)
@@ -186,7 +186,7 @@ class JitterBuffer:
         return (command.number for command in self._queue)
 
     def _steps_to(self, command: ArmCommand, is_next: Callable[[ArmCommand, int, bool], bool]) -> int:
-        """Returns how many cycles from now a command is due, 1 for now."""
+        """Returns the number of cycles until a command is due, 1 for now."""
         ahead = command.number - self._last_id
         if not 1 < ahead <= LONGEST_GAP:
             return 1
@@ -203,20 +203,20 @@ class JitterBuffer:
         return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._is_last_lost) and self.is_playing
 
     def _find_excess(self) -> None:
-        stock = len(self._queue) - 1
-        if stock < self._lowest:
-            self._lowest = stock
+        queued = len(self._queue) - 1
+        if queued < self._lowest:
+            self._lowest = queued
         self._observed += 1
-        if self._observed >= STOCK_WINDOW:
+        if self._observed >= QUEUE_WINDOW:
             excess = self._lowest - self._prefill
             self._excess = excess if excess > SLACK else 0
             self._observed, self._lowest = 0, CAPACITY
 
     def _skip_old(self) -> int:
-        """Skips commands beyond the largest stock; returns how many."""
-        if self._max_stock is None:
+        """Skips commands beyond the largest queue length; returns how many."""
+        if self._max_queued is None:
             return 0
-        skipped = max(0, len(self._queue) - self._max_stock - 1)
+        skipped = max(0, len(self._queue) - self._max_queued - 1)
         for _ in range(skipped):
             self._advance_to(self._queue.popleft().number)
         return skipped

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-_MAX_QUEUED = 200  # Lines; a tuning value: as many as a person reads.
+_MAX_QUEUED = 200  # [lines] A tuning value.
 _PERIOD = 10.0  # [s] For which lines of a kind that any peer can cause are counted together. A tuning value.
 _CLOSE_TIMEOUT = 0.5  # [s] For the last lines at the end of the controller, if they are not read.
 
@@ -40,7 +40,7 @@ class _Kind:
     counted: int = 0
 
 
-class SeldomLines:
+class RateLimitedLog:
     """Limits the rate of lines that any peer can cause: some of a kind per period, then the number of skipped ones.
 
     Args:
@@ -70,7 +70,7 @@ class SeldomLines:
             seen.counted += 1
 
     def write_counts(self) -> None:
-        """Writes how many lines were skipped in each period that is over. Call it now and then."""
+        """Writes how many lines were skipped in each period that is over. Call it periodically."""
         if not self._kinds:
             return
         now = self._clock()
@@ -103,7 +103,7 @@ class LogLines:
             self._skipped += 1
             return
         if self._skipped:
-            self._lines.append(f"{self._skipped} lines were left out: the stream was not read")
+            self._lines.append(f"{self._skipped} lines were dropped: the stream was not read")
             self._skipped = 0
         self._lines.append(line)
         self._wake.set()

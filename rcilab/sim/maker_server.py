@@ -1,7 +1,7 @@
 """The maker's part of a virtual controller: its behaviour, and a server for its protocol, without sockets or clock.
 
 `ArmServer` opens the channels, passes arrivals on, and calls `step`, `send_states` and `settle` once per cycle. A
-maker's server sends through the `Link`; `VirtualArm.step` returns the violations.
+maker's server sends through the `ClientLink`; `VirtualArm.step` returns the violations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from rcilab.core.fault import FaultCode
 from rcilab.core.safety_box import SafetyBox
 from rcilab.i18n.translator import Remark
 from rcilab.sim.api import SafetyButton
-from rcilab.sim.channels import Channel, Link, Peer
+from rcilab.sim.channels import Channel, ClientLink, Peer
 from rcilab.sim.virtual_arm import VirtualArm
 
 
@@ -134,7 +134,7 @@ class MakerServer(Protocol):
         """Whether nothing moves and no response is pending: a cycle may then be computed early."""
         ...
 
-    def attach(self, link: Link) -> None:
+    def attach(self, link: ClientLink) -> None:
         """Sets the link for sending; called once, before anything else."""
         ...
 

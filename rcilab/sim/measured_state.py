@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from operator import gt
 
 from rcilab.conformance.common_conditions import compliant_limits
-from rcilab.conformance.measured_monitor import MeasuredMonitor
+from rcilab.conformance.measured_monitor import MeasuredMonitor, find_collision_joint
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.i18n.translator import Remark
@@ -18,7 +18,6 @@ from rcilab.sim.tool_kinematics import ToolKinematics
 from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
 _ANYWHERE = (0.0, 0.0, 0.0)
-_LEAST = 1e-3  # [N m] Divisor for a threshold of zero; the client uses the same.
 
 
 class MeasuredStateMonitor:
@@ -106,9 +105,7 @@ class MeasuredStateMonitor:
         torques: list[float] = self.tau_ext.tolist()
         if not any(map(gt, map(abs, torques), thresholds)):
             return None
-        # The same choice as in the client, so that both name the same joint.
-        beyond = (i for i, torque in enumerate(torques) if abs(torque) > thresholds[i])
-        joint = max(beyond, key=lambda i: abs(torques[i]) / max(thresholds[i], _LEAST))
+        joint = find_collision_joint(torques, thresholds)
         torque, threshold = torques[joint], thresholds[joint]
         sentence = f"joint {joint + 1}: external torque {torque:.3g} N m is above its threshold {threshold:g} N m"
         return Remark(sentence, "collision", joint=joint + 1, value=torque, bound=threshold, unit="N m")

@@ -17,11 +17,11 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Measurement
 
-BANDWIDTH = 200.0  # [rad/s] of the residual: a push shows with a time constant of 5 ms
+BANDWIDTH = 200.0  # [rad/s] of the residual: time constant of 5 ms for a push
 _CYCLE = scalar(CYCLE_TIME)  # [s]
 _SHARE = BANDWIDTH * CYCLE_TIME / (1.0 + BANDWIDTH * CYCLE_TIME)  # of the difference, in one cycle
 _GAIN = scalar(_SHARE)
-_NOTHING = 1e-6  # [N m] A smaller residual is rounding and set to zero.
+_SMALLEST_TORQUE = 1e-6  # [N m] A smaller residual is rounding and set to zero.
 _DAMPING = 2.5e-5 * np.eye(6)  # [m^2, rad^2] keeps the wrench finite at a singularity
 
 
@@ -35,17 +35,17 @@ class MomentumObserver:
     def __init__(self, model: RobotModel) -> None:
         self._body = model.rigid_body
         self._zeros = readonly_copy(np.zeros(model.n))
-        self._none = (self._zeros, readonly_copy(np.zeros(6)))
+        self._no_force = (self._zeros, readonly_copy(np.zeros(6)))
         self._last: Measurement | None = None
         self._is_static = True
-        self._answer = self._none
+        self._result = self._no_force
         self._raw = self._zeros
 
     def reset(self, measured: Measurement) -> None:
         """Resets the estimate for a stationary arm."""
         self._last, self._is_static = measured, True
-        self._raw = self._unexplained(measured, self._zeros)
-        self._answer = self._answered(self._raw, measured)
+        self._raw = self._unmodelled_torque(measured, self._zeros)
+        self._result = self._estimate(self._raw, measured)
 
     def step(self, measured: Measurement) -> tuple[JointVector, Array]:
         """Returns external joint torques, shape (n,), [N m], and the wrench on the tool, base axes, shape (6,).
@@ -56,29 +56,29 @@ class MomentumObserver:
         last = self._last
         if last is None:
             self.reset(measured)
-            return self._answer
+            return self._result
         if measured is not last:
-            self._raw = self._unexplained(measured, (measured.dq - last.dq) / _CYCLE)
+            self._raw = self._unmodelled_torque(measured, (measured.dq - last.dq) / _CYCLE)
             self._last, self._is_static = measured, False
         elif not self._is_static:  # The same measurement again: its velocity has not changed.
-            self._raw = self._unexplained(measured, self._zeros)
+            self._raw = self._unmodelled_torque(measured, self._zeros)
             self._is_static = True
-        tau_ext = self._answer[0]
+        tau_ext = self._result[0]
         if tau_ext is self._raw:
-            return self._answer
+            return self._result
         step = _GAIN * (self._raw - tau_ext)
-        is_there = _is_tiny(step, _SHARE * _NOTHING)
-        self._answer = self._answered(self._raw if is_there else make_readonly(tau_ext + step), measured)
-        return self._answer
+        has_converged = _is_tiny(step, _SHARE * _SMALLEST_TORQUE)
+        self._result = self._estimate(self._raw if has_converged else make_readonly(tau_ext + step), measured)
+        return self._result
 
-    def _unexplained(self, measured: Measurement, ddq: JointVector) -> JointVector:
+    def _unmodelled_torque(self, measured: Measurement, ddq: JointVector) -> JointVector:
         raw = self._body.full_torque(measured.q, measured.dq, ddq)
         raw -= measured.tau
-        return self._zeros if _is_tiny(raw, _NOTHING) else make_readonly(raw)
+        return self._zeros if _is_tiny(raw, _SMALLEST_TORQUE) else make_readonly(raw)
 
-    def _answered(self, tau_ext: JointVector, measured: Measurement) -> tuple[JointVector, Array]:
+    def _estimate(self, tau_ext: JointVector, measured: Measurement) -> tuple[JointVector, Array]:
         if tau_ext is self._zeros:
-            return self._none
+            return self._no_force
         J = self._body.tool_terms(measured.q, measured.dq).jacobian
         return tau_ext, make_readonly(self._body.tool_solver.solve(J.dot(J.T) + _DAMPING, J.dot(tau_ext)))
 

@@ -1,7 +1,7 @@
-"""Solid things around a MuJoCo arm: a floor, boxes, the walls of a safety box.
+"""Obstacles of the MuJoCo plant: a floor, boxes, the walls of a safety box.
 
-MuJoCo's models are of fixed size, and compiling one takes many cycles of the controller. So the geoms are there from
-the start and switched off; to place something is to set its numbers.
+A MuJoCo model has a fixed size, and compiling one takes many cycles of the controller. Therefore all geoms exist from
+the start, switched off; placing an obstacle sets the values of its geom.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ MOST_BOXES = 16
 _FLOOR = "floor"
 _WALLS = tuple(f"wall{number}" for number in range(6))
 _BOXES = tuple(f"box{number}" for number in range(MOST_BOXES))
-_NEAR = 0.1  # [m] Beyond this distance from a link a box is free.
-_GAP = 1e-3  # [m] Left between a box that was moved out of the way and the arm.
-_FARTHEST_WAY = 5.0  # [m] No arm of ours is that large.
+_NEAR = 0.1  # [m] Largest distance of a box from a link that is measured.
+_GAP = 1e-3  # [m] Remaining gap between a box that was moved and the arm.
+_MAX_ESCAPE = 5.0  # [m] Larger than any arm.
 _DIRECTIONS = {
     "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
 }  # fmt: skip
-_ARM, _SOLID = 1, 1  # Bits: an arm's geom takes part as `conaffinity`, a solid one as `contype`.
+_ARM, _SOLID = 1, 1  # Bits: `conaffinity` of the arm's geoms, `contype` of obstacles.
 
 
 class Obstacles:
-    """What is solid around one arm. Owned by its plant; outlives the compiled models it is installed in."""
+    """The obstacles of one arm. Owned by its plant; kept when another model is compiled."""
 
     def __init__(self) -> None:
         self._boxes: dict[str, tuple[float, float, float, Pose]] = {}
@@ -41,11 +41,11 @@ class Obstacles:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is solid."""
+        """Whether there are no obstacles."""
         return not (self._boxes or self._has_floor or self._walls)
 
     def add_to(self, spec: Any, mj: Any) -> None:
-        """Adds the geoms to an `MjSpec` and takes contact among the arm's own geoms out of it."""
+        """Adds the geoms to an `MjSpec` and disables contact between the arm's own geoms."""
         for geom in spec.geoms:
             geom.contype, geom.conaffinity = 0, _ARM
         for names, kind in (((_FLOOR, *_WALLS), mj.mjtGeom.mjGEOM_PLANE), (_BOXES, mj.mjtGeom.mjGEOM_BOX)):
@@ -54,27 +54,28 @@ class Obstacles:
                 spec.worldbody.add_geom(name=name, type=kind, size=size, contype=_SOLID, conaffinity=0, group=4)
 
     def install(self, model: Any, mj: Any) -> None:
-        """Puts everything into a compiled model."""
+        """Installs all obstacles in a compiled model."""
         self._model, self._mj = model, mj
-        model.opt.disableflags |= mj.mjtDisableBit.mjDSBL_MIDPHASE  # Its trees were built for the places at compiling.
+        # Not the trees of the middle phase, which were built for the poses at compile time.
+        model.opt.disableflags |= mj.mjtDisableBit.mjDSBL_MIDPHASE
         for name in (_FLOOR, *_WALLS, *_BOXES):
             model.geom_sameframe[model.geom(name).id] = 0
         self._apply()
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose, data: Any) -> None:
-        """Puts a box somewhere, or moves it; see `Plant.place_box`.
+        """Adds a box, or moves it; see `Plant.place_box`.
 
         Args:
-            name: See there, as the next two.
-            size: [m].
-            pose: In base.
-            data: MuJoCo's data of the arm as it is now, which must not stand in the box.
+            name: Its name.
+            size: Edge lengths, shape (3,), [m].
+            pose: Its pose in base.
+            data: MuJoCo's data of the present arm, which must not overlap the box.
         """
         x, y, z = as_vector(size, 3, "box size", "m").tolist()
         if min(x, y, z) <= 0.0:
             raise InvalidValueError("box size", [x, y, z], "must be three lengths above 0 [m]").coded("box_size")
         if name not in self._boxes and len(self._boxes) == MOST_BOXES:
-            problem = f"would be one too many; {MOST_BOXES} can be there, remove another"
+            problem = f"exceeds the limit of {MOST_BOXES} boxes; remove another"
             raise InvalidValueError("box", name, problem).coded("box_many", name=name, most=MOST_BOXES)
         before = dict(self._boxes)
         self._boxes[name] = (x, y, z, pose)
@@ -87,26 +88,28 @@ class Obstacles:
             raise
 
     def _require_free(self, name: str, data: Any) -> None:
-        """Refuses a box that the arm stands in: MuJoCo would throw the arm out of it."""
+        """Refuses a box that overlaps the arm: MuJoCo would push the arm out."""
         index = int(self._model.geom(_BOXES[list(self._boxes).index(name)]).id)
         depth, link = self._deepest(index, data)
         if depth <= 0.0:
             return
         position = self._model.geom_pos[index].copy()
-        ways = {axis: self._way_out(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()}
+        distances = {
+            axis: self._escape_distance(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()
+        }
         self._model.geom_pos[index] = position
-        axis = min(ways, key=lambda axis: ways[axis])
-        way = 1e-3 * math.ceil(1e3 * ways[axis])  # [m]
+        axis = min(distances, key=lambda axis: distances[axis])
+        distance = 1e-3 * math.ceil(1e3 * distances[axis])  # [m]
         problem = (
-            f"would overlap {link} of the arm by {1e3 * depth:.0f} mm; place it {1e3 * way:.0f} mm farther "
+            f"would overlap {link} of the arm by {1e3 * depth:.0f} mm; place it {1e3 * distance:.0f} mm farther "
             f"along {axis}, or move the arm first"
         )
         raise InvalidValueError("box", name, problem).coded(
-            "box_overlap", name=name, link=link, axis=axis, depth=float(depth), way=way
+            "box_overlap", name=name, link=link, axis=axis, depth=float(depth), way=distance
         )
 
     def _deepest(self, box: int, data: Any) -> tuple[float, str]:
-        """Returns how deep a link of the arm is in a box, [m], and its name; 0 or less where none is."""
+        """Returns the depth of the deepest link in a box, [m], and its name; 0 or less if none overlaps."""
         model, mj = self._model, self._mj
         mj.mj_kinematics(model, data)
         moves = model.body_weldid[model.geom_bodyid] != 0  # The base may stand in a table: neither of them moves.
@@ -115,33 +118,33 @@ class Obstacles:
         nearest = int(np.argmin(distances))
         return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
 
-    def _way_out(self, box: int, data: Any, direction: Array) -> float:
+    def _escape_distance(self, box: int, data: Any, direction: Array) -> float:
         """Returns how far a box has to move along a direction to be free of the arm, [m]."""
-        position, way = self._model.geom_pos[box].copy(), 0.0
-        while way < _FARTHEST_WAY:
+        position, distance = self._model.geom_pos[box].copy(), 0.0
+        while distance < _MAX_ESCAPE:
             depth, _ = self._deepest(box, data)
             if depth <= 0.0:
                 break
-            way += depth + _GAP
-            self._model.geom_pos[box] = position + way * direction
+            distance += depth + _GAP
+            self._model.geom_pos[box] = position + distance * direction
         self._model.geom_pos[box] = position
-        return way
+        return distance
 
     def remove_box(self, name: str) -> None:
-        """Takes a box away; see `Plant.remove_box`."""
+        """Removes a box; see `Plant.remove_box`."""
         if name not in self._boxes:
             known = ", ".join(self._boxes) or "none"
-            raise InvalidValueError("box", name, f"is not there; there are: {known}").coded("box_unknown", name=name)
+            raise InvalidValueError("box", name, f"does not exist; there are: {known}").coded("box_unknown", name=name)
         del self._boxes[name]
         self._apply()
 
     def set_floor(self, on: bool) -> None:
-        """Lets the plane z = 0 be solid or not."""
+        """Adds or removes a solid floor at z = 0."""
         self._has_floor = on
         self._apply()
 
     def set_walls(self, box: SafetyBox | None) -> None:
-        """Lets the faces of a box be solid from inside; None takes them away."""
+        """Makes the faces of a box solid from inside; None removes them."""
         self._walls = box
         self._apply()
 

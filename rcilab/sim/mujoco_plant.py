@@ -38,14 +38,14 @@ from rcilab.sim.push import Push
 
 BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped, about 13 Hz; a tuning value
 KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
-FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; real drives do not know it exactly.
+FRICTION_KNOWN = 0.9  # Share of the friction that the drives compensate; that of real drives is not known exactly.
 PEAK_TORQUE = 4.0  # Largest torque of a drive, in units of the manual's torque limit; see above
 END_STOP = math.radians(10.0)  # [rad] of the end stops beyond the manual's joint range: room to stop in
 BRAKE_TIME = 0.02  # [s] time constant of the brakes; a tuning value
 
 _KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
 _BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
-_BRAKES_HOLD = 1e-4  # [rad/s] Below this, engaged brakes hold the arm.
+_BRAKED_SPEED = 1e-4  # [rad/s] Below this, engaged brakes hold the arm.
 _STILL_SPEED = 1e-7  # [rad/s] Below this, a joint counts as stationary.
 _STILL_ERROR = 1e-9  # [rad] A stationary joint nearer to its setpoint counts as being there.
 _STILL_CYCLES = 100  # Cycles of standstill until an arm off its setpoint counts as stationary.
@@ -156,7 +156,7 @@ class MuJoCoPlant:
         return self._times_inertia(_KP * (q_c - q) + _KD * (dq_c - dq) - _BACK * dq_c + _AHEAD * ddq_c)
 
     def _push_torque(self) -> Array | float:
-        """Returns what presses from outside as joint torques, shape (n,), [N m]; 0 where nothing does."""
+        """Returns the joint torques of the external force, shape (n,), [N m]; 0 without one."""
         return self._push.torque(self._q) if self._push.is_active else 0.0
 
     def _settle(self, setpoint: Setpoint) -> None:
@@ -164,7 +164,7 @@ class MuJoCoPlant:
         speeds: list[float] = self._dq.tolist()
         speed = max(map(abs, speeds))
         if setpoint.drive is Drive.BRAKED:
-            if speed < _BRAKES_HOLD:
+            if speed < _BRAKED_SPEED:
                 self._set_standstill(self._q.tolist())
             return
         if speed > _STILL_SPEED or setpoint.drive is Drive.TORQUE or any(setpoint.dq) or any(setpoint.ddq):

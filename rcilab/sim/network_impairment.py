@@ -1,7 +1,7 @@
-"""A bad network, as pure functions of what is sent, when, and a seed: no sockets, no clock.
+"""Simulated network faults as pure functions of the data, the time and a seed: no sockets, no clock.
 
-Every fault is drawn for each datagram on its own, in this order: loss, corruption, duplication, and for each copy its
-delay. Delays keep the order of the datagrams, except of those that `reorder` holds back.
+Every fault is drawn for each datagram separately, in this order: loss, corruption, duplication, and the delay of each
+copy. Delays keep the order of the datagrams, except for those that `reorder` holds back.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from rcilab.sim.api import NetworkFaults
 
 __all__ = ["HOLD_TIME", "PIECE_GAP", "DelayedDatagrams", "Impairment", "NetworkFaults", "SlowStream"]
 
-HOLD_TIME = 0.0025  # [s] By which a reordered datagram is late: two others of a 1 kHz stream overtake it.
-PIECE_GAP = 0.002  # [s] Between the pieces of a split answer, so that they arrive as pieces.
-MOST_HELD = 4096  # Datagrams on their way at once, four times what a delay of 1 s needs; more are lost, as in a router.
+HOLD_TIME = 0.0025  # [s] Delay of a reordered datagram: two others of a 1 kHz stream overtake it.
+PIECE_GAP = 0.002  # [s] Between the pieces of a split response, so that they arrive separately.
+MOST_HELD = 4096  # Datagrams in transit, four times the need of a delay of 1 s; further ones are lost, as in a router.
 
 
 class Impairment:
-    """What a bad network makes of the datagrams of one direction.
+    """Applies network faults to the datagrams of one direction.
 
     Args:
-        faults: What is wrong with it.
-        stream: Name of the direction; both draw different random numbers from one seed.
+        faults: The simulated faults.
+        stream: Name of the direction; each draws its own random numbers from one seed.
     """
 
     def __init__(self, faults: NetworkFaults, stream: str = "") -> None:
@@ -34,7 +34,7 @@ class Impairment:
         self._last_due = float("-inf")
 
     def apply(self, datagram: bytes, now: float) -> list[tuple[bytes, float]]:
-        """Returns what arrives of a datagram sent `now`, [s], and when: nothing, once, or twice."""
+        """Returns the copies of a datagram sent `now`, [s], that arrive, and their times: none, one or two."""
         faults, draw = self._faults, self._random.random
         if draw() < faults.loss:
             return []
@@ -52,17 +52,17 @@ class Impairment:
         return self._last_due
 
     def _flip_one_bit(self, datagram: bytes) -> bytes:
-        spoiled = bytearray(datagram)
-        bit = self._random.randrange(8 * len(spoiled))
-        spoiled[bit // 8] ^= 1 << bit % 8
-        return bytes(spoiled)
+        corrupted = bytearray(datagram)
+        bit = self._random.randrange(8 * len(corrupted))
+        corrupted[bit // 8] ^= 1 << bit % 8
+        return bytes(corrupted)
 
 
 class DelayedDatagrams:
-    """One direction of a bad network with the datagrams that are on their way in it.
+    """One direction of a faulty network with the datagrams in transit.
 
     Args:
-        faults: What is wrong with it.
+        faults: The simulated faults.
         stream: Name of the direction.
     """
 
@@ -74,16 +74,16 @@ class DelayedDatagrams:
 
     @property
     def next_due(self) -> float:
-        """When the next datagram arrives, [s]; infinity: none is on its way."""
+        """When the next datagram arrives, [s]; infinity: none is in transit."""
         return self._waiting[0][0] if self._waiting else float("inf")
 
     @property
     def is_clean(self) -> bool:
-        """Whether there is no fault and no datagram on its way, so that datagrams may pass directly."""
-        return self._spares and not self._waiting
+        """Whether there is no fault and no datagram in transit, so that datagrams may be sent directly."""
+        return self._has_no_faults and not self._waiting
 
     def put(self, datagram: bytes, now: float) -> bool:
-        """Sends a datagram on its way; returns whether it will arrive, be it spoiled."""
+        """Sends a datagram; returns whether it will arrive, possibly corrupted."""
         arrives = False
         for copy, due in self._impairment.apply(datagram, now):
             if len(self._waiting) < MOST_HELD:
@@ -99,17 +99,17 @@ class DelayedDatagrams:
         return arrived
 
     def replace(self, faults: NetworkFaults) -> None:
-        """Changes the faults; datagrams already on their way arrive as they would have."""
+        """Changes the faults; datagrams in transit are not affected."""
         self.faults = faults
-        self._spares = faults.spares_datagrams
+        self._has_no_faults = faults.is_udp_clean
         self._impairment = Impairment(faults, self._stream)
 
 
 class SlowStream:
-    """The answers of one TCP connection on their way through a bad network.
+    """The responses of one TCP connection in transit through a faulty network.
 
     Args:
-        faults: What is wrong with it.
+        faults: The simulated faults.
     """
 
     def __init__(self, faults: NetworkFaults) -> None:
@@ -119,21 +119,21 @@ class SlowStream:
 
     @property
     def next_due(self) -> float:
-        """When the next piece has to go out, [s]; infinity: none waits."""
+        """When the next piece must be sent, [s]; infinity: none is queued."""
         return self._pieces[0][0] if self._pieces else float("inf")
 
     @property
     def is_clean(self) -> bool:
-        """Whether nothing is wrong and nothing waits, so that answers may take the direct way."""
-        return not self._pieces and self.faults.spares_tcp
+        """Whether there is no fault and nothing is queued, so that responses may be sent directly."""
+        return not self._pieces and self.faults.is_tcp_clean
 
     @property
     def is_broken(self) -> bool:
-        """Whether the connection has carried as many bytes as it ever will."""
+        """Whether the byte limit is reached."""
         return self.faults.tcp_break is not None and self._sent >= self.faults.tcp_break
 
     def put(self, frame: bytes, now: float) -> None:
-        """Sends an answer on its way."""
+        """Queues a response."""
         size = self.faults.tcp_split or max(len(frame), 1)
         due = max(now + self.faults.tcp_delay, self._pieces[-1][0] if self._pieces else now)
         for start in range(0, len(frame), size):

@@ -13,10 +13,10 @@ _SOCK_DIAG = 4  # NETLINK_SOCK_DIAG
 _BY_FAMILY = 20  # SOCK_DIAG_BY_FAMILY
 _REQUEST = 1  # NLM_F_REQUEST
 _HEADER = struct.Struct("=IHHII")  # struct nlmsghdr: length, type, flags, sequence, port.
-_ASKED = struct.Struct("=BBBxI")  # Family, protocol, extensions, states.
-_ENDS = struct.Struct(">HH16s16s")  # struct inet_diag_sockid: ports and addresses of the other end and of ours,
+_QUERY = struct.Struct("=BBBxI")  # Family, protocol, extensions, states.
+_SOCKET_ID = struct.Struct(">HH16s16s")  # struct inet_diag_sockid: ports and addresses of the other end and of ours,
 _NO_COOKIE = struct.pack("=III", 0, 0xFFFFFFFF, 0xFFFFFFFF)  # interface, cookie.
-_FOUND = struct.Struct("=4x48x12xII")  # struct inet_diag_msg up to user and inode.
+_REPLY = struct.Struct("=4x48x12xII")  # struct inet_diag_msg up to user and inode.
 _ANY_STATE = 0xFFFFFFFF
 
 
@@ -30,18 +30,18 @@ def is_ours(connection: socket.socket) -> bool:
         (host, port), (own_host, own_port) = connection.getpeername(), connection.getsockname()
     except OSError:
         return False
-    ends = _ENDS.pack(port, own_port, socket.inet_aton(host), socket.inet_aton(own_host))
-    asked = _ASKED.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, _ANY_STATE) + ends + _NO_COOKIE
+    socket_id = _SOCKET_ID.pack(port, own_port, socket.inet_aton(host), socket.inet_aton(own_host))
+    query = _QUERY.pack(socket.AF_INET, socket.IPPROTO_TCP, 0, _ANY_STATE) + socket_id + _NO_COOKIE
     try:
         with socket.socket(socket.AF_NETLINK, socket.SOCK_DGRAM, _SOCK_DIAG) as kernel:
             kernel.setblocking(False)  # The kernel responds at once.
-            kernel.sendto(_HEADER.pack(_HEADER.size + len(asked), _BY_FAMILY, _REQUEST, 1, 0) + asked, (0, 0))
-            answer = kernel.recv(4096)
+            kernel.sendto(_HEADER.pack(_HEADER.size + len(query), _BY_FAMILY, _REQUEST, 1, 0) + query, (0, 0))
+            reply = kernel.recv(4096)
     except OSError:
         return True
-    if len(answer) < _HEADER.size + _FOUND.size or _HEADER.unpack_from(answer)[1] != _BY_FAMILY:
+    if len(reply) < _HEADER.size + _REPLY.size or _HEADER.unpack_from(reply)[1] != _BY_FAMILY:
         return False
-    user, inode = _FOUND.unpack_from(answer, _HEADER.size)
+    user, inode = _REPLY.unpack_from(reply, _HEADER.size)
     return inode != 0 and user in _allowed_users()
 
 

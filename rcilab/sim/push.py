@@ -1,4 +1,4 @@
-"""What presses on the arm from outside: a force and a moment at a point of a link."""
+"""An external force and moment at a point of a link."""
 
 from __future__ import annotations
 

@@ -14,9 +14,7 @@ from rcilab.core.limits import JointLimits
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.stop import plan_stop
 
-JOIN_SHARE = (
-    2.0  # Of the arm's limits: what a stop starts from at most, however fast the arm was pushed; a tuning value.
-)
+JOIN_SHARE = 2.0  # Upper bound for the start of a stop, in units of the arm's limits; a tuning value.
 
 
 class ReferenceTrajectory:
@@ -36,8 +34,8 @@ class ReferenceTrajectory:
 
     def __init__(self, limits: JointLimits, q: Sequence[float]) -> None:
         self._limits = limits
-        self._fastest = JOIN_SHARE * limits.velocity
-        self._hardest = JOIN_SHARE * limits.acceleration
+        self._max_velocity = JOIN_SHARE * limits.velocity
+        self._max_acceleration = JOIN_SHARE * limits.acceleration
         self._acceleration: list[float] = limits.acceleration.tolist()
         self._jerk: list[float] = limits.jerk.tolist()
         self._pack = Struct(f"{3 * len(q)}d").pack
@@ -51,7 +49,7 @@ class ReferenceTrajectory:
         """q, dq and ddq as read-only arrays, created once per cycle and shared by all readers."""
         if self._arrays is None or self._arrays_version != self.version:
             n = len(self.q)
-            rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # numpy looks at each float of a list twice.
+            rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # Faster than np.array of a list.
             self._arrays, self._arrays_version = (rows[:n], rows[n : 2 * n], rows[2 * n :]), self.version
         return self._arrays
 
@@ -92,7 +90,8 @@ class ReferenceTrajectory:
             ddq: Their accelerations, [rad/s^2]. Values above `JOIN_SHARE` times a limit are clipped.
         """
         velocity, acceleration = differences_from_derivatives(
-            np.clip(dq, -self._fastest, self._fastest), np.clip(ddq, -self._hardest, self._hardest)
+            np.clip(dq, -self._max_velocity, self._max_velocity),
+            np.clip(ddq, -self._max_acceleration, self._max_acceleration),
         )
         self.q, self.dq, self.ddq = list(q), velocity.tolist(), acceleration.tolist()
         self.is_stationary = not any(self.dq) and not any(self.ddq)

@@ -2,7 +2,7 @@
 
 It serves the user who started the controller; other accounts of the machine are refused. An idle client stays connected
 until another one needs its slot. Requests are lines of JSON, see `rcilab.sim.api`. A client whose line is not a valid
-request gets one line with the reason and is disconnected; what follows is not read. So a web page's POST, whose first
+request gets one line with the reason and is disconnected; further data is not read. So a web page's POST, whose first
 line is not a request, has no effect.
 """
 
@@ -20,7 +20,7 @@ from rcilab.sim.peer_user import is_ours
 
 MAX_CLIENTS = 8  # At once. A tuning value: one script and one page need two.
 IDLE_TIMEOUT = 60.0  # [s] A connection that has been idle for longer is closed when another one needs its slot.
-_FALLBACK = "127.0.0.1"  # For a controller that listens on an address which others can reach.
+_FALLBACK = "127.0.0.1"  # For a controller that listens on an address of the network.
 _BYTES_AT_ONCE = 4096
 
 

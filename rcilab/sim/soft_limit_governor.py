@@ -2,9 +2,9 @@
 
 Each joint follows its command as long as a stop with limited jerk would end inside the soft limits. The first command
 after which it would not is rejected: the joint stops just before the limit. From then on it approaches its command, as
-far as that is inside, and follows it again once it has reached it.
+far as that is inside, and follows it again after reaching it.
 
-    following --stop would end outside--> stopping --standstill--> chasing --command reached--> following
+    following --stop would end outside--> stopping --standstill--> approaching --command reached--> following
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from rcilab.core.limits import JointLimits
 
 MARGIN = 1e-3  # [rad] Distance from the soft limit at which a joint stops; a tuning value.
 SHARE = 0.9  # Share of the velocity, acceleration and jerk limits in use: the rest is for rounding.
-_PULL = 8.0  # [1/s] Gain of the approach; critically damped with the one below.
-_GRIP = 4.0 * _PULL  # [1/s]
+_GAIN = 8.0  # [1/s] Gain of the approach; critically damped with the one below.
+_DAMPING = 4.0 * _GAIN  # [1/s]
 _FAR = 100.0  # [rad] Largest command beyond a limit; keeps extreme numbers finite.
-_CAUGHT = 1e-8  # [rad] Distance at which the command counts as reached: a jerk of 10 rad/s^3.
+_REACHED = 1e-8  # [rad] Distance at which the command counts as reached: a jerk of 10 rad/s^3.
 
 
 class _Mode(Enum):
     FOLLOWING = "following"
     STOPPING = "stopping"
-    CHASING = "chasing"
+    APPROACHING = "approaching"
 
 
 class SoftLimitGovernor:
@@ -132,10 +132,10 @@ class _Joint:
         self._u, self._du = u, du
         if self._mode is _Mode.STOPPING:
             return self._continue_stop()
-        x = u if self._mode is _Mode.FOLLOWING else self._chase(u, du, ddu)
+        x = u if self._mode is _Mode.FOLLOWING else self._approach(u, du, ddu)
         if self._can_stop_from(x):
             self._advance(x)
-            if abs(x - u) < _CAUGHT and abs(self._v - du) * h < _CAUGHT:
+            if abs(x - u) < _REACHED and abs(self._v - du) * h < _REACHED:
                 self._mode = _Mode.FOLLOWING
             return x
         self._begin_stop()
@@ -174,17 +174,17 @@ class _Joint:
         distance, _ = _along(stop.times, self._elapsed, v, a, self._jerk)
         self._advance(start + sign * distance)
         if self._elapsed > sum(stop.times) + 3.0 * CYCLE_TIME:
-            self._mode = _Mode.CHASING
+            self._mode = _Mode.APPROACHING
         return self._x
 
-    def _chase(self, u: float, du: float, ddu: float) -> float:
+    def _approach(self, u: float, du: float, ddu: float) -> float:
         """Returns the next angle of the approach: velocity from the distance, acceleration from the velocity."""
         h = CYCLE_TIME
         goal = min(max(u, self._lower), self._upper)
         if goal != u:
             du = ddu = 0.0
-        v_desired = _clip(du + _PULL * (goal - self._x), self._velocity)
-        a_desired = _clip(ddu + _GRIP * (v_desired - self._v), self._acceleration)
+        v_desired = _clip(du + _GAIN * (goal - self._x), self._velocity)
+        a_desired = _clip(ddu + _DAMPING * (v_desired - self._v), self._acceleration)
         a = self._a + _clip(a_desired - self._a, self._jerk * h)
         return self._x + h * (self._v + h * a)
 

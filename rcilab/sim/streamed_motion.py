@@ -10,8 +10,8 @@ from rcilab.sim.generators.motion_limits import MotionMode
 from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer
 from rcilab.sim.violations import ArmCondition, ArmViolation
 
-PREFILL = 10  # [cycles] Pauses of client and network that a motion survives unharmed, and its delay. Both ends on one
-# busy machine, even under SCHED_FIFO, were measured to pause for 5 to 10 ms now and then.
+PREFILL = 10  # [cycles] Pauses of client and network that are absorbed, and the delay of commands. On one busy
+# machine, even under SCHED_FIFO, occasional pauses of 5 to 10 ms were measured at both ends.
 TORQUE_PREFILL = 2  # [cycles] The same for torques: the client closes the loop, and delay makes it oscillate.
 LOST_LIMIT = 20  # [cycles] Consecutive lost commands that end a motion (RCI manual 4.6: usually 10 to 20).
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after the end of the stream; longer than any queue.

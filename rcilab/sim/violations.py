@@ -19,7 +19,7 @@ class ArmCondition(Enum):
     ARM_ANGLE_RANGE = "a commanded arm angle is within one turn"
     START_TOLERANCE = "a motion begins near the reference"
     """Not a fault by itself: it explains the limits that the jump violates."""
-    COMMANDS_ARRIVE = "few commands in a row are lost, and the motion can go on without them"
+    COMMANDS_ARRIVE = "few commands in a row are lost, and the motion can continue without them"
     NO_COLLISION = "external joint torques stay below the collision thresholds"
 
 

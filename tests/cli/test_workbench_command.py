@@ -72,7 +72,7 @@ def test_it_prints_one_line_serves_the_page_and_ends_cleanly(number):
         (["--private"], "RCILAB_TOKEN"),
         (["--token-file", "/nowhere/token"], "cannot read the token in /nowhere/token"),
         (["--robot", "http://x"], "rci://"),
-        (["--robot", "foo"], "'foo' is no address; write it like rci://"),
+        (["--robot", "foo"], "'foo' is not a valid address; write it like rci://"),
         (["--port", "70000"], "0 to 65535"),
         (["--port", "abc"], "0 to 65535"),
     ],

@@ -158,7 +158,7 @@ def test_a_killed_workbench_leaves_an_arm_that_its_control_process_has_stopped_a
         measure("control process, of its workbench", lambda: not is_alive(worker))
         with connect(controller.address, MODEL) as robot:
             # Had the control process just died, too, the controller would have said so and stopped the arm itself.
-            assert "in mid-motion" not in controller.stderr_tail
+            assert "during a motion" not in controller.stderr_tail
             state = robot.state
             assert state.faults == ()
             assert np.array_equal(state.q_c, robot.receive_state().q_c)
@@ -219,7 +219,7 @@ def test_closing_in_mid_motion_brings_the_arm_to_rest_first():
         with running(controller.address) as supervisor:
             begin_moving(supervisor)
             supervisor.drain()
-        assert "in mid-motion" not in controller.stderr_tail
+        assert "during a motion" not in controller.stderr_tail
         with connect(controller.address, MODEL) as robot:
             assert robot.state.faults == ()
     finally:

@@ -290,7 +290,10 @@ def test_something_else_at_that_port_is_no_world():
 
         thread = threading.Thread(target=answer)
         thread.start()
-        with SimulationControl(*listener.getsockname()) as world, pytest.raises(ConnectionLostError, match="no JSON"):
+        with (
+            SimulationControl(*listener.getsockname()) as world,
+            pytest.raises(ConnectionLostError, match="not valid JSON"),
+        ):
             world.status()
         thread.join()
 

@@ -150,7 +150,7 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
     statuses = [status for kind in kinds for status in kind if status.name not in ("SUCCESS", "MOTION_STARTED")]
     errors = [CommandRejectedError("StartMove", status) for status in statuses]
     errors += [BusyError("power_on", what) for what in ("execute", "control", "power_on", "power_off", "recover")]
-    errors += [InvalidValueError("address", "robot", "is no address")]
+    errors += [InvalidValueError("address", "robot", "is not a valid address")]
     for language in LANGUAGES:
         text = Text(language, "rcilab.notebook")
         for error in errors:

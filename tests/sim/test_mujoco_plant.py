@@ -208,7 +208,7 @@ def test_boxes_are_judged_and_counted() -> None:
     for number in range(MOST_BOXES):
         plant.place_box(f"box {number}", [0.1, 0.1, 0.1], Pose([5.0, 0.0, 0.0]))
     plant.place_box("box 0", [0.2, 0.1, 0.1], Pose([5.0, 0.0, 0.0]))
-    with pytest.raises(InvalidValueError, match="one too many"):
+    with pytest.raises(InvalidValueError, match="exceeds the limit of 16 boxes"):
         plant.place_box("last straw", [0.1, 0.1, 0.1], Pose())
     with pytest.raises(InvalidValueError, match="there are: box 0, box 1"):
         plant.remove_box("table")
@@ -237,7 +237,7 @@ def test_what_mujoco_warns_of_is_logged_and_no_file_is_written(tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_box_that_the_arm_stands_in_is_refused_with_the_depth_and_the_way_out() -> None:
+def test_a_box_that_overlaps_the_arm_is_refused_with_the_depth_and_the_escape_distance() -> None:
     plant = MuJoCoPlant(load_model("xMatePro7"))
     size, inside = [0.1, 1.0, 1.0], [0.6, 0.0, 0.5]
     with pytest.raises(
@@ -258,5 +258,5 @@ def test_a_box_that_was_refused_leaves_the_one_of_its_name_where_it_was() -> Non
     with pytest.raises(InvalidValueError, match="would overlap"):
         plant.place_box("wall", [0.1, 1.0, 1.0], Pose([0.6, 0.0, 0.5]))
     plant.remove_box("wall")
-    with pytest.raises(InvalidValueError, match="is not there"):
+    with pytest.raises(InvalidValueError, match="does not exist"):
         plant.remove_box("wall")

@@ -218,7 +218,7 @@ def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     idle.dispatcher.ask(SetNetwork(name="loss", value=9.0))
     wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.loss == 0.3, "the bound of the slider")
     idle.dispatcher.ask(SetNetwork(clear=True))
-    wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.spares_datagrams, "a good network")
+    wait(lambda: (w := idle.store.state.world.status) is not None and w.commands.is_udp_clean, "a good network")
     idle.dispatcher.ask(RobotCommand(what="reconnect"))
     wait(lambda: idle.session.status().phase in ("idle", "fault"), "the connection")
     settle(idle)

@@ -1,4 +1,4 @@
-"""Requests and answers of a virtual controller's simulation port, as values and as lines of JSON."""
+"""Requests and responses of a virtual controller's simulation port, as values and as lines of JSON."""
 
 from rcilab.sim.api.answers import Done, Refused, WorldAnswer, WorldStatus, status_as_dict
 from rcilab.sim.api.faults import DIRECTIONS, LONGEST_STALL, Direction, NetworkFaults, Stall

@@ -23,23 +23,23 @@ class Refused:
     reason: str
     """One English sentence: what, why, what to do."""
     code: str = ""
-    """Names what is wrong, as `RcilabError.code` does; "" where nothing does."""
+    """Code of the error, as `RcilabError.code`; "" without one."""
     facts: Mapping[str, object] = field(default_factory=dict[str, object])
-    """What fills its words: numbers and text."""
+    """Values of the placeholders: numbers and text."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldStatus:
-    """How the virtual controller is: what its RCI state does not say."""
+    """Status of the virtual controller beyond its RCI state."""
 
     model: str
     """Name of the arm."""
     plant: str
-    """What moves: ideal or mujoco."""
+    """Kind of plant: ideal or mujoco."""
     cycle: int
     """Number of the newest cycle; the message id of its state."""
     phase: str
-    """What the robot is doing, in the controller's own words."""
+    """Phase of the controller."""
     faults: tuple[str, ...] = ()
     """Names of the error bits that are set."""
     reason: str = ""
@@ -51,15 +51,15 @@ class WorldStatus:
     lost: int = 0
     """Cycles of the last motion whose command did not arrive in time."""
     lost_in_row: int = 0
-    """The most of them that followed one another; 10 to 20 end a motion."""
+    """Largest number of consecutive lost cycles; 10 to 20 end a motion."""
     success_rate: float = 1.0
-    """As the state says it, 0 to 1."""
+    """As in the state, 0 to 1."""
     missed: int = 0
-    """Cycles that the controller's process was too late for and left out."""
+    """Cycles that were skipped because the controller's process was late."""
     bad_datagrams: int = 0
-    """Datagrams that had not the size of a command."""
+    """Datagrams of the client that did not have the size of a command."""
     unknown_senders: int = 0
-    """Datagrams that did not come from the client."""
+    """Datagrams from other senders than the client."""
     ignored: int = 0
     """Commands that arrived while none was expected."""
     pushed: bool = False
@@ -67,7 +67,7 @@ class WorldStatus:
     stalls: int = 0
     """Number of simulated stalls of the clock."""
     auto_limit: bool | None = None
-    """Whether commands are led to a standstill inside the soft limits; None: an older controller does not say."""
+    """Whether commands are stopped inside the soft limits; None: an older controller does not report it."""
     commands: NetworkFaults = field(default_factory=NetworkFaults)
     """Faults of the network towards the controller."""
     states: NetworkFaults = field(default_factory=NetworkFaults)
@@ -81,7 +81,7 @@ _LARGEST_COUNT = 2**63
 
 
 def status_as_dict(status: WorldStatus) -> dict[str, Any]:
-    """Returns a status as JSON has it."""
+    """Returns a status as a JSON object."""
     content = {item.name: getattr(status, item.name) for item in fields(status)}
     if isinstance(status.reason, Remark) and status.reason.code:
         content["remark"] = status.reason.as_dict()
@@ -123,16 +123,16 @@ def _reason(sentence: object, coded: object) -> str:
     try:
         return _text(sentence) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
     except (AttributeError, LookupError, RecursionError) as error:
-        raise TypeError(f"{coded!r} is no remark") from error
+        raise TypeError(f"{coded!r} is not a remark") from error
 
 
 def _text(value: object) -> str:
     if not isinstance(value, str):
-        raise TypeError(f"{value!r} is no text")
+        raise TypeError(f"{value!r} is not a text")
     return value
 
 
 def _items(value: object) -> list[object]:
     if not isinstance(value, list):
-        raise TypeError(f"{value!r} is no list")
+        raise TypeError(f"{value!r} is not a list")
     return value  # pyright: ignore[reportUnknownVariableType]

@@ -1,4 +1,4 @@
-"""What can be wrong with a network and with a clock, as values with ranges."""
+"""Simulated faults of network and clock."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import Any, Literal, TypeAlias, get_args
 from rcilab.sim.api.fields import as_float, as_integer
 
 Direction: TypeAlias = Literal["both", "commands", "states"]
-"""Which UDP datagrams are meant: commands (to the controller), states (from it), or both."""
+"""Affected UDP datagrams: commands (to the controller), states (from it), or both."""
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
 
-LONGEST_DELAY = 1.0  # [s] A thousand datagrams on their way: more is no network.
+LONGEST_DELAY = 1.0  # [s] A thousand datagrams in transit; a larger delay is not realistic.
 LONGEST_TCP_DELAY = 10.0  # [s] Longer than any client waits.
 LONGEST_STALL = 5.0  # [s] Longer than any client waits for a state.
-LONGEST_TIME = 86400.0  # [s] For what is to happen later: a day.
+LONGEST_TIME = 86400.0  # [s] Largest delay of a scheduled event: a day.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkFaults:
-    """A bad network between a client and the virtual controller. The default is a perfect one.
+    """Faults of the network between client and virtual controller. The default has none.
 
     Raises:
         InvalidValueError: A value is out of range; the message says which.
@@ -28,9 +28,9 @@ class NetworkFaults:
     loss: float = 0.0
     """Share of the datagrams that never arrive, 0 to 1."""
     delay: float = 0.0
-    """What every datagram takes at least, [s]."""
+    """Minimum delay of a datagram, [s]."""
     jitter: float = 0.0
-    """What it takes at most in addition, evenly distributed, [s]. The order is kept: that is `reorder`'s business."""
+    """Largest random delay in addition, uniformly distributed, [s]. The order is kept."""
     reorder: float = 0.0
     """Share of the datagrams that are held back until later ones have overtaken them, 0 to 1."""
     duplicate: float = 0.0
@@ -38,11 +38,11 @@ class NetworkFaults:
     corrupt: float = 0.0
     """Share of the datagrams in which one bit is flipped, 0 to 1. Real networks drop most of these (checksum)."""
     tcp_delay: float = 0.0
-    """What an answer over TCP takes in addition, [s]."""
+    """Additional delay of a TCP response, [s]."""
     tcp_split: int = 0
-    """Answers over TCP come in pieces of so many bytes, some time apart; 0: in one piece."""
+    """TCP responses arrive in pieces of so many bytes, some time apart; 0: in one piece."""
     tcp_break: int | None = None
-    """The TCP connection breaks after so many bytes of answers; None: it holds."""
+    """The TCP connection breaks after so many bytes of responses; None: never."""
     seed: int = 0
     """Of the random numbers: equal seeds and equal traffic give equal faults."""
 
@@ -59,13 +59,13 @@ class NetworkFaults:
         _put(self, "seed", as_integer(self.seed, "seed", 0, 2**32 - 1))
 
     @property
-    def spares_datagrams(self) -> bool:
-        """Whether UDP is left alone."""
+    def is_udp_clean(self) -> bool:
+        """Whether UDP is not affected."""
         return not (self.loss or self.delay or self.jitter or self.reorder or self.duplicate or self.corrupt)
 
     @property
-    def spares_tcp(self) -> bool:
-        """Whether TCP is left alone."""
+    def is_tcp_clean(self) -> bool:
+        """Whether TCP is not affected."""
         return not (self.tcp_delay or self.tcp_split) and self.tcp_break is None
 
     def as_dict(self) -> dict[str, Any]:
@@ -75,18 +75,18 @@ class NetworkFaults:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stall:
-    """A controller whose clock stands still for a while: it neither moves nor listens nor sends, and is late then.
+    """A pause of the controller's clock: no motion, no reception, no states meanwhile.
 
     Raises:
         InvalidValueError: A value is out of range, or the pauses would leave no time between them.
     """
 
     duration: float
-    """How long it stands still, [s]."""
+    """Duration of the pause, [s]."""
     after: float = 0.0
-    """When it does so first: this long after the request, or after the start of the controller, [s]."""
+    """Time of the first pause after the request, or after the start of the controller, [s]."""
     period: float | None = None
-    """And again this long after the beginning of the last time, [s]; None: once."""
+    """Time from the start of one pause to the start of the next, [s]; None: once."""
 
     def __post_init__(self) -> None:
         """Checks every value."""

@@ -1,4 +1,4 @@
-"""Checks of the fields of a world request: every invalid value raises one error that names it."""
+"""Checks of the fields of a request: every invalid value raises one error that names it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ def as_float(value: object, name: str, unit: str, low: float = -inf, high: float
 
     Args:
         value: A number; text and booleans are refused.
-        name: What to call it in an error.
+        name: Its name in an error message.
         unit: Its unit, such as "s".
         low: Smallest value.
         high: Largest value.
 
     Raises:
-        InvalidValueError: It is no such number.
+        InvalidValueError: It is not such a number.
     """
     value = _plain(value)
     if not isinstance(value, int | float) or isinstance(value, bool) or not -1e300 <= value <= 1e300:
@@ -95,7 +95,7 @@ def as_name(value: object, name: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Returns the Python value of what may come from numpy."""
+    """Returns a value from numpy as the corresponding Python value."""
     return cast("Any", value).tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 

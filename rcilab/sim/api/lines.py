@@ -1,11 +1,11 @@
-"""World requests and answers as lines of JSON.
+"""Requests and responses of the simulation port as lines of JSON.
 
     {"id": 1, "request": "push", "wrench": [0, 0, -20, 0, 0, 0], "link": 4}        request
     {"id": 1, "ok": true}                                                         done
     {"id": 1, "ok": false, "error": "..."}                                        refused
-    {"id": 1, "ok": true, "status": {...}}                                        the answer to "status"
+    {"id": 1, "ok": true, "status": {...}}                                        the response to "status"
 
-Optional fields may be left out. One object a line, UTF-8, no line longer than `LONGEST_LINE`.
+Optional fields may be omitted. One object per line, UTF-8, no line longer than `LONGEST_LINE`.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class LineReader:
 
 
 def encode_world_request(request: WorldRequest, request_id: int) -> bytes:
-    """Returns the line of a request; what has its default value is left out."""
+    """Returns the line of a request; fields with their default values are omitted."""
     content: dict[str, Any] = {"id": request_id, "request": request.name}
     for item in fields(request):
         value: Any = getattr(request, item.name)
@@ -56,10 +56,10 @@ def encode_world_request(request: WorldRequest, request_id: int) -> bytes:
 
 
 def decode_world_request(line: bytes) -> tuple[int, WorldRequest | Refused]:
-    """Returns the id and the request in a line; why it is not a request, if the line can be read so far.
+    """Returns the id and the request in a line, or the reason why it is not a valid request.
 
     Raises:
-        DecodeError: It is no JSON object, or its id is no number; the message says why.
+        DecodeError: It is not a JSON object, or its id is not a number; the message says why.
     """
     content = _decode(line)
     request_id = _pop_id(content)
@@ -87,12 +87,12 @@ def _request(content: dict[str, Any]) -> WorldRequest:
         raise DecodeError(f"{name}: {error}") from error
 
 
-_BESIDE = ("auto_limit",)
-"""Fields of the status that were added to it later."""
+_SEPARATE_FIELDS = ("auto_limit",)
+"""Fields that were added to the status later, and are sent outside of it."""
 
 
 def encode_world_answer(answer: WorldAnswer, request_id: int) -> bytes:
-    """Returns the line of an answer to the request with this id; 0 where none could be read."""
+    """Returns the line of a response to the request with this id; 0 if no id could be read."""
     content: dict[str, Any] = {"id": request_id, "ok": not isinstance(answer, Refused)}
     match answer:
         case Refused(reason, code, facts):
@@ -101,18 +101,18 @@ def encode_world_answer(answer: WorldAnswer, request_id: int) -> bytes:
                 content |= {"code": code, "facts": dict(facts)}
         case WorldStatus():
             content["status"] = status_as_dict(answer)
-            # Beside the status: readers of releases before it refuse a status with a name that they do not know.
-            content |= {name: content["status"].pop(name) for name in _BESIDE}
+            # Next to the status: clients of older releases refuse a status with an unknown name.
+            content |= {name: content["status"].pop(name) for name in _SEPARATE_FIELDS}
         case Done():
             pass
     return _encode(content)
 
 
 def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
-    """Returns the id and the answer in a line.
+    """Returns the id and the response in a line.
 
     Raises:
-        DecodeError: It is no answer; the message says why.
+        DecodeError: It is not a response; the message says why.
     """
     content = _decode(line)
     request_id = _pop_id(content)
@@ -123,8 +123,8 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
     if "status" not in content:
         return request_id, Done()
     try:
-        beside = {name: content[name] for name in _BESIDE if name in content}
-        return request_id, status_from_dict(content["status"] | beside)
+        separate = {name: content[name] for name in _SEPARATE_FIELDS if name in content}
+        return request_id, status_from_dict(content["status"] | separate)
     except (InvalidValueError, TypeError, ValueError) as error:
         raise DecodeError(f"status: {error}") from error
 
@@ -146,23 +146,23 @@ def _decode(line: bytes) -> dict[str, Any]:
     try:
         content: object = json.loads(line.decode("utf-8"), parse_constant=_refuse)
     except RecursionError as error:
-        raise DecodeError("no JSON one would write: nested too deeply") from error
-    except ValueError as error:  # No UTF-8 or no JSON.
-        raise DecodeError(f"no JSON: {error}", getattr(error, "pos", getattr(error, "start", 0))) from error
+        raise DecodeError("not valid JSON: nested too deeply") from error
+    except ValueError as error:  # Not UTF-8, or not JSON.
+        raise DecodeError(f"not valid JSON: {error}", getattr(error, "pos", getattr(error, "start", 0))) from error
     if not isinstance(content, dict):
-        raise DecodeError("no JSON object")
+        raise DecodeError("not a JSON object")
     return cast("dict[str, Any]", content)
 
 
 def _pop_id(content: dict[str, Any]) -> int:
     request_id = content.pop("id", 0)
     if not isinstance(request_id, int) or isinstance(request_id, bool) or not 0 <= request_id <= _LARGEST_ID:
-        raise DecodeError(f"id {_shown(request_id)} is no whole number from 0 to {_LARGEST_ID}")
+        raise DecodeError(f"id {_shown(request_id)} is not a whole number from 0 to {_LARGEST_ID}")
     return request_id
 
 
 def _refuse(constant: str) -> NoReturn:
-    raise ValueError(f"{constant} is no number")
+    raise ValueError(f"{constant} is not a number")
 
 
 def _shown(value: object) -> str:

@@ -13,14 +13,16 @@ Floats: TypeAlias = tuple[float, ...]
 SafetyButton: TypeAlias = Literal["none", "estop", "gstop"]
 
 _BUTTONS: tuple[SafetyButton, ...] = get_args(SafetyButton)
-_LARGEST_FORCE = 1e4  # [N], [N m] Far beyond what any arm here withstands: it catches wrong units.
-_FARTHEST = 100.0  # [m] Likewise.
-_LAST_SIGNAL = 31  # The status of the control process has 32 bits for them; a controller refuses what it lacks.
+_LARGEST_FORCE = 1e4  # [N], [N m] Far beyond the strength of any arm: it detects wrong units.
+_FARTHEST = 100.0  # [m] The same for lengths.
+_LAST_SIGNAL = (
+    31  # The status of the control process has 32 bits for them; a controller refuses signals that it does not have.
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """Something presses on the arm until the time is over, or until `Release`. It replaces the push before."""
+    """Applies an external force for a duration, or until `Release`. It replaces the previous force."""
 
     name: ClassVar[str] = "push"
     wrench: Floats
@@ -59,7 +61,7 @@ class Release:
 
 @dataclass(frozen=True, slots=True)
 class Press:
-    """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" puts both right again."""
+    """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" resets both."""
 
     name: ClassVar[str] = "press"
     button: SafetyButton
@@ -86,7 +88,7 @@ class SetInput:
 
 @dataclass(frozen=True, slots=True)
 class LoopBack:
-    """Wires every digital output to the input of the same number, or cuts these wires."""
+    """Wires every digital output to the input of the same number, or removes this wiring."""
 
     name: ClassVar[str] = "loop_back"
     on: bool
@@ -98,7 +100,7 @@ class LoopBack:
 
 @dataclass(frozen=True, slots=True)
 class AutoLimit:
-    """Has commands led to rest inside the soft joint limits, instead of raising a fault beyond them; or not."""
+    """Stops commands inside the soft joint limits instead of raising a fault, or not."""
 
     name: ClassVar[str] = "auto_limit"
     on: bool
@@ -114,7 +116,7 @@ class Limits:
 
     name: ClassVar[str] = "limits"
     table: str
-    """One of the maker's; "manual" is that of its manual."""
+    """Name of one of the maker's tables; "manual" is that of its manual."""
 
     def __post_init__(self) -> None:
         """Checks the word."""
@@ -123,12 +125,12 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """Makes the network bad, or good again."""
+    """Sets the simulated network faults."""
 
     name: ClassVar[str] = "network"
     faults: NetworkFaults
     direction: Direction = "both"
-    """Which datagrams are meant; TCP follows "both" and "states", whose way its answers go."""
+    """Affected datagrams; TCP responses are affected by "both" and "states"."""
 
     def __post_init__(self) -> None:
         """Checks both; a dictionary of faults, as in a line of JSON, becomes a value."""
@@ -138,11 +140,11 @@ class Network:
 
 @dataclass(frozen=True, slots=True)
 class StallClock:
-    """Has the controller's clock stand still, once or again and again; a new one replaces those before."""
+    """Stops the controller's clock, once or periodically; a new request replaces the previous one."""
 
     name: ClassVar[str] = "stall"
     duration: float
-    """[s]; 0 takes back what was asked for before."""
+    """[s]; 0 cancels pending stalls."""
     after: float = 0.0
     """[s] from now."""
     period: float | None = None
@@ -157,13 +159,13 @@ class StallClock:
 
     @property
     def stall(self) -> Stall | None:
-        """What is asked for; None: nothing more."""
+        """The requested stall; None: pending ones are cancelled."""
         return Stall(duration=self.duration, after=self.after, period=self.period) if self.duration else None
 
 
 @dataclass(frozen=True, slots=True)
 class PlaceBox:
-    """Puts a box that cannot move beside the arm, or moves the one of that name."""
+    """Puts a fixed box next to the arm, or moves the box of that name."""
 
     name: ClassVar[str] = "place_box"
     box: str
@@ -203,7 +205,7 @@ class RemoveBox:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Puts a floor under the base that the arm can hit, or takes it away."""
+    """Adds a floor under the base that the arm can hit, or removes it."""
 
     name: ClassVar[str] = "floor"
     on: bool
@@ -215,7 +217,7 @@ class Floor:
 
 @dataclass(frozen=True, slots=True)
 class Walls:
-    """Makes the faces of the active safety box solid, so that the links run into them, or not."""
+    """Makes the faces of the active safety box solid walls for the links, or not."""
 
     name: ClassVar[str] = "walls"
     on: bool
@@ -227,7 +229,7 @@ class Walls:
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Fixes a real load to the flange, whatever SetLoad says of it; without a mass again the one of SetLoad."""
+    """Attaches a physical load to the flange, independent of SetLoad; without a mass, the load of SetLoad again."""
 
     name: ClassVar[str] = "mount"
     mass: float | None = None
@@ -281,7 +283,7 @@ def _network_faults(value: Any) -> NetworkFaults:
         return NetworkFaults(**value)
     except TypeError:
         known = ", ".join(NetworkFaults().as_dict())
-        raise InvalidValueError("faults", value, f"are no faults of a network; known: {known}") from None
+        raise InvalidValueError("faults", value, f"are not faults of a network; known: {known}") from None
 
 
 def _put(owner: object, name: str, value: object) -> None:

@@ -107,7 +107,7 @@ class CartesianGenerator:
             q = self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
-                return lost_motion(Remark(f"no joint angles for a pose on its way: {error}", "no_angles"))
+                return lost_motion(Remark(f"no joint angles for a bridged pose: {error}", "no_angles"))
             return _invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
         if not self._reference_has_begun:
             self._reference_has_begun = True

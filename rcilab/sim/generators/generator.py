@@ -18,7 +18,7 @@ from rcilab.sim.reference_trajectory import JOIN_SHARE
 from rcilab.sim.soft_limit_governor import SoftLimitGovernor
 from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
-_REACH = 2  # [cycles] that a second difference includes after a gap
+_REACH = 2  # [cycles] Range of a second difference after a gap.
 
 
 class GeneratorOutput(NamedTuple):
@@ -96,7 +96,7 @@ class JointReference:
         self._offset: StartOffset | None = None
         self._jump: Remark | None = None
         self._range = list(zip(joint.lower.tolist(), joint.upper.tolist(), strict=True))
-        self._hardest: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
+        self._max_acceleration: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
         self._last = self._before = q
         self._cycles_to_check = 0
 
@@ -139,10 +139,12 @@ class JointReference:
             reference = self._offset.step(q)
             if self._offset.is_absorbed:
                 self._offset, self._cycles_to_check = None, 0
-        jolt = None if cycles == 1 and self._cycles_to_check == 0 else self._find_jolt(reference, cycles)
+        excess = (
+            None if cycles == 1 and self._cycles_to_check == 0 else self._find_excess_acceleration(reference, cycles)
+        )
         self._last, self._before = reference, self._last
-        if jolt is not None:
-            return lost_motion(jolt)
+        if excess is not None:
+            return lost_motion(excess)
         if cycles == 0:
             return GeneratorOutput(reference)
         output = self._check(q, cycles)
@@ -153,20 +155,22 @@ class JointReference:
         monitor.reset(q)
         return monitor
 
-    def _find_jolt(self, q: list[float], cycles: int) -> Remark | None:
+    def _find_excess_acceleration(self, q: list[float], cycles: int) -> Remark | None:
         """Returns which joint would be accelerated too much or leave its range while differences span a gap."""
         self._cycles_to_check = self._cycles_to_check - 1 if cycles == 1 else _REACH
         h2 = CYCLE_TIME * CYCLE_TIME
-        columns = zip(q, self._last, self._before, self._hardest, self._range, strict=True)
-        for number, (x, y, z, hardest, (lower, upper)) in enumerate(columns, 1):
+        columns = zip(q, self._last, self._before, self._max_acceleration, self._range, strict=True)
+        for number, (x, y, z, bound, (lower, upper)) in enumerate(columns, 1):
             ddq = (x - 2.0 * y + z) / h2
-            if abs(ddq) > hardest:
-                sentence = f"joint {number} would need {ddq:.4g} rad/s^2 to go on, more than {hardest:g} rad/s^2"
-                return Remark(sentence, "thrown", joint=number, value=ddq, bound=hardest, unit="rad/s^2")
+            if abs(ddq) > bound:
+                sentence = f"joint {number} would need {ddq:.4g} rad/s^2 to continue, more than {bound:g} rad/s^2"
+                return Remark(sentence, "thrown", joint=number, value=ddq, bound=bound, unit="rad/s^2")
             if cycles == 0 and not lower < x < upper:
-                sentence = f"joint {number} would go on to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
-                bound = lower if x <= lower else upper
-                return Remark(sentence, "beyond", joint=number, value=x, bound=bound, unit="rad")
+                sentence = (
+                    f"joint {number} would continue to {x:.4g} rad, beyond its range {lower:.4g} to {upper:.4g} rad"
+                )
+                limit = lower if x <= lower else upper
+                return Remark(sentence, "beyond", joint=number, value=x, bound=limit, unit="rad")
         return None
 
     def _check(self, q: list[float], cycles: int) -> GeneratorOutput:

@@ -28,9 +28,7 @@ SERVO_LENGTH = 1e-3  # [m] The same at the tool, at a lever of 1 m.
 FORCE = 5.0  # [N] At the tool: the effect of friction and an imperfect load model on a compliant arm.
 LEVER = 0.5  # [m] From a joint to the tool, about half of the arms' reach: FORCE becomes a torque of 2.5 N m.
 TURNING_LEVER = 0.1  # [m] From the tool's axes to the point of FORCE: a torque of 0.5 N m.
-WIDEST_ANGLE = (
-    0.05  # [rad] However soft the spring: an arm that is farther off has been moved, and is not where it was.
-)
+WIDEST_ANGLE = 0.05  # [rad] For any stiffness: an arm with a larger deviation has been moved.
 WIDEST_LENGTH = 0.02  # [m] The same for the tool.
 SHARE = 0.1  # Of the joints' acceleration and jerk limits, for absorbing an offset; the rest is for the motion.
 
@@ -116,14 +114,14 @@ def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolera
     return None
 
 
-def _jump(begins: float, stands: float, bound: float, joint: int) -> Remark:
-    off = abs(begins - stands)
+def _jump(start: float, reference: float, bound: float, joint: int) -> Remark:
+    off = abs(start - reference)
     sentence = (
-        f"joint {joint}: the first command of the motion is {degrees(begins):.4f}° and the arm's reference is "
-        f"{degrees(stands):.4f}°, {degrees(off):.3g}° apart, more than {degrees(bound):.3g}°; "
+        f"joint {joint}: the first command of the motion is {degrees(start):.4f}° and the arm's reference is "
+        f"{degrees(reference):.4f}°, {degrees(off):.3g}° apart, more than {degrees(bound):.3g}°; "
         "begin at the commanded joint angles in the state"
     )
-    return Remark(sentence, "start_joint", joint=joint, begins=begins, stands=stands, off=off, bound=bound)
+    return Remark(sentence, "start_joint", joint=joint, begins=start, stands=reference, off=off, bound=bound)
 
 
 def _tool_jump(code: str, what: str, off: float, bound: float) -> Remark:

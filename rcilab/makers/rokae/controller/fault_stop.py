@@ -2,9 +2,9 @@
 
     print(fault_stop.as_text())
 
-Where one command or one measurement violates several conditions, all their bits are set in that cycle. A state, a
-report and an error list them in the order of the error bytes on the wire, that of this table, which does not tell
-which came first. Commands are checked before the measurement: after a bad command no measurement is checked.
+If one command or one measurement violates several conditions, all their bits are set in that cycle. States, reports
+and errors list them in the order of the error bytes on the wire, which is that of this table and not that of their
+occurrence. Commands are checked before the measurement: after a rejected command no measurement is checked.
 
 Common to all: the bit is set in the state of the cycle in which the condition is violated and stays set until the
 error recovery; queued commands are dropped; the arm stops inside its acceleration and jerk limits under the position
@@ -24,11 +24,11 @@ from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
 
 
 class FaultSource(Enum):
-    """The violating value, and its fate."""
+    """The violating value, and its effect."""
 
-    COMMAND = "the command of this cycle is not given to the arm"
-    MEASUREMENT = "the command of this cycle has been followed; the arm, not the command, broke the condition"
-    ABSENCE = "there was no command, and none is made up any more"
+    COMMAND = "the command of this cycle is not followed"
+    MEASUREMENT = "the command of this cycle has been followed; the measurement violates the condition"
+    ABSENCE = "there was no command, and missing commands are no longer extrapolated"
 
 
 class FaultStop(NamedTuple):
@@ -36,18 +36,18 @@ class FaultStop(NamedTuple):
 
     offender: FaultSource
     modes: str
-    """In which controller modes it is checked."""
+    """Controller modes in which it is checked."""
     recovery: str
-    """What the error recovery needs."""
+    """Conditions of the error recovery."""
 
 
 _ANYTIME = "none: recover, then start the next motion"
 _BACK = (
-    "up to 1 deg outside: recover, then power on, which the limit has taken unless auto_limit is on. "
-    "Farther: refused (manual recovery needed), power off and on, then lead back"
+    "up to 1 deg outside: recover, then power on (the limit has switched the motors off unless auto_limit is on). "
+    "Farther: refused (manual recovery needed), power off and on, then move back"
 )
-_BACK_BOX = "up to 1 cm outside: as below. Farther: refused (manual recovery needed), power off and on, then lead back"
-_CLEAR = "refused (reflex) while something still presses harder than the thresholds"
+_BACK_BOX = "up to 1 cm outside: as below. Farther: refused (manual recovery needed), power off and on, then move back"
+_CLEAR = "refused (reflex) while an external torque is above its threshold"
 
 _ALL, _JOINTS, _TOOL, _TORQUES = "all", "all but torque", "both Cartesian modes", "torque"
 _COMMAND, _MEASUREMENT = FaultSource.COMMAND, FaultSource.MEASUREMENT
@@ -56,7 +56,7 @@ FAULT_STOP: Final = {
     Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _BACK),
     Fault.ACTUAL_CARTESIAN_POSITION_LIMITS_VIOLATION: FaultStop(
         _MEASUREMENT,
-        "all but hand guiding, which leads it back; not with the virtual guide in an impedance mode",
+        "all but hand guiding, which moves it back; not with the virtual guide in an impedance mode",
         _BACK_BOX,
     ),
     Fault.ACTUAL_CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
@@ -69,7 +69,7 @@ FAULT_STOP: Final = {
         _MEASUREMENT, "both Cartesian modes; four times the bound in Cartesian impedance", _ANYTIME
     ),
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(
-        _COMMAND, "all but torque; with auto_limit joints are led to rest inside instead", _BACK
+        _COMMAND, "all but torque; with auto_limit joints stop inside instead", _BACK
     ),
     Fault.COMMAND_CARTESIAN_POSITION_LIMITS_VIOLATION: FaultStop(
         _COMMAND, "all but torque; not with the virtual guide in an impedance mode", _BACK_BOX
@@ -97,11 +97,11 @@ ARM_FAULTS: Final = {
     ArmCondition.COMMANDS_ARRIVE: Fault.INSTABILITY_DETECTION,
     ArmCondition.NO_COLLISION: Fault.COLLISION,
 }
-"""The fault of every condition that is not a row of the condition table."""
+"""The fault of every condition outside of the condition table."""
 
 
 def faults_of(violations: Iterable[CycleViolation]) -> tuple[Fault, ...]:
-    """Returns the faults that violations raise, in wire order and once each."""
+    """Returns the faults of violations, in wire order without duplicates."""
     faults: set[Fault | None] = set()
     for violation in violations:
         if isinstance(violation, ArmViolation):

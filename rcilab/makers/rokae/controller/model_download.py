@@ -1,9 +1,9 @@
-"""The figures in the answer to LoadRobotModel, in the form of the vendor's model library.
+"""The values in the answer to LoadRobotModel, in the format of the vendor's model library.
 
 Geometry is the DH table in millimetres. Dynamics are base parameters: the smallest set of numbers that determines the
 torques of a 7-axis arm. They are computed from the arm's own rigid-body model by least squares over random states,
 which is exact because these span it (Khalil and Dombre, Modeling, Identification and Control of Robots, 2002, chapter
-9). So a vendor program that compensates gravity agrees with the arm it drives, with one exception: in its calls without
+9). So gravity compensation in a vendor program agrees with the arm, with one exception: in its calls without
 friction the vendor's library replaces the last two numbers, the first moments of link 7, by constants. Friction is
 served as zero: the library misplaces it in one call and would use viscous friction as an offset.
 
@@ -21,7 +21,7 @@ from rcilab.makers.rokae.wire import ModelResponse
 from rcilab.model.robot_model import RobotModel
 from rcilab.robots import RobotDescription
 
-GRAVITY = 9.81  # [m/s^2] Along the base's -z; what the vendor's library uses.
+GRAVITY = 9.81  # [m/s^2] Along the base's -z; as in the vendor's library.
 _STATES = 20  # 7 equations each for 43 unknowns: three times as many as needed.
 
 _ENTRIES = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mx", "my", "mz")
@@ -31,7 +31,7 @@ _SERVED = (
     *(("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "mx", "mz"),) * 5,
     ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my"),
 )
-"""The parameters of each link that are not determined by those of others: those that the vendor's controller sends."""
+"""The parameters of each link that are not determined by those of others: as sent by the vendor's controller."""
 _COLUMNS = tuple(9 * link + _ENTRIES.index(name) for link, names in enumerate(_SERVED) for name in names)
 
 

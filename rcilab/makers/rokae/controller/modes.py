@@ -1,4 +1,4 @@
-"""The five controller modes of the RCI: the pairs of modes that StartMove accepts, and what each runs.
+"""The five controller modes of the RCI: the pairs of modes that StartMove accepts, and the motion of each.
 
 A pair selects what the client commands (joint angles, tool poses, torques) and the control law of the drives. Pairs
 that are not in the table are refused as not possible.
@@ -20,7 +20,7 @@ MODES: Final = {
     (C.CARTESIAN_POSITION, M.CARTESIAN): MotionMode(ControlLaw.POSITION, True),
     (C.JOINT_IMPEDANCE, M.JOINT): MotionMode(ControlLaw.JOINT_IMPEDANCE, False),
     (C.CARTESIAN_IMPEDANCE, M.CARTESIAN): MotionMode(ControlLaw.CARTESIAN_IMPEDANCE, True),
-    (C.TORQUE, M.IDLE): MotionMode(ControlLaw.TORQUE, False),  # What the vendor's example asks for.
+    (C.TORQUE, M.IDLE): MotionMode(ControlLaw.TORQUE, False),  # As in the vendor's example.
     (C.TORQUE, M.JOINT): MotionMode(ControlLaw.TORQUE, False),
 }
-"""Controller mode and motion mode of StartMove, and what they run (manual 3.1.1)."""
+"""Controller mode and motion mode of StartMove, and the resulting motion (manual 3.1.1)."""

@@ -2,11 +2,11 @@
 
 Each `step` advances the arm by one cycle, turns its violations into faults, and reports the state.
 
-The reaction to a fault: the violating command is never given to the arm; the fault's bit is in the state of the same
-cycle, and stays; queued commands are dropped; the arm stops on one path, `ReferenceTrajectory.stop`, inside its
-acceleration and jerk limits, under the position servo; then the brakes engage. Where the arm followed its angles the
-stop begins from the last good command; where it was compliant (impedance, torque, hand guiding), from its measured
-position and velocity. `fault_stop` lists it fault by fault.
+The reaction to a fault: the violating command is not followed; the fault's bit is set in the state of the same cycle,
+and stays set; queued commands are dropped; the arm stops on one path, `ReferenceTrajectory.stop`, inside its
+acceleration and jerk limits, under the position servo; then the brakes engage. If the arm followed its angles, the
+stop begins at the last valid command; if it was compliant (impedance, torque, hand guiding), at its measured position
+and velocity. `fault_stop` lists the reaction to each fault.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from rcilab.sim.plant import Plant
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
-RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that a client sees it.
-_PRESSED = {
+RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
+_STOP_REASONS = {
     rci.SafetyStop.ESTOP: Remark("an emergency stop was pressed", "estop"),
     rci.SafetyStop.GSTOP: Remark("the safety gate was opened", "gstop"),
 }
@@ -55,7 +55,7 @@ _BUTTONS: dict[rci.SafetyStop, SafetyButton] = {
     rci.SafetyStop.ESTOP: "estop",
     rci.SafetyStop.GSTOP: "gstop",
 }
-_POWER_OFF = Remark("the client switched motor power off in mid-motion", "power_off")
+_POWER_OFF = Remark("the client switched motor power off during a motion", "power_off")
 _WAITING = (Phase.STARTING, Phase.RECOVERING)
 _MOVING = (Phase.MOVING, Phase.STOPPING)
 _STILL = (Phase.OFF, Phase.IDLE, Phase.REFLEX, Phase.CUT_OFF, Phase.USER_STOPPED)
@@ -69,7 +69,7 @@ _REPORTED = (
     rci.CommandCode.SET_FC_COOR,
     rci.CommandCode.SET_TORQUE_FILTER_CUT_OFF_FREQUENCY,
 )
-"""Setters that change the form of states."""
+"""Setters that change the content of states."""
 
 
 class RciController:
@@ -80,13 +80,13 @@ class RciController:
         settings: All settings.
         phase: The phase of the robot.
         faults: The set error bits, in wire order.
-        reason: Why the last fault was raised, as a sentence with numbers.
+        reason: Reason for the last fault, as a sentence with numbers.
         state: The last reported state.
-        ignored: Number of commands that came outside of a motion.
+        ignored: Number of commands that arrived outside of a motion.
         safety_stop: The active safety stop.
 
     Args:
-        arm: The arm, as after power-up.
+        arm: The arm after power-up.
         mode_delay: Cycles from StartMove to the requested modes in the state.
         recovery_time: Shortest duration of an error recovery, [cycles].
     """
@@ -108,7 +108,7 @@ class RciController:
         self.ignored = 0
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
-        self._model_response = model_response(model.description)  # Here, as it takes longer than a cycle.
+        self._model_response = model_response(model.description)  # Computed here: it takes longer than a cycle.
         self.arm = arm
         arm.configure(self.settings)
         self._reporter = StateReporter(model, self.settings)
@@ -167,7 +167,7 @@ class RciController:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the arm stands still in a phase that does not end by itself: deferred replies are due."""
+        """Whether the arm is at standstill in a phase without its own end: deferred replies are due."""
         return self.arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
@@ -187,7 +187,7 @@ class RciController:
 
     @property
     def lacks_commands(self) -> bool:
-        """Whether a fault is set that missing commands raise."""
+        """Whether a fault is set that is caused by missing commands."""
         return Fault.INSTABILITY_DETECTION in self.faults
 
     @property
@@ -227,16 +227,16 @@ class RciController:
         self.settings = self.settings.with_input(signal, level)
 
     def reset(self, q: JointVector) -> None:
-        """Moves the arm at standstill to another position, which only a simulation can do."""
+        """Moves the arm at standstill to another position (simulation only)."""
         self._is_still = False
         self.arm.reset(q)
 
     def receive(self, packet: rci.CommandPacket) -> None:
-        """Takes a command from the network; it is kept while a motion is in progress."""
+        """Queues a command from the network while a motion is in progress; others are counted."""
         self.ignored += not self.arm.receive(ArmCommand(*packet))
 
     def handle(self, request: rci.Request) -> Reply:
-        """Takes a request and returns the answer to it."""
+        """Handles a request and returns the answer."""
         content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
         if content is not None:
             return Reply(content)
@@ -270,19 +270,19 @@ class RciController:
         return conclude(reply, self.phase)
 
     def on_event(self, event: Event, *faults: Fault) -> None:
-        """Takes an event that is not a client's request; `faults` are the bits that it may set."""
+        """Handles an event other than a client's request; `faults` are the bits that it may set."""
         self._enter(transition(self.phase, event), faults=faults)
 
     def press_safety_stop(self, kind: rci.SafetyStop) -> None:
         """Presses an emergency stop or opens the safety gate, or ends both with NONE.
 
-        Both stop the arm and keep it stopped; from StartMove to the end of a motion they also set an error bit, as the
-        client would not notice otherwise.
+        Both stop the arm and keep it stopped; from StartMove to the end of a motion they also set an error bit, because
+        the client would not notice otherwise.
         """
         if kind is not self.safety_stop:
             self.safety_stop = kind
             if kind is not rci.SafetyStop.NONE:
-                self.reason = _PRESSED[kind]
+                self.reason = _STOP_REASONS[kind]
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.on_event(event, Fault.INSTABILITY_DETECTION)
 
@@ -290,8 +290,8 @@ class RciController:
         """Advances by one cycle and returns the state at its end.
 
         Args:
-            is_seen: Whether that state is sent. One that is not sent has no number of its own: for the client,
-                which takes numbers for cycles, nothing is missing.
+            is_seen: Whether that state is sent. A state that is not sent has no number of its own, so that the
+                client, which uses numbers as cycles, does not miss one.
         """
         self._message_id += is_seen
         if not self._is_still:
@@ -313,7 +313,7 @@ class RciController:
             self.on_event(Event.AT_REST)
 
     def _may_stay_still(self) -> bool:
-        """Returns whether the next cycle will equal this one, unless a request comes or the arm is moved."""
+        """Returns whether the next cycle will equal this one, unless a request arrives or the arm is moved."""
         return self.phase in _STILL and self._countdown == 0 and self.arm.has_settled
 
     def _repeat(self) -> RobotState:
@@ -389,7 +389,7 @@ class RciController:
                 self.arm.configure(self.settings)
                 self._reporter.configure(self.model, self.settings)
             case Action.APPLY:
-                pass  # Done before, because it may fail.
+                pass  # Done earlier, because it may fail.
 
     def _apply(self, request: rci.Request) -> bool:
         try:

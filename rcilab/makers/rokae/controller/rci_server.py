@@ -1,6 +1,6 @@
 """The server of the RCI: one TCP client whose requests are handled in order, commands and states over UDP.
 
-An answer may have to wait, for the next state or until the arm stands still; then the requests behind it wait, too.
+An answer may be deferred to the next state or until the arm is at standstill; later requests are then deferred, too.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from rcilab.makers.rokae.wire import (
     decode_request,
     encode_response,
 )
-from rcilab.sim.channels import Link, Peer, TcpChannel, UdpChannel
+from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
-SHUTDOWN_NOTICE = 20  # [cycles] During which the states of an ended motion are still sent, with the error bit.
+SHUTDOWN_NOTICE = 20  # [cycles] For which states are still sent after the end of a motion, with the error bit.
 _PROTOCOL = "RCI"
 _QUIET = (Phase.OFF, Phase.IDLE)
 _ACTIVE = (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
@@ -47,7 +47,7 @@ class RciServer:
     """A `MakerServer` for the RCI.
 
     Args:
-        controller: Grants or refuses requests and follows commands.
+        controller: The controller.
         port: TCP port; 0 takes any free one.
         udp_port: For commands; None: the same number, as the vendor's client expects it.
         client_port: Port for states; None: the same number.
@@ -62,23 +62,23 @@ class RciServer:
             UdpChannel(port=udp_port, target_port=client_port),
         )
         self._n = controller.model.n
-        self._link: Link
+        self._link: ClientLink
         self._peer: Peer | None = None
         self._frames: deque[bytes] = deque()
         self._pending: tuple[Request, int, Reply] | None = None
-        self._asked = 0  # Number of the last state before the request that waits.
+        self._pending_since = 0  # Number of the last state before the deferred request.
 
     @property
     def is_quiet(self) -> bool:
-        """Whether nothing moves and no answer waits."""
+        """Whether nothing moves and no answer is deferred."""
         return self.controller.phase in _QUIET and self._pending is None
 
-    def attach(self, link: Link) -> None:
-        """Takes the link to clients."""
+    def attach(self, link: ClientLink) -> None:
+        """Sets the link to clients."""
         self._link = link
 
     def connect(self, peer: Peer) -> None:
-        """Takes a client and sends a state first: the vendor's client waits for it a few milliseconds."""
+        """Accepts a client and sends a state first: the vendor's client waits for it for a few milliseconds."""
         self._peer = peer
         self.send_states()
 
@@ -92,12 +92,12 @@ class RciServer:
         return was_moving
 
     def receive(self, peer: Peer, frame: bytes) -> None:
-        """Takes a request and handles it in its turn."""
+        """Queues a request and handles it after the earlier ones."""
         self._frames.append(frame)
         self._serve(peer)
 
     def receive_datagram(self, datagram: bytes) -> bool:
-        """Takes a command; returns whether it has the size of one."""
+        """Passes a command on; returns whether it has the correct size."""
         if len(datagram) != COMMAND_SIZE:
             return False
         self.controller.receive(decode_command(datagram, self._n))
@@ -112,28 +112,28 @@ class RciServer:
         self._link.send_datagram(self.controller.datagram)
 
     def settle(self) -> None:
-        """Sends the answer that had to wait if it is due, and continues with the requests behind it."""
+        """Sends the deferred answer if it is due, and continues with the next requests."""
         if self._pending is not None and self._is_due(self._pending[2].when):
-            waited, self._pending = self._pending, None
+            deferred, self._pending = self._pending, None
             assert self._peer is not None
-            self._answer(self._peer, *waited)
+            self._answer(self._peer, *deferred)
             self._serve(self._peer)
 
     def begin_shutdown(self) -> int:
-        """Ends a motion in progress; returns for how many cycles its client is still sent states with the error bit."""
+        """Ends a motion in progress; returns for how many cycles states with the error bit are still sent."""
         if self.controller.phase is not Phase.MOVING:
             self.controller.on_event(Event.CLIENT_LOST)
             return 0
-        self.controller.reason = Remark("the controller was ended in mid-motion", "told_to_end")
+        self.controller.reason = Remark("the controller was ended during a motion", "told_to_end")
         self.controller.on_event(Event.FAULT, Fault.INSTABILITY_DETECTION)
         return SHUTDOWN_NOTICE
 
     def _is_due(self, when: When) -> bool:
-        is_shown = self.controller.state.message_id > self._asked
+        is_shown = self.controller.state.message_id > self._pending_since
         return is_shown and (when is When.SHOWN or self.controller.is_settled)
 
     def _serve(self, peer: Peer) -> None:
-        """Handles requests in order, up to one whose answer has to wait."""
+        """Handles requests in order, up to one whose answer is deferred."""
         while self._frames and self._pending is None:
             frame = self._frames.popleft()
             try:
@@ -147,13 +147,13 @@ class RciServer:
                 self._link.log(reply.refusal)
             if isinstance(request, Connect):
                 self._link.direct_datagrams(peer, request.udp_port)
-            # An answer is sent when its effect is visible: after a reply that waits, every state shows the new mode.
+            # An answer is sent when its effect is visible: after a deferred answer, every state has the new mode.
             if reply.when is When.NOW:
                 self._answer(peer, request, command_id, reply)
             else:
-                self._pending, self._asked = (request, command_id, reply), self.controller.state.message_id
+                self._pending, self._pending_since = (request, command_id, reply), self.controller.state.message_id
 
     def _answer(self, peer: Peer, request: Request, command_id: int, reply: Reply) -> None:
         self._link.send_frame(peer, encode_response(request.code, command_id, self.controller.conclude(reply)))
         if reply.ends_connection:
-            self._link.drop(peer, "asked for a reboot")
+            self._link.drop(peer, "requested a reboot")

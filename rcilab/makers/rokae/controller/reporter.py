@@ -1,20 +1,20 @@
 """The reported state: all fields that follow from the reference and the measurement.
 
-How this virtual arm computes its fields:
+Computation of the fields:
 
 * Commanded velocities and accelerations are backward differences of the commanded angles over one cycle, the tool's
-  twist is the Jacobian times them, the tool's acceleration the twist's backward difference; so for the arm angle.
+  twist is the Jacobian times them, the tool's acceleration the twist's backward difference; the same for the arm angle.
 * While forces move the arm (torque commands, hand guiding), the commanded angles are the measured ones.
-* The arm angle is undefined where shoulder and wrist are above one another or the arm is stretched: there its last
-  value stays, and 0 at first. On 6-axis arms it is 0.
+* The arm angle is undefined if shoulder and wrist are aligned with the base axis or the arm is stretched: its last
+  value is then kept, initially 0. On 6-axis arms it is 0.
 * `tau_c` is the client's command in torque mode (without gravity), otherwise the torque of the commanded motion by
-  the rigid-body model (with gravity). At a change between the two its rate is reported as zero.
+  the rigid-body model (with gravity). When it changes between the two, its rate is reported as zero.
 * External torques are the observer's estimates of what the environment exerts on the arm. `tau_ext_in_base` is the
   wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
-  frame of setFcCoor, in axes that its type names: WORLD those of the base, TOOL those of the force frame, PATH x along
-  the commanded velocity of the tool (at standstill, its last direction), z as near to the force frame's z as that
-  allows; where a path turns sharply its axes turn within 0.5 s. The sign is that of the action on the arm: a hand
-  that presses down shows as a negative z in base axes. The manual leaves it open; the opposite is what the arm exerts.
+  frame of setFcCoor, in the axes of its type: WORLD those of the base, TOOL those of the force frame, PATH x along
+  the commanded velocity of the tool (at standstill, its last direction), z as near as possible to the force frame's
+  z; at a sharp turn of the path its axes turn within 0.5 s. The sign is that of the action on the arm: a hand
+  that presses down gives a negative z in base axes. The manual does not define it.
 * Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
   frequency of SetTorqueFilterCutOffFrequency.
 """
@@ -43,10 +43,10 @@ _CYCLE = scalar(CYCLE_TIME)  # [s]
 
 
 class StateReporter:
-    """Builds the state of each cycle; while nothing moves it repeats the last one. Owned by the controller's cycle.
+    """Builds the state of each cycle; at standstill it repeats the last one. Owned by the controller.
 
     Attributes:
-        has_repeated: Whether the last state equals the one before, and the next will if the arm stands still.
+        has_repeated: Whether the last state equals the one before, and the next one will at standstill.
 
     Args:
         model: The arm with its tool and load.
@@ -59,7 +59,7 @@ class StateReporter:
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
-        """Takes a new tool, load, force frame or filter; only at standstill."""
+        """Sets a new tool, load, force frame or filter; only at standstill."""
         self._model = model
         self._axes.configure(model, settings)
         self._is_wrench_at_tool = self._axes.is_world and not any(self._axes.T_tool_force.parts[1])
@@ -94,7 +94,7 @@ class StateReporter:
         return self.repeat(message_id)
 
     def repeat(self, message_id: int) -> RobotState:
-        """Returns the state of a cycle that differs from the last one only in its number."""
+        """Returns the state of a cycle that differs from the last one in its number only."""
         return build_state((message_id, *self._rest))
 
     def _is_same(self, signals: CycleSignals) -> bool:
@@ -169,9 +169,9 @@ class StateReporter:
         if self._axes.is_world:
             return readonly_copy((fx, fy, fz, mx, my, mz))
         r = self._axes.rotation(T_base_tool)
-        return readonly_copy((*_inwards(r, fx, fy, fz), *_inwards(r, mx, my, mz)))
+        return readonly_copy((*_in_axes(r, fx, fy, fz), *_in_axes(r, mx, my, mz)))
 
 
-def _inwards(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Returns a vector of the base in axes that are the columns of a rotation."""
+def _in_axes(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Returns a vector in base axes as a vector in the axes that are the columns of a rotation."""
     return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z

@@ -1,4 +1,4 @@
-"""The answers of the controller beyond its table of phases: contents, and invalid arguments."""
+"""The answers of the controller that do not follow from its table of phases: contents, and invalid arguments."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 
 class Reply(NamedTuple):
-    """The answer, and when it is sent."""
+    """An answer, and when it is sent."""
 
     response: rci.Response
     when: When = When.NOW
@@ -49,7 +49,7 @@ def answer_query(
     settings: Settings,
     model_response: rci.Response,
 ) -> rci.Response | None:
-    """Returns the content for a query, or None if the request is no query."""
+    """Returns the content for a query, or None for other requests."""
     match request:
         case rci.GetMotorState():
             return rci.MotorStateResponse(int(phase not in (Phase.OFF, Phase.CUT_OFF, Phase.USER_STOPPED)))
@@ -76,9 +76,9 @@ def check_request(request: rci.Request, phase: Phase, settings: Settings, arm: V
             refusal = None if port >= LOWEST_CLIENT_PORT else rci.SettingStatus.INVALID_ARGUMENT
         case rci.SetMotorPower(power=power):
             refusal = None if power == 1 else rci.SettingStatus.INVALID_ARGUMENT
-            if refusal is None and phase is Phase.OFF and not arm.is_standstill:  # The brakes have not stopped it yet.
+            if refusal is None and phase is Phase.OFF and not arm.is_standstill:  # The brakes have not yet stopped it.
                 return cell._replace(when=When.AT_REST)
-        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # A refusal by the phase takes precedence.
+        case rci.StartMove() if cell.status is rci.StartStatus.SUCCESS:  # A refusal by the phase has priority.
             refusal = _check_start(request, arm.model, arm.commanded)
         case rci.StartDrag(space=space, type=kind):
             is_known = space in tuple(rci.DragSpace) and kind in tuple(rci.DragType)
@@ -107,7 +107,7 @@ def _check_start(request: rci.StartMove, model: RobotModel, commanded: Reference
 def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.RecoveryStatus | None:
     """Returns why a stopped arm cannot recover, or None if it can.
 
-    Beyond a soft limit or the safety box by more than a measurement error, an operator has to move it back (power off
+    Beyond a soft limit or the safety box by more than a measurement error, an operator must move it back (power off
     and on, then hand guiding, or a motion that leads back): MANUAL_RECOVERY_NEEDED. While an external force is still
     above the collision thresholds: REFLEX.
 
@@ -146,15 +146,15 @@ def describe_refusal(
     why: object = _describe_phase(phase, safety_stop, faults)
     if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
-        why = f"there is no {pair}" if arm.commanded.is_stationary else _MOVES
+        why = f"there is no {pair}" if arm.commanded.is_stationary else _STILL_MOVING
     elif request.code in GROUNDED and Action.APPLY in transition(phase, request.code).actions:
-        why = _MOVES
+        why = _STILL_MOVING
     elif status is rci.StartStatus.SINGULAR_START_POSE:
         why = arm.model.solver.singularity(arm.commanded.q)
     elif status is rci.RecoveryStatus.REFLEX:
         why = arm.measured_state.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
-        why = f"{_find_outside(settings, arm.measured_state)}: power off and on, then lead it back"
+        why = f"{_find_outside(settings, arm.measured_state)}: power off and on, then move it back"
     if status.name == "INVALID_ARGUMENT":
         why = _describe_argument(request, settings, arm)
     return f"refused {type(request).__name__} ({status.name.lower().replace('_', ' ')}): {why}"
@@ -164,13 +164,13 @@ def _describe_phase(phase: Phase, safety_stop: rci.SafetyStop, faults: Iterable[
     """Returns the phase of the robot and, if it was stopped, the cause."""
     match phase:
         case Phase.USER_STOPPED:
-            return _PRESSED[safety_stop]
+            return _STOP_DESCRIPTIONS[safety_stop]
         case Phase.REFLEX:
             return f"the arm was stopped by {name_faults(faults)}"
         case Phase.CUT_OFF:
             return f"the motors were switched off by {name_faults(faults)}"
         case _:
-            return _DOING[phase]
+            return _PHASE_DESCRIPTIONS[phase]
 
 
 def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm) -> str:
@@ -183,26 +183,26 @@ def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm
 
 
 def conclude(reply: Reply, phase: Phase) -> rci.Response:
-    """Returns the answer that is due: a recovery that was interrupted names the cause."""
+    """Returns the answer that is due: for an interrupted recovery, the cause."""
     status = getattr(reply.response, "status", None)
     if reply.when is When.AT_REST and isinstance(status, rci.RecoveryStatus):
-        return rci.StatusResponse(_OVERTAKEN.get(phase, rci.RecoveryStatus.ABORTED))
+        return rci.StatusResponse(_RECOVERY_RESULTS.get(phase, rci.RecoveryStatus.ABORTED))
     return reply.response
 
 
-_PRESSED = {
+_STOP_DESCRIPTIONS = {
     rci.SafetyStop.ESTOP: "an emergency stop is pressed",
     rci.SafetyStop.GSTOP: "the safety gate is open",
 }
-_MOVES = "the arm still moves"
-_DOING = {
+_STILL_MOVING = "the arm still moves"
+_PHASE_DESCRIPTIONS = {
     Phase.OFF: "the motors are off",
     Phase.IDLE: "the robot is idle",
     **dict.fromkeys((Phase.STARTING, Phase.MOVING, Phase.STOPPING), "a motion is in progress"),
     Phase.GUIDING: "the arm is guided by hand",
     Phase.RECOVERING: "an error recovery is in progress",
 }
-_OVERTAKEN = {
+_RECOVERY_RESULTS = {
     Phase.IDLE: rci.RecoveryStatus.SUCCESS,
     Phase.OFF: rci.RecoveryStatus.SUCCESS,
     Phase.USER_STOPPED: rci.RecoveryStatus.USER_STOP,

@@ -52,7 +52,7 @@ class Settings(ArmParameters):
     """Cut-off frequency of the filtered torques in the state, [Hz]."""
     outputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
     inputs: tuple[bool, ...] = (False,) * SIGNAL_COUNT
-    """Levels of the digital inputs; a virtual controller has no wiring, they are set from outside."""
+    """Levels of the digital inputs; a virtual controller has no wiring; the simulation port sets them."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
 
@@ -71,18 +71,18 @@ class Settings(ArmParameters):
         return replace(self, loop_back=on, inputs=self.outputs if on else self.inputs)
 
     def rebooted(self, arm: RobotDescription) -> Settings:
-        """Returns the settings after a reboot: the defaults, and what is wired or chosen outside of the controller."""
+        """Returns the settings after a reboot: the defaults, except for values set outside of the controller."""
         kept = replace(Settings.of(arm), inputs=self.inputs, auto_limit=self.auto_limit)
         return kept.with_loop_back(self.loop_back)
 
 
 def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings:
-    """Returns the settings with a request's values in them.
+    """Returns the settings with the values of a request.
 
     Args:
         settings: The settings before.
-        request: A setter; anything else leaves them as they are.
-        arm: Its ranges apply.
+        request: A setter; other requests have no effect.
+        arm: The arm, for its ranges.
 
     Raises:
         InvalidValueError: A value is out of its bounds, or values do not fit together; it names the first.
@@ -139,7 +139,7 @@ def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) ->
             return {"T_flange_tool": _pose_at_flange("tool", numbers)}
         case rci.SetFcCoor(frame=numbers, type=kind):
             if kind not in tuple(rci.ForceFrame):
-                raise InvalidValueError("type", kind, "is no force-control frame; there are 0 to 2")
+                raise InvalidValueError("type", kind, "is not a force-control frame; there are 0 to 2")
             return {
                 "T_flange_force": _pose_at_flange("frame", numbers),
                 "force_axes": _FORCE_AXES[rci.ForceFrame(kind)],
@@ -158,7 +158,7 @@ def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) ->
 
 
 def _require(name: str, value: float, lowest: float, largest: float, unit: str) -> None:
-    if not lowest <= value <= largest:  # NaN is in no range.
+    if not lowest <= value <= largest:  # Also True for NaN.
         raise InvalidValueError(name, _round(value), f"{unit} is outside {lowest:g} to {largest:g} {unit}")
 
 

@@ -5,8 +5,8 @@
                                 MOVING, STOPPING -> CUT_OFF -> OFF
                                 any of them <-> USER_STOPPED
 
-In every phase except for MOVING and GUIDING the arm stops if it still moves, and then stands still; that is the one
-stop path, and no event needs to ask for it. A reply with `AT_REST` is sent when the arm stands still.
+In every phase except for MOVING and GUIDING the arm stops if it still moves, and stays at standstill. This is the only
+stop path, and no event requests it explicitly. A reply with `AT_REST` is sent at standstill.
 `print(state_machine.as_text())` shows the table.
 """
 
@@ -33,9 +33,9 @@ class Phase(Enum):
     OFF = (RobotMode.OTHER, 0)
     """Motors off, brakes closed."""
     IDLE = (RobotMode.IDLE, 0)
-    """Motors on, the arm stands still under power."""
+    """Motors on, arm at standstill."""
     STARTING = (RobotMode.IDLE, 1)
-    """StartMove was answered; the requested modes are not shown yet."""
+    """StartMove was answered; states do not yet show the requested modes."""
     MOVING = (RobotMode.MOVE, 0)
     """Commands are followed."""
     STOPPING = (RobotMode.MOVE, 1)
@@ -45,7 +45,7 @@ class Phase(Enum):
     REFLEX = (RobotMode.REFLEX, 0)
     """A fault stopped the arm; the brakes engage at standstill."""
     CUT_OFF = (RobotMode.REFLEX, 1)
-    """As REFLEX, and without motor power: a joint passed its range without `auto_limit` (manual 3.1.15)."""
+    """As REFLEX, and without motor power: a joint exceeded its range without `auto_limit` (manual 3.1.15)."""
     USER_STOPPED = (RobotMode.USER_STOPPED, 0)
     """An emergency stop is pressed or the safety gate is open."""
     RECOVERING = (RobotMode.AUTOMATIC_ERROR_RECOVERY, 0)
@@ -60,38 +60,38 @@ class Event(Enum):
     """Events inside the controller, in addition to the client's commands."""
 
     MODES_SHOWN = "the delay after StartMove is over"
-    FAULT = "a condition was broken"
-    JOINT_LIMIT = "a joint passed its range, and auto_limit is off"
+    FAULT = "a condition was violated"
+    JOINT_LIMIT = "a joint is beyond its range, and auto_limit is off"
     AT_REST = "the arm has stopped"
-    RECOVERED = "the recovery has taken its time and the arm rests"
+    RECOVERED = "the recovery time is over and the arm is at standstill"
     CLIENT_LOST = "the client's connection ended"
     SAFETY_STOP = "an emergency stop was pressed or the safety gate opened"
-    SAFETY_RELEASE = "neither is so any more"
+    SAFETY_RELEASE = "the emergency stop and the safety gate are released"
 
 
 class Action(Enum):
     """Actions of a transition."""
 
-    APPLY = "take the request's values into the settings"
-    BEGIN = "arm the play-out and count down to the modes"
-    SHOW_MODES = "show the requested modes and listen for commands"
-    REVEAL_MODES = "show the requested modes and follow nothing"
+    APPLY = "apply the request's values to the settings"
+    BEGIN = "prepare the jitter buffer and start the countdown to the modes"
+    SHOW_MODES = "show the requested modes and follow commands"
+    REVEAL_MODES = "show the requested modes without following commands"
     HIDE_MODES = "show idle modes"
-    DRAIN = "play what is queued, then stop"
-    DISCARD = "forget commands that were not played and stop"
+    DRAIN = "play the queued commands, then stop"
+    DISCARD = "discard the queued commands and stop"
     SET_FAULTS = "set the error bits"
     CLEAR_FAULTS = "clear the error bits"
-    GUIDE = "remember where the arm is guided from"
-    REBOOT = "forget all settings and end the connection"
+    GUIDE = "store the pose at which guiding begins"
+    REBOOT = "reset all settings and end the connection"
 
 
 class When(Enum):
     """When a reply is sent."""
 
     NOW = "now"
-    SHOWN = "once a state has shown it"
-    AT_REST = "once the arm rests"
-    """And, in RECOVERING and STOPPING, once that phase is over."""
+    SHOWN = "after the next state"
+    AT_REST = "at standstill"
+    """And, in RECOVERING and STOPPING, after the end of that phase."""
 
 
 Trigger: TypeAlias = CommandCode | Event
@@ -105,14 +105,14 @@ class Transition(NamedTuple):
     actions: tuple[Action, ...] = ()
     """In this order."""
     status: Status | None = None
-    """The answer to a command; None for events, and for commands that are answered with content."""
+    """The answer to a command; None for events and queries."""
     when: When = When.NOW
 
 
 C, P, E, A = CommandCode, Phase, Event, Action
 
 QUERIES: Final = (C.GET_MOTOR_STATE, C.LOAD_ROBOT_MODEL, C.GET_DI_STATE, C.GET_SAFETY_STOP_STATE)
-"""Answered with content, always."""
+"""Always answered with content."""
 
 ANYTIME: Final = (C.CONNECT, C.SET_DO, C.SET_CART_IMP_DESIRED_TAU)
 """Setters that are allowed while the arm moves: they do not affect the motion."""
@@ -133,11 +133,11 @@ GROUNDED: Final = (
 """Setters for an arm at standstill without faults. The manual gives no list: this one is conservative."""
 
 REMEDIES: Final = (C.SET_COLLISION_BEHAVIOR, C.SET_LOAD)
-"""Those that a stopped arm accepts, too: the manual's remedy for a collision without contact is to raise the
-thresholds (4.6), and an error recovery waits until nothing is above them."""
+"""Setters that a stopped arm accepts, too: the manual's remedy for a collision without contact is to raise the
+thresholds (4.6), and an error recovery is refused while a torque is above them."""
 
 _IN_MOTION = (P.STARTING, P.MOVING, P.STOPPING)
-"""Phases that a client takes for its motion: only an error bit stops it there.
+"""Phases in which a client assumes that its motion is active: only an error bit ends it.
 
 In STARTING the vendor's client waits for the modes, without a timeout, so a stop there shows them with the bit; they
 are hidden again when the client ends the motion.
@@ -152,7 +152,7 @@ _START_REFUSED = dict.fromkeys((P.OFF, *_BUSY), StartStatus.NOT_POSSIBLE) | {
 
 
 def _modes_after(phase: Phase) -> Action:
-    """Returns the modes in the state when something stops the arm in a phase."""
+    """Returns the action for the reported modes when the arm is stopped in a phase."""
     return A.REVEAL_MODES if phase is P.STARTING else A.HIDE_MODES
 
 
@@ -177,7 +177,7 @@ def _setters(phase: Phase) -> dict[Trigger, Transition]:
 
 
 def _motion(phase: Phase) -> dict[Trigger, Transition]:
-    stopped = StopStatus.SUCCESS  # Always: the vendor's client aborts at any other answer.
+    stopped = StopStatus.SUCCESS  # Always: the vendor's client aborts on any other answer.
     rows: dict[Trigger, Transition] = {}
     if phase is P.IDLE:
         rows[C.START_MOVE] = Transition(P.STARTING, (A.BEGIN,), StartStatus.SUCCESS)
@@ -187,7 +187,7 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
         rows[C.STOP_MOVE] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD), stopped, When.AT_REST)
     elif phase is P.MOVING:
         rows[C.STOP_MOVE] = Transition(P.STOPPING, (A.HIDE_MODES, A.DRAIN), stopped, When.AT_REST)
-    else:  # A guided arm need not stop.
+    else:  # A guided arm does not have to stop.
         when = When.NOW if phase is P.GUIDING else When.AT_REST
         rows[C.STOP_MOVE] = Transition(phase, (A.HIDE_MODES,), stopped, when)
     if phase is P.IDLE:
@@ -202,7 +202,7 @@ def _motion(phase: Phase) -> dict[Trigger, Transition]:
 
 
 def _power(phase: Phase) -> dict[Trigger, Transition]:
-    """SetMotorPower is two commands in one: this is the row for "on"; `POWER_OFF` holds the one for "off"."""
+    """SetMotorPower combines two commands: these are the rows for "on"; `POWER_OFF` contains those for "off"."""
     rows: dict[Trigger, Transition] = {}
     if phase is P.OFF:
         rows[C.SET_MOTOR_POWER] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS), SettingStatus.SUCCESS, When.SHOWN)
@@ -225,7 +225,7 @@ def _recovery(phase: Phase) -> dict[Trigger, Transition]:
         return {command: Transition(P.RECOVERING, (), RecoveryStatus.SUCCESS, When.AT_REST)}
     if phase is P.CUT_OFF:
         return {command: Transition(P.OFF, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS, When.AT_REST)}
-    if phase in (P.OFF, P.IDLE):  # There can only be the bit of a motion that a stop or power-off ended.
+    if phase in (P.OFF, P.IDLE):  # Only the bit of a motion that a stop or power-off ended can be set.
         return {command: Transition(phase, (A.HIDE_MODES, A.CLEAR_FAULTS), RecoveryStatus.SUCCESS)}
     status = RecoveryStatus.USER_STOP if phase is P.USER_STOPPED else RecoveryStatus.NOT_POSSIBLE
     return {command: Transition(phase, (), status)}
@@ -239,7 +239,7 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         rows[E.AT_REST] = Transition(P.IDLE, (A.DISCARD,))
     if phase is P.RECOVERING:
         rows[E.RECOVERED] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS))
-    if phase is P.USER_STOPPED:  # A stop that is pressed and released between two states shows by its bit alone.
+    if phase is P.USER_STOPPED:  # If a stop is pressed and released between two states, only its bit shows it.
         rows[E.SAFETY_RELEASE] = Transition(P.OFF)
         rows[E.FAULT] = rows[E.JOINT_LIMIT] = Transition(phase, (A.SET_FAULTS,))
     elif phase is not P.OFF:
@@ -271,7 +271,7 @@ def _power_off(phase: Phase) -> Transition:
 
 
 POWER_OFF: Final = {phase: _power_off(phase) for phase in Phase}
-"""SetMotorPower(0): obeyed in every phase; a moving arm stops first, then the brakes engage."""
+"""SetMotorPower(0): executed in every phase; a moving arm stops first, then the brakes engage."""
 
 
 def transition(phase: Phase, trigger: Trigger) -> Transition:

@@ -67,14 +67,14 @@ def parse_address(text: str) -> RciAddress:
         InvalidValueError: It is not such an address; the message says which part is wrong.
     """
     if not isinstance(text, str) or not text.strip():
-        raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
+        raise InvalidValueError("address", text, f"is not a valid address; write it like {_EXAMPLE}")
     text = text.strip()
     if "[" in text or text.rpartition("://")[2].count(":") > 1:
         raise InvalidValueError(
             "address", text, f"looks like IPv6, which is not supported; write the robot's IPv4 address, like {_EXAMPLE}"
         )
     if not any(mark in text for mark in ":.") and text != "localhost":  # "foo", or a robot's name: a typing error.
-        raise InvalidValueError("address", text, f"is no address; write it like {_EXAMPLE}")
+        raise InvalidValueError("address", text, f"is not a valid address; write it like {_EXAMPLE}")
     parts = urlsplit(text if "://" in text else f"rci://{text}")
     if parts.scheme != "rci":
         raise InvalidValueError("address", text, f"begins with {parts.scheme}://, needs rci://, like {_EXAMPLE}")
@@ -84,7 +84,7 @@ def parse_address(text: str) -> RciAddress:
     try:
         port = parts.port
     except ValueError:
-        raise InvalidValueError("address", text, "has a port that is no number from 1 to 65535") from None
+        raise InvalidValueError("address", text, "has a port that is not a number from 1 to 65535") from None
     options: dict[str, int] = {}
     for name, value in parse_qsl(parts.query, keep_blank_values=True):
         if name not in _KNOWN_OPTIONS:

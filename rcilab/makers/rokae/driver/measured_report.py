@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rcilab.conformance.common_conditions import compliant_limits
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.measured_monitor import MeasuredMonitor
+from rcilab.conformance.measured_monitor import MeasuredMonitor, find_collision_joint
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import KinematicsError
 from rcilab.core.limits import Limits
@@ -24,8 +24,7 @@ from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
-_CLOSE = math.radians(1.0)  # A joint farther inside has not come near the known limits.
-_LEAST = 1e-3  # [N m] Against a division by a threshold of zero.
+_NEAR_LIMIT = math.radians(1.0)  # [rad] A joint farther inside was not near the known limits.
 _CARTESIAN = (ControllerMode.CARTESIAN_POSITION, ControllerMode.CARTESIAN_IMPEDANCE)
 YIELDING_MODES = tuple(ControllerMode[mode.upper()] for mode in COMPLIANT_MODES)
 """`COMPLIANT_MODES` as the state reports them."""
@@ -60,7 +59,7 @@ def describe_measured(
     faults = set(faults)
     if not len(record):
         return
-    measured = _judge(record, model, limits, mode)
+    measured = _check_record(record, model, limits, mode)
     remarks = {violation.condition.fault: violation.remark for violation in measured.violations}
     joint = limits.joint
     for fault, condition, values, bounds, unit in (
@@ -80,8 +79,8 @@ def describe_measured(
         ),
     ):
         if fault in faults and fault not in remarks:
-            place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
-            number, value, bound = int(place[1]) + 1, float(values[place]), float(bounds[place[1]])
+            index = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
+            number, value, bound = int(index[1]) + 1, float(values[index]), float(bounds[index[1]])
             remarks[fault] = Remark(
                 f"joint {number} was measured at {value:.3g} {unit} (commands: {bound:g} {unit})",
                 "nearest",
@@ -105,17 +104,17 @@ def describe_measured(
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:
     """Returns the face of the safety box that the tool exceeded, and by how much; "" if that is unknown.
 
-    For a face that the tool was beyond at the first of these cycles, only the distance that it moved out counts.
+    For a face that the tool was beyond in the first of these cycles, only the distance that it moved outwards counts.
     """
     if box is None or not BOX_FAULTS & set(faults) or not len(record):
         return ""
     passed = []
     for field in ("command_pose", "T_base_tool"):
         path = record[field][:, :3, 3]
-        places = path[np.isfinite(path).all(axis=1)].tolist()
-        if places:
-            entered = EntryBox(box, places[0])
-            passed += map(entered.exceeded_face, places)
+        positions = path[np.isfinite(path).all(axis=1)].tolist()
+        if positions:
+            entered = EntryBox(box, positions[0])
+            passed += map(entered.exceeded_face, positions)
     if not passed:
         return ""
     _, face, beyond = max(passed)
@@ -124,19 +123,19 @@ def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box:
     return Remark(sentence, "past_face", away=away, face=face)
 
 
-def _judge(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
+def _check_record(record: NDArray[np.void], model: RobotModel, limits: Limits, mode: ControllerMode) -> _Measured:
     monitor = MeasuredMonitor(
         compliant_limits(limits) if mode in YIELDING_MODES else limits, rows=RCI_MEASURED_CONDITIONS
     )
     monitor.reset(record["q"][0].tolist())
     ddq, violations = np.zeros((len(record), model.n)), []
-    for place, (q, dq) in enumerate(zip(record["q"], record["dq"], strict=True)):
+    for row, (q, dq) in enumerate(zip(record["q"], record["dq"], strict=True)):
         twist, psi = None, None
         if mode in _CARTESIAN:
             twist, psi = (model.jacobian(q) @ dq).tolist(), _arm_angle(model, q)
         if monitor.step(q.tolist(), dq.tolist(), (0.0, 0.0, 0.0), twist, psi):
             violations += monitor.violations()
-        ddq[place] = monitor.acceleration
+        ddq[row] = monitor.acceleration
     return _Measured(violations, ddq)
 
 
@@ -153,40 +152,40 @@ def _describe_range(faults: set[Fault], record: NDArray[np.void], limits: Limits
     joint, is_measured = limits.joint, Fault.ACTUAL_JOINT_POSITION_LIMITS_VIOLATION in faults
     q = record["q"] if is_measured else record["q_c"]
     beyond = np.maximum(joint.lower - q, q - joint.upper)
-    place = np.unravel_index(beyond.argmax(), q.shape)
-    if beyond[place] < -_CLOSE:
+    index = np.unravel_index(beyond.argmax(), q.shape)
+    if beyond[index] < -_NEAR_LIMIT:
         return "every joint was inside the limits of this model: the controller has narrower ones (set_joint_limit)"
-    low, high = math.degrees(joint.lower[place[1]]), math.degrees(joint.upper[place[1]])
+    low, high = math.degrees(joint.lower[index[1]]), math.degrees(joint.upper[index[1]])
     was = "measured" if is_measured else "commanded"
-    number, value = int(place[1]) + 1, float(q[place])
+    number, value = int(index[1]) + 1, float(q[index])
     return Remark(
         f"joint {number} was {was} at {math.degrees(value):.2f} deg (from {low:.2f} to {high:.2f} deg)",
         "joint_range",
         condition="measured.joint.position" if is_measured else "joint.position",
         joint=number,
         value=value,
-        low=float(joint.lower[place[1]]),
-        high=float(joint.upper[place[1]]),
+        low=float(joint.lower[index[1]]),
+        high=float(joint.upper[index[1]]),
     )
 
 
 def _describe_collision(
     record: NDArray[np.void], model: RobotModel, limits: Limits, thresholds: JointVector | None
 ) -> str:
-    """Returns the force on which joint, from the wrench that the controller estimates at the tool."""
+    """Returns the external torque at the joint of the collision, from the estimated wrench at the tool."""
     last, known = record[-1], limits.joint.collision_threshold if thresholds is None else thresholds
     wrench = last["tau_ext_in_base"]
-    outside = np.abs(model.jacobian(last["q"]).T @ wrench)
-    joint = int((outside / np.maximum(known, _LEAST)).argmax())
+    external = np.abs(model.jacobian(last["q"]).T @ wrench)
+    joint = find_collision_joint(external.tolist(), known.tolist())
     bound = f"its threshold is {known[joint]:g} N m"
     if thresholds is None:
         bound = f"its threshold is at most {known[joint]:g} N m, set_collision_behavior sets it"
     return Remark(
-        f"{np.linalg.norm(wrench[:3]):.3g} N were felt at the tool, which is {outside[joint]:.3g} N m on joint "
-        f"{joint + 1} ({bound})",
+        f"an external force of {np.linalg.norm(wrench[:3]):.3g} N acts at the tool, which is "
+        f"{external[joint]:.3g} N m on joint {joint + 1} ({bound})",
         "collision",
         joint=joint + 1,
-        value=float(outside[joint]),
+        value=float(external[joint]),
         bound=float(known[joint]),
         unit="N m",
     )

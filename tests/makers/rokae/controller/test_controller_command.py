@@ -109,7 +109,7 @@ def test_without_a_world_there_is_no_second_line() -> None:
         ("--stall", "9", "duration needs 0.001 to 5.*, got 9.0"),
         ("--stall", "0.5/0.1", "period needs .*, got 0.1"),
         ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
-        ("--world-port", "70000", "--world-port: 70000 is no port"),
+        ("--world-port", "70000", "--world-port: 70000 is not a valid port"),
     ],
 )
 def test_an_option_out_of_range_is_one_sentence(option: str, value: str, message: str) -> None:

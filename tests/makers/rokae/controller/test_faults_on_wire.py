@@ -135,7 +135,7 @@ def test_a_wrong_measurement_sets_its_bit_in_the_very_cycle(place: Arena, robot:
     early = next(s.message_id for s in robot.states if s.message_id >= first and s.q != s.q_c and lie.breaks(s))
     assert state.message_id == early
     stays_inside_the_limits(watch_the_stop(robot, state))
-    while max(map(abs, robot.receive_fresh_state().tau_ext_in_base)) > 1.0:  # What the jolt left in the estimate.
+    while max(map(abs, robot.receive_fresh_state().tau_ext_in_base)) > 1.0:  # The estimate still contains the impact.
         pass
     recover_and_move(robot)
 

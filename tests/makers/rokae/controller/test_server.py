@@ -334,7 +334,7 @@ def test_a_client_that_goes_in_mid_motion_leaves_one_controlled_stop(how: str) -
                 assert not peer.seen[-1].dq_c.any()
                 assert not peer.seen[-1].faults
                 assert stop_is_smooth(peer.seen)
-            assert "in mid-motion" in found.wait_for_line("the client")
+            assert "during a motion" in found.wait_for_line("the client")
     assert len(found.lines) == 1
 
 
@@ -449,7 +449,7 @@ def test_ended_in_mid_motion_it_informs_the_client_with_an_error_bit() -> None:
         assert not found.thread.is_alive()
         assert stop_is_smooth(peer.seen)
         assert closes(peer.tcp)
-    assert any("ended in mid-motion" in line for line in found.lines)
+    assert any("ended during a motion" in line for line in found.lines)
 
 
 def test_what_an_answer_says_is_in_every_state_after_it() -> None:
@@ -484,7 +484,7 @@ def test_refusals_are_told_with_their_reason(lockstep: Running) -> None:
 
 def test_states_that_go_to_another_address_than_the_client_are_pointed_out() -> None:
     with running(client_host="127.0.0.3", udp_port=0) as found, Peer(found):
-        assert "--client 127.0.0.1" in found.wait_for_line("it will not see any")
+        assert "--client 127.0.0.1" in found.wait_for_line("it will receive none")
 
 
 def test_a_motion_that_the_machine_held_up_says_so() -> None:
@@ -495,7 +495,7 @@ def test_a_motion_that_the_machine_held_up_says_so() -> None:
             peer.send(state.message_id, q)
             state = peer.receive_state()
         assert peer.ask(rci.StopMove()) == 0
-        assert "longer than it should" in found.wait_for_line("that motion took")
+        assert "longer than planned" in found.wait_for_line("that motion took")
 
 
 def test_a_command_that_jumps_is_a_fault_in_the_state_that_answers_it(lockstep: Running) -> None:
@@ -607,8 +607,8 @@ def test_an_unknown_arm_lists_the_known_ones() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"port": 70000}, "port: 70000 is no port"),
-        ({"client_port": 0}, "client_port: 0 is no port"),
+        ({"port": 70000}, "port: 70000 is not a valid port"),
+        ({"client_port": 0}, "client_port: 0 is not a valid port"),
         ({"host": ""}, "host"),
         ({"plant": "rubber"}, "known: ideal, mujoco"),
         ({"lost_limit": 9}, "needs 10 to 20 cycles"),

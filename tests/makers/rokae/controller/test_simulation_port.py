@@ -150,7 +150,7 @@ def test_who_holds_a_place_and_says_nothing_gives_it_to_the_next_and_comes_back(
         assert world.status().phase == "off", "it has connected again by itself"
 
 
-def ask_as_stranger(found: Running) -> dict:
+def ask_as_another_user(found: Running) -> dict:
     """What another account of this machine is answered when it presses the emergency stop."""
     assert found.server.world_address is not None
     host, _, port = found.server.world_address.partition(":")
@@ -200,7 +200,7 @@ def test_another_account_takes_no_place_from_a_guest_that_is_silent(
         guests = [stack.enter_context(Guest(lockstep)) for _ in range(MAX_CLIENTS)]
         assert all(guest.ask(request="status")["ok"] for guest in guests)
         time.sleep(0.1)
-        answer = ask_as_stranger(lockstep)
+        answer = ask_as_another_user(lockstep)
         assert "for the user who started the controller" in answer["error"]
         assert all(guest.ask(request="status")["ok"] for guest in guests)
 
@@ -245,7 +245,7 @@ def test_an_account_is_not_taken_for_root_because_it_has_hung_up(user: int, stay
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can become another user")
 def test_another_account_of_this_machine_is_refused(lockstep: Running) -> None:
-    answer = ask_as_stranger(lockstep)
+    answer = ask_as_another_user(lockstep)
     assert answer["ok"] is False
     assert "for the user who started the controller" in answer["error"]
     with Guest(lockstep) as guest:

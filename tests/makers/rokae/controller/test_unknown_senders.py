@@ -1,4 +1,4 @@
-"""Who is not the client moves nothing, learns nothing and spoils nothing; what nobody reads holds nobody up."""
+"""Data of unknown senders has no effect, and log lines that are not read do not block the controller."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.sim import log_lines
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
-from rcilab.sim.log_lines import LineHandler, LogLines, SeldomLines
+from rcilab.sim.log_lines import LineHandler, LogLines, RateLimitedLog
 from tests.makers.rokae.controller.test_server import PATIENCE, Peer, Running, bind_udp, running
 from tests.waiting import wait_for
 
@@ -34,7 +34,7 @@ def absurd(message_id: int) -> bytes:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
-def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
+def test_commands_of_an_unknown_sender_do_not_end_a_motion_and_are_counted(host):
     with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.bind((host, 0))
         place = robot.address.removeprefix("rci://").split("?")[0].split(":")
@@ -56,7 +56,7 @@ def test_commands_of_a_stranger_do_not_end_a_motion_and_are_counted(host):
 
 
 @pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
-def test_a_flood_of_a_stranger_leaves_room_for_commands(host):
+def test_a_flood_of_an_unknown_sender_leaves_room_for_commands(host):
     """From the first command on; it comes while the controller does not know yet which port the client sends from."""
     with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.bind((host, 0))
@@ -90,8 +90,8 @@ class FloodedPeer(Peer):
 
     def send(self, message_id: int, q: np.ndarray) -> None:
         for _ in range(1000):
-            for stranger in self.unknown_senders:
-                stranger.sendto(bytes(290), self.controller)
+            for unknown in self.unknown_senders:
+                unknown.sendto(bytes(290), self.controller)
         self.sender.sendto(rci.encode_command(rci.CommandPacket(message_id, tuple(q.tolist()))), self.controller)
 
     def hold(self, cycles: int) -> None:
@@ -102,13 +102,13 @@ class FloodedPeer(Peer):
 def test_a_client_is_heard_in_a_flood_wherever_it_sends_from_and_when_its_port_changes():
     with (
         bind_udp(0, "127.0.0.1") as other_port, bind_udp(0, "127.0.0.1") as next_port,
-        bind_udp(0, "127.0.0.9") as stranger, bind_udp(0, "127.0.0.1") as neighbour,
+        bind_udp(0, "127.0.0.9") as unknown, bind_udp(0, "127.0.0.1") as neighbour,
         running(lockstep=True) as found, FloodedPeer(found, []) as peer,
     ):  # fmt: skip
         peer.direct_states_to(bind_udp(0, "127.0.0.1"))
         peer.sender = other_port
         peer.hold(1)
-        peer.unknown_senders = [stranger, neighbour]
+        peer.unknown_senders = [unknown, neighbour]
         peer.hold(20)
         peer.sender = peer.udp
         peer.hold(20)
@@ -120,11 +120,11 @@ def test_a_client_is_heard_in_a_flood_wherever_it_sends_from_and_when_its_port_c
 
 
 def test_the_client_that_is_named_at_the_start_is_heard_in_a_flood():
-    with bind_udp(0, "127.0.0.1") as udp, bind_udp(0, "127.0.0.9") as stranger:
+    with bind_udp(0, "127.0.0.1") as udp, bind_udp(0, "127.0.0.9") as unknown:
         port = udp.getsockname()[1]
         with running(lockstep=True, client_host="127.0.0.1", client_port=port) as found:
             for _ in range(2):  # The second time, too: it is kept when the client leaves.
-                with FloodedPeer(found, [stranger]) as peer:
+                with FloodedPeer(found, [unknown]) as peer:
                     peer.udp.close()
                     peer.udp = peer.sender = udp.dup()
                     peer.udp.settimeout(PATIENCE)
@@ -132,14 +132,14 @@ def test_the_client_that_is_named_at_the_start_is_heard_in_a_flood():
             assert found.server.bad_datagrams == 0
 
 
-def test_strangers_in_the_moment_before_a_socket_is_connected_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_senders_before_a_socket_is_connected_are_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     """Between its bind and its connect, the socket of the client's commands takes anybody's datagrams."""
     connect = socket.socket.connect
-    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as stranger:
+    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as unknown:
 
         def connect_late(sock: socket.socket, place: tuple[str, int]) -> None:
             if sock.type == socket.SOCK_DGRAM and sock.getsockname() == (found.host, found.port):
-                stranger.sendto(absurd(1), (found.host, found.port))
+                unknown.sendto(absurd(1), (found.host, found.port))
             connect(sock, place)
 
         monkeypatch.setattr(socket.socket, "connect", connect_late)
@@ -151,18 +151,18 @@ def test_strangers_in_the_moment_before_a_socket_is_connected_are_left_out(monke
 
 def test_a_flood_does_not_keep_the_controller_from_its_cycles() -> None:
     """Once the client's commands have a socket of their own, few of the unknown senders' are read at a time."""
-    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as stranger, FloodedPeer(found, []) as peer:
+    with running(lockstep=True) as found, bind_udp(0, "127.0.0.9") as unknown, FloodedPeer(found, []) as peer:
         peer.direct_states_to(bind_udp(0, "127.0.0.1"))
         peer.sender = peer.udp
         peer.hold(1)
         before = found.server._endpoint.unknown_senders
-        peer.unknown_senders = [stranger]
+        peer.unknown_senders = [unknown]
         peer.hold(20)
         cycles = found.server.controller.playout
         assert 0 < found.server._endpoint.unknown_senders - before < 64 * 20, cycles
 
 
-def test_strangers_are_counted_again_for_the_next_client():
+def test_unknown_senders_are_counted_again_for_the_next_client():
     with running() as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
         udp.bind(("127.0.0.9", 0))
         endpoint = found.server._endpoint
@@ -194,7 +194,7 @@ def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs()
 
 def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
     written, now = [], 100.0
-    lines = SeldomLines(written.append, lambda: now)
+    lines = RateLimitedLog(written.append, lambda: now)
     for number in range(1000):
         lines.write("left", f"the client left {number}", "clients were lost")
     lines.write("refused", "another kind", "were refused")
@@ -229,7 +229,7 @@ def test_connections_that_speak_no_rci_are_summed_up(sent):
     assert len(found.lines) == 1
 
 
-def test_lines_that_nobody_reads_are_left_out_and_counted_and_hold_up_nobody():
+def test_lines_that_are_not_read_are_dropped_and_counted_and_do_not_block():
     reader, writer = os.pipe()
     lines = LogLines(writer)
     began = time.monotonic()
@@ -239,7 +239,7 @@ def test_lines_that_nobody_reads_are_left_out_and_counted_and_hold_up_nobody():
     time.sleep(0.2)
     with os.fdopen(reader, "rb", buffering=0) as stream:
         said = b""
-        while b"lines were left out" not in said:
+        while b"lines were dropped" not in said:
             said += stream.read(65536)
             lines.write("the last one")
         lines.close()

@@ -34,7 +34,7 @@ def test_options_name_the_ports_that_differ():
         ("rci://host?udp_port=x", "udp_port 'x'"),
         ("rci://[::1]:1337", "IPv6, which is not supported; write the robot's IPv4 address"),
         ("::1", "IPv6"),
-        ("foo", "is no address; write it like rci://"),
+        ("foo", "is not a valid address; write it like rci://"),
         ("999.1.1.1", "'999.1.1.1': an IPv4 address has four numbers from 0 to 255"),
         ("rci://192.168.0:1337", "four numbers from 0 to 255"),
         ("rci://1.2.3.4.5", "four numbers from 0 to 255"),

@@ -46,41 +46,41 @@ def sender(host: str) -> socket.socket:
 
 
 def test_a_flood_from_another_address_leaves_room_for_a_state(wire: Wire):
-    with sender("127.0.0.9") as stranger:
-        wire.send(stranger, b"unknown sender", 5000)
+    with sender("127.0.0.9") as unknown:
+        wire.send(unknown, b"unknown sender", 5000)
     wire.send(wire.robot, b"state")
     assert wire.received() == [b"state"]
 
 
 def test_a_flood_from_the_robots_address_leaves_room_for_a_state(wire: Wire):
-    with sender(HOST) as stranger:
-        wire.send(stranger, b"unknown sender", 5000)
+    with sender(HOST) as unknown:
+        wire.send(unknown, b"unknown sender", 5000)
         wire.send(wire.robot, b"state")
-        wire.send(stranger, b"unknown sender", 5000)
+        wire.send(unknown, b"unknown sender", 5000)
         wire.send(wire.robot, b"next")
     assert wire.received() == [b"state", b"next"]
 
 
 def test_a_flood_leaves_room_for_a_robot_that_sends_from_another_port(wire: Wire):
-    with sender(HOST) as robot, sender(HOST) as stranger:
+    with sender(HOST) as robot, sender(HOST) as unknown:
         wire.send(robot, b"state")
         assert wire.received() == [b"state"]
-        for host in (stranger, sender("127.0.0.9")):
+        for host in (unknown, sender("127.0.0.9")):
             with host:
                 wire.send(host, b"unknown sender", 5000)
         wire.send(robot, b"next")
         assert wire.received() == [b"next"]
 
 
-def test_strangers_are_kept_out_when_the_port_is_shared_for_a_moment(monkeypatch: pytest.MonkeyPatch):
+def test_unknown_senders_are_ignored_before_the_socket_is_connected(monkeypatch: pytest.MonkeyPatch):
     """Between its bind and its connect, the socket of the robot's states takes anybody's datagrams."""
-    with socket.create_server((HOST, 0)) as listener, sender("127.0.0.9") as stranger:
+    with socket.create_server((HOST, 0)) as listener, sender("127.0.0.9") as unknown:
         port = listener.getsockname()[1]
         connect = socket.socket.connect
 
         def connect_late(sock: socket.socket, place: tuple[str, int]) -> None:
             if sock.type == socket.SOCK_DGRAM and place[1] == port and sock.getsockname()[1] == port:
-                stranger.sendto(bytes(SIZE), sock.getsockname())
+                unknown.sendto(bytes(SIZE), sock.getsockname())
             connect(sock, place)
 
         monkeypatch.setattr(module.socket.socket, "connect", connect_late)
@@ -99,20 +99,20 @@ def test_a_second_client_of_the_same_robot_finds_the_port_taken(wire: Wire):
 
 
 def test_the_robots_port_counts_and_no_other_once_a_state_came_from_there(wire: Wire):
-    with sender(HOST) as stranger:
-        wire.send(stranger, b"first")
+    with sender(HOST) as unknown:
+        wire.send(unknown, b"first")
         assert wire.received() == [b"first"], "nothing has come from where commands go"
         wire.send(wire.robot, b"state")
-        wire.send(stranger, b"unknown sender")
+        wire.send(unknown, b"unknown sender")
         wire.send(wire.robot, b"next")
         assert wire.received() == [b"state", b"next"]
-        wire.send(stranger, b"unknown sender")
+        wire.send(unknown, b"unknown sender")
         assert wire.received() == []
 
 
 def test_a_robot_that_sends_from_another_port_is_received(wire: Wire):
-    with sender(HOST) as robot, sender(HOST) as stranger:
-        for sock in (robot, stranger, robot):
+    with sender(HOST) as robot, sender(HOST) as unknown:
+        for sock in (robot, unknown, robot):
             wire.send(sock, b"state")
     assert wire.received() == [b"state", b"state"]
 
