@@ -163,7 +163,7 @@ def test_what_became_of_a_run_is_said_of_the_robot_that_made_it():
     ):
         said = outcome_html(elsewhere, status, text)
         assert "rl-verdict" not in said
-        assert f"virtual controller, ideal arm, {run.model.name}: Ran to its end" in said
+        assert f"virtual controller, ideal arm · {run.model.name}: Ran to its end" in said
 
 
 def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypatch):
