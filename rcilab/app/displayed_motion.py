@@ -1,4 +1,4 @@
-"""What scene, timeline and curves draw in place of the plan: a provoked fault, or what a cell of a notebook ran."""
+"""The motion that scene, timeline and curves draw instead of the plan: of a triggered fault, or of a notebook cell."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _FEWEST = 8  # [cycles] A shorter run of a cell did not move anything.
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DisplayedMotion:
-    """What is drawn in place of the plan. It is never one to execute."""
+    """A motion drawn instead of the plan. It cannot be executed."""
 
     plan: Plan
-    """What was commanded; of a fault the wrong command too, and the controller's stop."""
+    """The commanded motion; of a fault with the violating command and the controller's stop."""
     scene: Plan
-    """Where the arm is drawn."""
+    """The motion of the drawn arm."""
     run: Run
-    """What the arm did."""
+    """The recorded motion of the arm."""
     moment: float | None = None
-    """When the fault was reported, on the clock of `plan`, [s]; None without one."""
+    """Time of the fault report on the clock of `plan`, [s]; None without a fault."""
 
 
 def display_fault(demo: FaultDemo) -> DisplayedMotion:

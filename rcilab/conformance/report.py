@@ -300,7 +300,7 @@ class Report:
         return find_slow_down(self, recommended=recommended, at_most=at_most, progress=progress)
 
     @property
-    def broken_conditions(self) -> int:
+    def violated_conditions(self) -> int:
         """Number of violated conditions; one may have violations at several times and of several joints."""
         return len({violation.condition.id for violation in self.violations})
 

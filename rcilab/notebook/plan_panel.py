@@ -165,7 +165,7 @@ class PlanPanel(Part):
         sentence = text("plan.ready", duration=f"{plan.motion.duration:.3f}")
         if not report.ok:
             sentence += " " + text(
-                "check.failed_long", conditions=report.broken_conditions, count=len(report.violations)
+                "check.failed_long", conditions=report.violated_conditions, count=len(report.violations)
             )
         elif plan.short is not None:
             tone, word = "warn", "target.not_there"

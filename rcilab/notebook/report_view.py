@@ -50,7 +50,7 @@ class ReportView(Part):
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             sentence = verdict("good", text("check.passed"), text(code, count=unheeded))
         else:
-            failed = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            failed = text("check.failed_long", conditions=report.violated_conditions, count=len(report.violations))
             sentence = verdict("bad", text("check.failed"), failed)
         write(self._verdict, sentence + soft(text("check.note")))
         broken = "".join(
@@ -64,7 +64,7 @@ class ReportView(Part):
         tone: Tone = "good" if row.ok and row.ratio <= _TIGHT else "warn"
         word = "check.kept" if tone == "good" or row.start_excess else "check.tight" if row.ok else "check.exceeded"
         if not row.ok and condition.necessity == "necessary":
-            tone, word = "bad", "check.broken"
+            tone, word = "bad", "check.violated"
         facts = [value_against_bound(*row.displayed, condition.unit, text)]
         facts += [text("check.joint", joint=row.joint)] if row.joint else []
         facts += [text("check.led_in")] if row.start_excess else []

@@ -230,7 +230,7 @@ def test_what_only_allows_for_rounding_is_0_and_the_verdict_counts_conditions_as
     bench.store.update(setup=replace(setup, wanted=replace(setup.wanted, box=box)))
     bench.goal.set_joints(HOME + np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     report = bench.plan.report
-    assert report.broken_conditions == 1
+    assert report.violated_conditions == 1
     cards = rows_html(report, MODEL, "", Text("en"))
     assert cards.count("rl-card rl-bad") == 1
     card = next(card for card in cards.split('<div class="rl-card') if "Tool inside the safety box" in card)

@@ -132,8 +132,8 @@ class RobotJog:
             return
         report = made.completed().report
         if report.certificate is None:
-            broken = message(f"condition.{report.violations[0].condition.id}")
-            change_jog(self._store, sentence=message("jog.unsafe", condition=broken))
+            violated = message(f"condition.{report.violations[0].condition.id}")
+            change_jog(self._store, sentence=message("jog.unsafe", condition=violated))
             return
         try:
             request = self._connection.robot().execute(made.motion, report.certificate, stops=stops)

@@ -118,8 +118,8 @@ class LearnActions:
             self._set(provoking=None, problem=message("learn.failed", error=explain_error(result)))
             return
         state = self._store.state
-        beside = None if state.plan is None else state.plan.motion
-        show = make_show(result, beside)
+        plan_motion = None if state.plan is None else state.plan.motion
+        show = build_display(result, plan_motion)
         self._set(provoking=None, show=show)
         self._store.update(place=show.place, playing=False)
 
@@ -133,8 +133,8 @@ class LearnActions:
         state, show = self._store.state, self._learn.show
         if show is None:
             return
-        beside = None if state.plan is None else state.plan.motion
-        other = beside is not show.beside or state.model.name != show.demo.model.name
+        plan_motion = None if state.plan is None else state.plan.motion
+        other = plan_motion is not show.plan_motion or state.model.name != show.demo.model.name
         if other or is_moving(self._connection.status()):
             self._set(show=None)
 
@@ -158,7 +158,7 @@ class LearnActions:
             self._store.notify("good", message("lesson.ticked", next=last))
 
 
-def make_show(demo: FaultDemo, beside: object) -> Show:
+def build_display(demo: FaultDemo, plan_motion: object) -> Show:
     """Returns a fault as the page shows it."""
     rows = demo.whole
     return Show(
@@ -167,5 +167,5 @@ def make_show(demo: FaultDemo, beside: object) -> Show:
         recording=Recording(
             t=np.array(rows["t"]), q=rows["q"], q_c=rows["q_c"], dq=rows["dq"], delay=0, moment=demo.time
         ),
-        beside=beside,
+        plan_motion=plan_motion,
     )

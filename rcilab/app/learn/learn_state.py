@@ -25,7 +25,7 @@ class Show:
     displayed: DisplayedMotion
     recording: Recording
     """The motion of the arm."""
-    beside: object
+    plan_motion: object
     """The plan of the page when the display opened; another plan closes the display."""
 
     @property

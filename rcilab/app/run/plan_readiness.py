@@ -64,7 +64,9 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
     if plan is None:
         return message("ready.no_plan")
     if not plan.report.ok:
-        return message("ready.violations", conditions=plan.report.broken_conditions, count=len(plan.report.violations))
+        return message(
+            "ready.violations", conditions=plan.report.violated_conditions, count=len(plan.report.violations)
+        )
     if q_c is None or not _is_at(q_c, plan.starts_at):
         return message("ready.done" if q_c is not None and is_done(plan, q_c) else "ready.elsewhere")
     return None

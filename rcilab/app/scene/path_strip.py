@@ -39,7 +39,7 @@ class PathStrip:
     path: Array
     """Positions of the tool, shape (N, 3), [m]."""
     usage: Array
-    """The most that is used of a limit between each of these and the next, shape (N,); from 1 on it is broken."""
+    """The most that is used of a limit between each of these and the next, shape (N,); 1 or more is a violation."""
     markers: tuple[ViolationMarker, ...]
 
 

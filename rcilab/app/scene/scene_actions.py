@@ -1,4 +1,4 @@
-"""What the scene shows of goal and plan, kept up to date in ticks, and its requests. Owned by the dispatcher.
+"""Values computed for the scene from goal and plan, updated in every tick, and its requests. Owned by the dispatcher.
 
 A tick looks at the newest goal and plan only: a drag that comes faster than ticks does not wait for any of this.
 """
@@ -145,7 +145,7 @@ class SceneActions:
         self._compute("swept", moved, lambda: compute_swept_volume(model, plan.motion))  # type: ignore[union-attr]
 
     def _compute(self, name: str, wanted: tuple[object, ...], work: Callable[[], Any]) -> None:
-        """Has something computed beside the page when it is wanted anew, and shows it once it is there."""
+        """Computes a value in the background when its inputs have changed, and shows it once it is ready."""
         running = self._made.get(name)
         if running is not None and running.done():
             del self._made[name]

@@ -99,7 +99,7 @@ class CheckPanel:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))
         else:
-            sentence = text("check.failed_long", conditions=report.broken_conditions, count=len(report.violations))
+            sentence = text("check.failed_long", conditions=report.violated_conditions, count=len(report.violations))
             headline = ("bad", "", "check.failed", sentence)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")

@@ -37,7 +37,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
     word = text(
         "check.kept"
         if tone == "good" or (row.ok and row.start_excess)
-        else "check.broken"
+        else "check.violated"
         if tone == "bad"
         else _AMBER[not row.ok]
     )

@@ -54,8 +54,8 @@ class TargetPanel:
         wxyz.show(quaternion_text(target.wxyz), state.problems.get(wxyz.field), state.entered)
         labels.append((wxyz.field, self._text("target.wxyz")))
         problems = problems_html(state, self._text, labels)
-        is_broken = state.plan is not None and not state.plan.report.ok  # Shown here, too: the rest is further down.
-        sentence = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_broken else "")
+        is_violated = state.plan is not None and not state.plan.report.ok  # Shown here, too: the rest is further down.
+        sentence = reach_html(state, self._text) + (planned_html(state, status, self._text) if is_violated else "")
         self._reach.show(f'<div class="rl-slot">{problems or sentence}</div>')  # A fixed height: nothing below moves.
 
 
@@ -86,8 +86,8 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
         sentence += ". " + text("target.leads_short", short=text.render(plan.short))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
-        worst, more = report.violations[0].condition.id, report.broken_conditions - 1
-        sentence += " · " + text("scene.broken", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
+        worst, more = report.violations[0].condition.id, report.violated_conditions - 1
+        sentence += " · " + text("scene.violated", condition=text(f"condition.{worst}")) + (f" +{more}" if more else "")
     unheeded = count_unheeded(report) if report.ok else 0
     if unheeded:
         sentence += " · " + text("target.unheeded", count=unheeded)

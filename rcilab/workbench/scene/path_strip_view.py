@@ -105,5 +105,5 @@ def bead_words(bead: ViolationMarker, text: Text) -> str:
     worst = bead.violations[0]
     joint = f" J{worst.joint}" if worst.joint else ""
     more = f" +{len(bead.violations) - 1}" if len(bead.violations) > 1 else ""
-    broken = text("scene.broken", condition=text("condition." + worst.condition.id))
-    return f"◆ {broken}{joint} · {worst.worst_time:.2f} s{more}"
+    violated = text("scene.violated", condition=text("condition." + worst.condition.id))
+    return f"◆ {violated}{joint} · {worst.worst_time:.2f} s{more}"

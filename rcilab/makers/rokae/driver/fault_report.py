@@ -76,27 +76,27 @@ def describe_faults(
         return FaultReport(f"{sentence}; error.run holds the motion", Remark(""))
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
-    commanded, is_broken = _describe_commanded(faults, record, limits)
+    commanded, is_violated = _describe_commanded(faults, record, limits)
     measured = describe_measured(faults, record, model, limits, mode, collision_thresholds)
     followed = _describe_followed(faults, record, model, limits)
     passed = describe_passed_face(faults, record, box)
     found = [part for part in (commanded, followed, *measured, passed) if part]
     parts += found
     if faults:
-        parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_broken=is_broken)))
+        parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_violated=is_violated)))
     clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
     parts.append(f"{clears}error.run holds the motion")
     finding = Remark.all(part for part in found if isinstance(part, Remark))
     return FaultReport("; ".join(parts), finding)
 
 
-def _remedy(fault: Fault, mode: ControllerMode, *, is_broken: bool) -> str:
+def _remedy(fault: Fault, mode: ControllerMode, *, is_violated: bool) -> str:
     """Returns the remedy for a fault; if the commands kept their limits, it is not about the plan."""
     if mode is ControllerMode.TORQUE:
         return fault.torque_remedy
     if mode in YIELDING_MODES:
         return fault.impedance_remedy
-    return fault.remedy if is_broken else fault.outside_remedy
+    return fault.remedy if is_violated else fault.outside_remedy
 
 
 def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], model: RobotModel, limits: Limits) -> str:
@@ -173,9 +173,9 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
     searched; a violation of another one only counts for the second result.
     """
     sent = record[record["sent_ns"] != 0]
-    is_broken = False
+    is_violated = False
     if not len(sent):
-        return "", is_broken
+        return "", is_violated
     for field, find, describe in (
         ("command", _judge_joints, _describe_joints),
         ("command_pose", _judge_poses, _describe_pose),
@@ -190,14 +190,14 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
             values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
         first = len(values) - len(rows)
         for place, violations in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
-            is_broken = is_broken or bool(violations)
+            is_violated = is_violated or bool(violations)
             for violation in violations:
                 if violation.condition.fault in faults:
                     remark = violation.remark
                     sentence = f"{remark} in the command at t = {rows['t'][place - first]:.3f} s"
                     return Remark(sentence, remark.code, **remark.facts), True
-        return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_broken
-    return "", is_broken
+        return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_violated
+    return "", is_violated
 
 
 def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:

@@ -83,7 +83,7 @@ def _pieces(
     middles = np.array(arm.middles)
     bits = 1 << np.arange(7)
 
-    def broken(q: Array, nearness: Array) -> NDArray[np.int64]:
+    def exceeded(q: Array, nearness: Array) -> NDArray[np.int64]:
         angle = wrapped(q - middles) + middles
         beyond = np.asarray(((angle <= lower) | (angle >= upper)) @ bits, dtype=np.int64)
         return beyond + _SINGULAR * (nearness >= 1.0)
@@ -91,7 +91,7 @@ def _pieces(
     starts, ends, branches = motion.starts, motion.ends, motion.branches
     half = len(starts) // 2  # The other half are twins with the same determinants.
     nearness = held_singularity_path(arm, np.concatenate((starts[:half], ends[:half]))).reshape(2, half)
-    before, after = (broken(q, np.tile(near, 2)) for q, near in zip((starts, ends), nearness, strict=True))
+    before, after = (exceeded(q, np.tile(near, 2)) for q, near in zip((starts, ends), nearness, strict=True))
     cut = (before != after) | ((branches < 0) & (np.abs(ends - starts).max(axis=1) > _LONG))
     done: list[tuple[Array, Array, NDArray[np.int64]]] = []
     shares = np.linspace(0.0, 1.0, _CUTS + 1)[:, None, None]
@@ -101,7 +101,7 @@ def _pieces(
         whole = _placed(arm, motion, T_base_flange, between.reshape(-1, 7), np.tile(branches[cut], _CUTS + 1))
         whole = whole.reshape(between.shape)
         q = whole.reshape(-1, 7)
-        codes = broken(q, held_singularity_path(arm, q)).reshape(_CUTS + 1, -1)
+        codes = exceeded(q, held_singularity_path(arm, q)).reshape(_CUTS + 1, -1)
         good = np.abs(whole - between).max(axis=2) < 2.0 * _LONG  # False for NaN.
         both = good[:-1] & good[1:]
         starts, ends, before, after = whole[:-1][both], whole[1:][both], codes[:-1][both], codes[1:][both]

@@ -86,7 +86,7 @@ def feasible_arcs(
     values = forms[:, 1:2] * np.cos(middle) + forms[:, 2:3] * np.sin(middle) + forms[:, 0:1]
     both, lost = _angles_at(values, acos(c4), arm.offsets)
     lost |= s4 < SINGULAR or horizontal < SINGULAR * length
-    return FeasibleArcs(arcs=tuple(_arcs(starts, _broken(both, lower, upper), lost, outside_box)))
+    return FeasibleArcs(arcs=tuple(_arcs(starts, _exceeded(both, lower, upper), lost, outside_box)))
 
 
 def _linear_forms(
@@ -188,16 +188,16 @@ def _angles_at(values: Array, q4: float, offsets: Angles) -> tuple[Array, NDArra
     return both, unbent[0] | unbent[1]
 
 
-def _broken(both: Array, lower: Array, upper: Array) -> NDArray[np.uint8]:
+def _exceeded(both: Array, lower: Array, upper: Array) -> NDArray[np.uint8]:
     """Returns the joints beyond their limits in every branch, as bits from that of joint 1, shape (8, m)."""
     beyond = (both <= lower[:, None, None]) | (both >= upper[:, None, None])
     return np.packbits(beyond.reshape(14, -1).take(_TWINS, axis=0), axis=0, bitorder="little")[0]
 
 
-def _arcs(starts: Array, broken: NDArray[np.uint8], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
+def _arcs(starts: Array, exceeded: NDArray[np.uint8], lost: NDArray[np.bool_], outside: bool) -> list[Arc]:
     """Returns arcs, with equal neighbours merged."""
-    best = broken[_SIZES.take(broken).argmin(axis=0), np.arange(len(starts))]
-    possible = np.packbits(broken == 0, axis=0, bitorder="little")[0]
+    best = exceeded[_SIZES.take(exceeded).argmin(axis=0), np.arange(len(starts))]
+    possible = np.packbits(exceeded == 0, axis=0, bitorder="little")[0]
     looks = best + 256 * possible.astype(np.intp) + 65536 * lost  # Everything an arc reports.
     is_new = np.empty(len(starts), dtype=np.bool_)
     np.not_equal(looks[1:], looks[:-1], out=is_new[1:])
