@@ -16,9 +16,8 @@ from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_rows
-from rcilab.i18n.locale import Language
 from rcilab.i18n.notebook_language import language
-from rcilab.i18n.translator import Remark
+from rcilab.i18n.translator import Remark, Text
 from rcilab.motion import storage
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
 from rcilab.motion.samples import is_on_grid, read_samples
@@ -29,12 +28,6 @@ TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile",
 profile (3.5), the fastest stop, or given samples."""
 
 _LAWS: tuple[TimeLaw, ...] = get_args(TimeLaw)
-
-_HTML_TEXTS: dict[Language, tuple[str, str, str]] = {
-    "en": ("Motion, {law}: {duration:.3f} s at speed {speed:g} (angles in °)", "start", "goal"),
-    "zh": ("运动，{law}：{duration:.3f} s，速度 {speed:g}（角度以 ° 计）", "起点", "目标"),
-}
-"""Caption and row names of a motion in a notebook."""
 
 _ROUNDING = 1e-9
 """A duration that exceeds whole cycles by less than this part of a cycle is rounded down to them."""
@@ -317,12 +310,12 @@ class Motion:
         return f"<Motion {self.law}, {self.n} joints, {self.duration:.3f} s, speed {self.speed:g}>"
 
     def _repr_html_(self) -> str:
-        caption, start, goal = _HTML_TEXTS[language()]
+        text = Text(language(), SHARED)
         degrees = (
             f"<tr><th>{name}</th>" + "".join(f"<td>{angle:.1f}</td>" for angle in np.degrees(q)) + "</tr>"
-            for name, q in ((start, self.start), (goal, self.goal))
+            for name, q in ((text("motion.start"), self.start), (text("motion.goal"), self.goal))
         )
-        title = caption.format(law=self.law, duration=self.duration, speed=self.speed)
+        title = text("motion.caption", law=self.law, duration=self.duration, speed=self.speed)
         return f"<table><caption>{title}</caption>{''.join(degrees)}</table>"
 
     def _write_npz(self, stream: IO[bytes]) -> None:
