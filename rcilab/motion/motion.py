@@ -16,6 +16,7 @@ from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_rows
+from rcilab.i18n.catalogue import SHARED
 from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark, Text
 from rcilab.motion import storage
