@@ -243,7 +243,7 @@ def test_soft_limits_of_the_session_count_in_plan_check_and_certificate():
             robot.execute(motion)
         with pytest.raises(CertificateError, match="limits"):
             robot.execute(motion, certificate)
-        assert "SetJointLimit" in robot.model.limits.source("joint.upper")
+        assert "soft limit" in robot.model.limits.source("joint.upper")
         robot.rci.set_joint_limit(joint.lower, joint.upper)
         robot.execute(motion)
 

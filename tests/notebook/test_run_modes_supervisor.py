@@ -160,7 +160,7 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
     panda = rcilab.load_model("Panda")
     with notebook.RunPanel(panda, language="zh") as panel:
         panel.connect.click()
-        assert "RCI" in text_of(panel._outcome)
+        assert "Franka" in text_of(panel._outcome)
         assert "Franka" not in text_of(panel._outcome)
 
 

@@ -230,7 +230,7 @@ def test_a_watching_page_may_look_but_not_touch(bench, ask):
     assert told(bench) == "notice.watching"
     assert bench.store.state.notice.page == 2, "the page that holds the controls need not be told"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("rcilab.app.dispatcher._AGAIN", 1e9)
+        patch.setattr("rcilab.app.dispatcher._REFUSAL_INTERVAL", 1e9)
         before = bench.store.state.notices
         ask(MoveJoint(page=2, joint=0, angle=0.1))
         assert bench.store.state.notices == before, "it is informed once in that time"

@@ -380,6 +380,15 @@ def test_a_program_that_was_changed_since_is_not_executed(square):
     assert obstacle(square.state, status) is None
 
 
+def test_a_number_typed_again_leaves_plan_and_history_as_they_are(square):
+    square.plan()
+    assert square.type("blend", "-5") is not None
+    assert square.type("blend", "0") is None
+    assert square.program.planned is square.program.draft
+    square.edit("undo")
+    assert not square.program.draft.steps  # The load of the file.
+
+
 def test_a_chosen_row_is_the_one_that_the_preview_shows(square):
     square.plan()
     for number, step in enumerate(square.program.draft.steps, start=1):

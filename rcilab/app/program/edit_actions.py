@@ -101,6 +101,8 @@ class EditActions:
             made = proposed(waypoint, name, request.text, self._draft.arm(self._store.state.model))
             if made is not None and self._history.answer(request.field, made if isinstance(made, Message) else None):
                 assert isinstance(made, Waypoint)
+                if made == waypoint:  # Its plan stays valid.
+                    return
                 self._history.change(self._draft.changed(int(key), made), int(key), typed=True)
 
     @property
