@@ -27,6 +27,7 @@ from rcilab.core.state import ControllerMode, RobotMode, RobotState
 from rcilab.execution.call_times import CallTimes
 from rcilab.execution.command_validation import describe_distance, distance_to, require_command, require_start
 from rcilab.execution.filters import CommandFilter, is_near
+from rcilab.execution.interrupts import DeferredInterrupts
 from rcilab.execution.recorder import CycleLog
 from rcilab.execution.stop_planner import CartesianStopPlanner, JointStopPlanner, StopPlanner, TorqueStopPlanner
 from rcilab.makers.driver import StreamingDriver
@@ -119,6 +120,7 @@ class ControlLoop:
         self._has_moved = False  # A command differs from the first one, or is a torque.
         self._is_executed = False  # The controller's commanded values have changed since the start.
         self._pending: deque[RobotState] = deque()
+        self._interrupts = DeferredInterrupts()
         self._stop_planner = _build_stop_planner(self._kind, limits, model)
 
     def run(self, callback: Callback) -> str | None:
@@ -137,7 +139,12 @@ class ControlLoop:
             DeadlineError: It accepted the motion but did not begin.
             InvalidValueError: The callback returned an invalid command; the motion was stopped.
             Exception: An exception of the callback, after the motion was stopped.
+            KeyboardInterrupt: Ctrl-C, after the motion was stopped.
         """
+        with self._interrupts:
+            return self._run(callback)
+
+    def _run(self, callback: Callback) -> str | None:
         self._driver.begin(self._mode)
         try:
             state = self._await_modes()
@@ -154,6 +161,7 @@ class ControlLoop:
         """Returns the newest state that shows the requested modes, or the reason of `stop_check` to stop before."""
         deadline = time.monotonic() + MODE_TIMEOUT
         while time.monotonic() < deadline:
+            self._interrupts.deliver()
             states = self._driver.poll(self._state_timeout)
             if not states:
                 raise self._lost_error()
@@ -193,11 +201,14 @@ class ControlLoop:
                 return reason
             try:
                 start_ns = time.monotonic_ns()
+                self._interrupts.is_allowed = True
                 answer = callback(state, t)
+                self._interrupts.is_allowed = False
                 self._calls.add(1e-9 * (time.monotonic_ns() - start_ns), t)
                 requested = self._checked(answer, state)
                 command = self._filtered(requested, state)
             except BaseException:
+                self._interrupts.is_allowed = False
                 self._pending.appendleft(state)
                 raise
             self._answer(state, command)
@@ -266,6 +277,10 @@ class ControlLoop:
                 if state.message_id > self._answered_id:
                     if not self._driver.is_streaming(state):
                         raise self._ended_error(state)
+                    if self._interrupts.is_pending and not self._log.braking:
+                        self._pending.appendleft(state)  # The stop begins with it.
+                        self._interrupts.deliver()
+                        continue
                     return state
             states = self._driver.poll(deadline - time.monotonic())
             if not states and time.monotonic() >= deadline:
