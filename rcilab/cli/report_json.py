@@ -83,6 +83,7 @@ def _violation(violation: Violation) -> dict[str, Any]:
         "id": violation.condition.id,
         "place": violation.location,
         "time": _finite(violation.time),
+        "worst_time": _finite(violation.worst_time),
         "value": _finite(violation.value),
         "bound": _finite(violation.bound),
         "unit": violation.condition.unit,

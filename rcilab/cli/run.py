@@ -141,10 +141,17 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
         show_note = partial(print, file=_text_stream(args))
         motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
         state = robot.state
+        if motion.n != robot.model.n:
+            raise UsageError(
+                f"{args.file} has {motion.n} joints and {robot.model.name} has {robot.model.n}: it is for another arm"
+            )
         mismatch = find_start_mismatch(motion.q[0], state.q_c)
         if mismatch is None or not args.to_start:
             if mismatch is not None:  # Before the report, whose violations would all have this cause.
-                raise UsageError(f"{mismatch}; in the shell, rcilab run --to-start does that after a confirmation")
+                faults = f"the controller reports {name_faults(state.faults)}, and " if state.faults else ""
+                raise UsageError(
+                    f"{faults}{mismatch}; in the shell, rcilab run --to-start does that after a confirmation"
+                )
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]

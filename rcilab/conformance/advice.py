@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from math import ceil, degrees, floor, isfinite
 
+import numpy as np
+
 from rcilab.conformance.catalogue import Phrase
 from rcilab.core.condition import Condition, Signal
 from rcilab.motion.joint import JOINT_LAWS
 from rcilab.motion.motion import Motion
+
+_STANDSTILL = 1e-6  # [rad/s] The curve through samples of a motion that starts at standstill is slower.
 
 
 def share(ratio: float) -> str:
@@ -59,7 +63,7 @@ def advise(
         return Phrase(_REMEDIES.get(condition.signal, "advice.range"))
     if row <= condition.order and is_off_start:
         return Phrase("advice.off_start")
-    if row <= condition.order and motion.at(0.0).dq.any():
+    if row <= condition.order and np.abs(motion.at(0.0).dq).max() > _STANDSTILL:
         return Phrase("advice.moving_start")
     if row >= len(motion):
         return Phrase("advice.moving_end")
@@ -90,6 +94,8 @@ _REMEDIES: dict[Signal, str] = {
 
 
 def _torque_advice(condition: Condition, motion: Motion) -> Phrase:
+    if condition.order == 1 and motion.law in JOINT_LAWS and condition.necessity == "necessary":
+        return Phrase("advice.torque.planned")
     if condition.necessity == "necessary":
         return Phrase("advice.torque.rate" if condition.order == 1 else "advice.torque.range")
     if condition.order == 1 and motion.law == "jerk_limited":

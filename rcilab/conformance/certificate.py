@@ -110,6 +110,8 @@ class Certificate:
                     f"plan it again from the arm's commanded position (state.q_c)"
                 )
             return "the motion was checked from another start: the velocity of the arm has changed; plan it again"
+        if changed == ["motion"]:
+            return "the certificate is that of another motion; check this one"
         if changed == ["mode"]:
             return (
                 f"the motion was checked for the mode {self.parts['mode']}, not for the mode {mode}, "

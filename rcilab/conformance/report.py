@@ -179,8 +179,8 @@ class Violation:
 
     def __str__(self) -> str:
         row = self.condition
-        lasting = f" and for {self.count} ms" if self.count > 1 else ""
-        when = f" at t = {self.time:.3f} s{lasting}" if row.stage == "throughout" else ""
+        lasting = f", from t = {self.time:.3f} s on for {self.count} ms" if self.count > 1 else ""
+        when = f" at t = {self.worst_time:.3f} s{lasting}" if row.stage == "throughout" else ""
         is_advice = row.necessity == "recommended" and row.fault is None
         passes = ": the controller does not stop for it" if is_advice else ""
         return f"{self.location}: {self._describe_value()}{when} ({row.necessity} condition{passes}); {self.advice}"

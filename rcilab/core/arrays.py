@@ -95,6 +95,8 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
         InvalidValueError: It is not a vector of `size` finite numbers.
     """
     try:
+        if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+            raise TypeError("complex")  # numpy would drop the imaginary part.
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidValueError(name, value, f"must be {size} numbers{_in(unit)}").coded(

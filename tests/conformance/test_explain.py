@@ -140,7 +140,7 @@ def test_every_condition_is_explained_with_place_time_amount_fault_and_remedy(ro
         ("cartesian.position", "choose a path inside the safety box"),
         ("clearance.links", "choose a path that keeps them farther apart"),
         ("cartesian.frame", "command valid poses within reach"),
-        ("torque.rate", "change the commanded torque over more cycles"),
+        ("torque.rate", 'plan it with law="torque_rate_limited"'),
         ("torque.range", "command less torque"),
         ("joint.torque_rate", "it protects the drives; law="),
         ("measured.joint.velocity", "keep the commands farther from the bound"),
