@@ -95,7 +95,7 @@ def as_vector(value: ArrayLike, size: int, name: str, unit: str = "") -> Array:
         InvalidValueError: It is not a vector of `size` finite numbers.
     """
     try:
-        if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+        if getattr(getattr(value, "dtype", None), "kind", "") == "c":
             raise TypeError("complex")  # numpy would drop the imaginary part.
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

@@ -24,7 +24,8 @@ def spoiled() -> Motion:
 def test_a_violation_reads_as_one_sentence_with_everything_in_it():
     violation = next(v for v in check(spoiled(), MODEL).violations if v.condition.id == "joint.velocity")
     assert re.fullmatch(
-        r"joint 4: commanded velocity -?[\d.]+ rad/s exceeds 2\.175 rad/s at t = 0\.413 s, from t = 0\.412 s on for 2 ms "
+        r"joint 4: commanded velocity -?[\d.]+ rad/s exceeds 2\.175 rad/s at t = 0\.413 s, "
+        r"from t = 0\.412 s on for 2 ms "
         r"\(necessary condition\); the samples around this time jump: smooth them",
         str(violation),
     )

@@ -120,6 +120,18 @@ def test_an_edit_makes_the_plan_stale_in_words_and_undo_makes_it_good_again(benc
     assert obstacle(bench.store.state, bench.session.status()) is None
 
 
+def test_undo_of_soft_limits_is_sent_too():
+    with opened() as bench:
+        typed = (("setup.tool.z", "100"), ("setup.joints.lower.0", "-100"), ("setup.joints.lower.0", "-90"))
+        for field, text in typed:
+            bench.dispatcher.ask(TypeField(field=field, text=text))
+        wait(lambda: bench.session.status().setup.joints is not None, "the soft limits at the controller")
+        for _ in typed:
+            bench.dispatcher.ask(PressSetup(what="undo"))
+        wait(lambda: not bench.store.state.setup.can_undo, "everything undone")
+        wait(lambda: not pending_parts(bench.store.state, bench.session.status()), "the controller to have everything")
+
+
 def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     model, q = bench.store.state.model, np.array(bench.session.status().q_c)
     x, y, z = 1000.0 * model.forward(q).position

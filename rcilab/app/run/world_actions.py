@@ -10,8 +10,9 @@ from rcilab.app.app_state import AppState
 from rcilab.app.connection import Connection
 from rcilab.app.request import Handlers, Request
 from rcilab.app.run.active_force import no_push
+from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
-from rcilab.app.state_store import ROBOT_TROUBLE, StateStore
+from rcilab.app.state_store import StateStore
 from rcilab.app.status_text import explain_error
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 
+_SAFETY = "safety"  # Name of the notices of a pressed button.
 _WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
 
 
@@ -100,10 +102,11 @@ class WorldActions:
         if watch is not None and request.button in ("none", "estop", "gstop"):
             watch.ask(Press(request.button))
             status = self._store.state.world.status
-            if request.button != "none":
-                self._store.notify("warn", message(f"safety.{request.button}_done"), trouble=ROBOT_TROUBLE)
-            elif status is not None and status.button != "none":
-                self._store.notify("good", message(f"safety.{status.button}_over"), trouble=ROBOT_TROUBLE)
+            self._store.clear_notices(_SAFETY)
+            if request.button == "none" and status is not None and status.button != "none":
+                self._store.notify("good", message(f"safety.{status.button}_over"))
+            elif request.button != "none" and not is_moving(self._connection.status()):  # Else the stop is reported.
+                self._store.notify("warn", message(f"safety.{request.button}_done"), trouble=_SAFETY)
 
     def set_wiring(self, request: SetWiring) -> None:
         """Wires outputs to inputs, or stops commands at the soft limits; or ends that."""

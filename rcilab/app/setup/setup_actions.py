@@ -354,6 +354,8 @@ class SetupActions:
         touched |= frozenset(self._connection.status().setup.parts)  # Parts that were sent have to be reset there.
         if self._sender.is_underway:
             touched |= setup.touched
+        if before.joints is None and "joints" in touched:  # The controller knows soft limits, but not their absence.
+            before = before.updated(RobotConfiguration(joints=own_limits(self._store.state)))
         parts: set[SetupPart] = {p for p in LISTED if getattr(before, p) is not getattr(setup.wanted, p)}
         self._store.clear_problems(*(f"setup.{part}." for part in parts))
         self._take(replace(setup, wanted=before, touched=touched, inertia=None), parts)

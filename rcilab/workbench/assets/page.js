@@ -37,7 +37,13 @@
   const show = (message) => {
     const now = Date.now(), stays = (line) => now - line.at <= (TONES.indexOf(line.tone) > 0 ? WARNED : TOGETHER);
     const kept = toast.className ? lines.filter((line) => line.text !== message.text && stays(line)) : [];
-    lines = [...kept, { text: message.text, tone: message.tone, at: now }].slice(-3);
+    lines = [...kept, { text: message.text, tone: message.tone, at: now, serial: message.serial }].slice(-3);
+    drawToast();
+    toast.dataset.serial = message.serial || "";
+    clearTimeout(hideTimer);
+    hideTimer = setTimeout(hide, SHOWN);
+  };
+  const drawToast = () => {
     toast.replaceChildren(...lines.map((line) => {
       const said = document.createElement("p");
       said.className = "rl-" + line.tone;
@@ -45,10 +51,7 @@
       return said;
     }));
     toast.className = "rl-shown rl-" + TONES[Math.max(...lines.map((line) => TONES.indexOf(line.tone)))];
-    toast.dataset.serial = message.serial || "";
     place();
-    clearTimeout(hideTimer);
-    hideTimer = setTimeout(hide, SHOWN);
   };
   const hide = () => { toast.className = ""; };
 
@@ -184,7 +187,11 @@
     const serials = notices.map((said) => said.serial), newest = Math.max(0, ...serials);
     if (notice === null && !greeted) notice = newest;  // What was said before this page came is no news to it.
     if (notice > newest && !greeted) notice = 0;  // A workbench that has begun anew.
-    if (toast.dataset.serial && !serials.includes(Number(toast.dataset.serial))) hide();  // That trouble is over.
+    const left = lines.filter((line) => !line.serial || serials.includes(line.serial));  // Of troubles that are not over.
+    if (toast.className && left.length < lines.length) {
+      lines = left;
+      if (lines.length) drawToast(); else hide();
+    }
     notices.filter((said) => said.serial > notice && (said.page === null || (me && said.page === me.page))).forEach(show);
     keep("notice", notice = Math.max(notice, newest));
   };
