@@ -475,9 +475,7 @@ class RobotSession(Closeable):
 
     def _change_speed_override(self, speed_override: float) -> None:
         if (streamed := self._streamed) is None:
-            raise UsageError("no motion of execute() is in progress, so it cannot be paused, resumed or slowed").coded(
-                "no_pace"
-            )
+            raise UsageError("no motion of execute() is in progress whose speed override could change").coded("no_pace")
         streamed[1].change(speed_override)
 
     def control(

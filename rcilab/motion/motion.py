@@ -313,7 +313,9 @@ class Motion:
     def _repr_html_(self) -> str:
         text = Text(language(), SHARED)
         degrees = (
-            f"<tr><th>{name}</th>" + "".join(f"<td>{angle:.1f}</td>" for angle in np.degrees(q)) + "</tr>"
+            f"<tr><th>{name}</th>"
+            + "".join(f"<td>{text.units.format_angle(angle, 1)}</td>" for angle in q.tolist())
+            + "</tr>"
             for name, q in ((text("motion.start"), self.start), (text("motion.goal"), self.goal))
         )
         title = text("motion.caption", law=self.law, duration=self.duration, speed=self.speed)
