@@ -12,7 +12,6 @@ from rcilab.conformance.check import check
 from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
-from rcilab.core.limits import JointLimits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
@@ -110,10 +109,9 @@ def make_plan(
     via: Pose | None = None,
 ) -> Plan | Message:
     """Returns a motion from start to goal, checked except for collisions, or why planning failed."""
-    for place, q in (("start", start), ("goal", goal)):
-        joint = find_outside(model, q)
-        if joint is not None:
-            return _outside(place, model.limits.joint, joint, float(q[joint - 1]))
+    outside = explain_outside(model, "start", start) or explain_outside(model, "goal", goal)
+    if outside is not None:
+        return outside
     if float(np.abs(goal - start).max()) < SMALLEST_MOTION:
         return message("plan.here")
     if kind == "arc" and via is None:
@@ -146,7 +144,12 @@ def find_outside(model: RobotModel, q: JointVector) -> int | None:
     return int(outside[0]) + 1 if outside.size else None
 
 
-def _outside(place: str, limits: JointLimits, joint: int, angle: float) -> Message:
+def explain_outside(model: RobotModel, place: Literal["start", "goal"], q: JointVector) -> Message | None:
+    """Returns why no motion can start or end at joint angles, shape (n,), [rad]: a joint is out of its range."""
+    joint = find_outside(model, q)
+    if joint is None:
+        return None
+    limits, angle = model.limits.joint, float(q[joint - 1])
     soft = limits.exceeded_soft_limit(joint, angle)
     low, high = float(limits.lower[joint - 1]), float(limits.upper[joint - 1])
     if soft is not None:

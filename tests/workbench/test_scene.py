@@ -288,6 +288,10 @@ def test_a_typed_quaternion_turns_the_target_and_a_bad_one_is_answered(bench):
     bench.goal.type_field(TypeField(field="pose.wxyz", text="0 0 0 0"))
     assert bench.state.problems["pose.wxyz"].code == "parse.no_turn"
     assert bench.state.goal.target is target
+    bench.goal.type_field(TypeField(field="pose.x", text="500"))
+    assert "pose.wxyz" in bench.state.problems  # Still the orientation that it was typed for.
+    bench.goal.type_field(TypeField(field="pose.yaw", text="5"))
+    assert not bench.state.problems
 
 
 def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from rcilab.app.check.freshness import outdated
-from rcilab.app.goal.goal_actions import MoveJoint
+from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal
 from rcilab.app.request import TypeField
+from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.world_actions import SetWiring
+from rcilab.app.setup.configuration_state import pending_parts
 from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.text import Text
 from rcilab.execution.simulation_control import SimulationControl
@@ -35,6 +37,28 @@ def test_a_typed_limit_reaches_controller_and_plans_and_undo_takes_it_back(bench
     ask(PressSetup(what="undo"))
     wait(lambda: status().setup.joints.upper[0] == own, "the whole range at the controller")
     assert state().model.limits.joint.upper[0] == own
+
+
+def test_a_limit_that_leaves_the_goal_or_the_arm_outside_is_named_at_once() -> None:
+    with opened() as bench:
+        ask, state = bench.dispatcher.ask, lambda: bench.store.state
+        here = bench.session.status().q_c
+        assert here is not None
+        ask(MoveJoint(joint=0, angle=float(here[0]) + 0.5))
+        wait(lambda: state().goal.reach.tone == "good", "the goal")
+        ask(TypeField(field="setup.joints.upper.0", text=f"{np.degrees(here[0]) + 10.0:.2f}"))
+        wait(lambda: state().goal.reach.reason.code == "reach.at_soft", "the goal's new verdict")
+        assert state().goal.reach.reason.values["joint"] == 1
+        ask(PressSetup(what="undo"))
+        wait(lambda: state().goal.reach.tone == "good", "the old verdict")
+        ask(PoseGoal(name="here"))
+        wait(lambda: state().plan is None, "no plan at the goal")
+        ask(TypeField(field="setup.joints.upper.0", text=f"{np.degrees(here[0]) - 10.0:.2f}"))
+        wait(lambda: not pending_parts(state(), bench.session.status()), "the controller to have it")
+        reason = obstacle(state(), bench.session.status())
+        assert reason is not None
+        assert reason.code == "plan.start_soft"
+        assert reason.values["joint"] == 1
 
 
 def test_a_plan_that_was_checked_inside_other_limits_is_out_of_date(bench: Workbench) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -88,6 +88,13 @@ def goal_toward(
     """
     reach = evaluate_pose(model, target, near, psi)
     return Goal(q=reach.q, target=target, reach=reach, psi=_arm_angle(model, reach.q), snapped=snapped)
+
+
+def reevaluated(model: RobotModel, goal: Goal) -> Goal:
+    """Returns a goal with its status within other limits; one that missed its target is sought again."""
+    if goal.reach.short is not None:
+        return goal_toward(model, goal.target, goal.q, goal.psi)
+    return replace(goal, reach=evaluate_joints(model, goal.q))
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,9 @@ FURTHEST = 3.0  # [m] More than twice the reach of any arm, and the gizmo stays 
 SLOWEST = 0.01  # Lowest speed of plans, as a share of the limits.
 SETTLED = 0.15  # [s] A goal that has not changed for this time is taken as final.
 _FIELDS = ("joint.", "pose.", "psi")  # Beginnings of the names of the fields that a goal is typed into.
+_ANGLES = ("pose.roll", "pose.pitch", "pose.yaw")
+_REPLACED = {f"pose.{QUATERNION}": _ANGLES, **dict.fromkeys(_ANGLES, (f"pose.{QUATERNION}",))}
+"""Fields of the same orientation: a rejected text in them is about the previous one."""
 _ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use of a slider's keys.
 RESTED = 0.6  # [s] The same for a gizmo that is still held: the operator may only pause.
 
@@ -294,7 +297,7 @@ class GoalActions:
             self._store.set_problem(request.field, parsed.problem)
             return
         self._store.push_undo()
-        self._store.clear_problems(request.field)
+        self._store.clear_problems(request.field, *_REPLACED.get(request.field, ()))
         others = self._store.state.problems  # The texts of other fields stay there, to be corrected.
         act()
         self._store.update(problems=others)

@@ -99,6 +99,9 @@ class ModeActions:
             choose_mode(self._store, cast("Mode", request.mode))
             self._store.update(asked=None)
         if request.speed_override is not None and math.isfinite(request.speed_override):
+            typed = parse_number(f"{100.0 * request.speed_override:g}", 100.0 * MIN_SPEED_OVERRIDE, 100.0, "%")
+            if typed.problem is not None:
+                self._store.notify("warn", typed.problem, page=request.page)
             speed_override = min(max(request.speed_override, MIN_SPEED_OVERRIDE), 1.0)
             self._store.update(drive=replace(self._store.state.drive, speed_override=speed_override))
             self._wish.choose(speed_override, status)

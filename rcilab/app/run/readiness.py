@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_robot, is_only_planned
 from rcilab.app.check.freshness import outdated
-from rcilab.app.planning import find_outside
+from rcilab.app.planning import explain_outside, find_outside
 from rcilab.app.run.drive_state import destination, parameter_obstacle
 from rcilab.app.run.plan_readiness import arm_obstacle, ask_to_move, is_moving, plan_obstacle
 from rcilab.app.setup.configuration_state import setup_obstacle, tool_outside
@@ -39,7 +39,8 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     if resting is not None:
         return resting
     if state.plan is None:
-        return plan_obstacle(None, status.q_c)
+        outside = None if status.q_c is None else explain_outside(state.model, "start", status.q_c)
+        return outside or plan_obstacle(None, status.q_c)
     changed = outdated(state)
     if changed is not None:
         return changed

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 import numpy as np
 
 from rcilab.app.arm_features import explain_missing_part
-from rcilab.app.goal.goal import Goal, evaluate_joints, evaluate_pose
+from rcilab.app.goal.goal import Goal, evaluate_joints, evaluate_pose, reevaluated
 from rcilab.app.planning import Plan, tool_path
 from rcilab.app.request import Handlers, Request, TypeField
 from rcilab.app.robot_connection import RobotConnection
@@ -384,6 +384,8 @@ class SetupActions:
                 changes["goal"] = Goal(q=state.goal.q, target=target, reach=reach, psi=state.goal.psi)
                 if isinstance(state.plan, Plan):
                     changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
+            elif "joints" in parts:
+                changes["goal"] = reevaluated(model, state.goal)
         changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))
         self._store.update(**changes)
 

@@ -61,8 +61,8 @@ class ElbowPanel:
             self._ring.show(no_ring_html(state.model.redundancy, self._text) if elbow is None
                             else ring_html(elbow, self._text, is_nearest=is_nearest))  # fmt: skip
         sentence = problems_html(state, self._text, [("psi", "ψ")])
-        if goal.snapped is not None:
-            sentence += (
+        if goal.snapped is not None and not sentence:
+            sentence = (
                 f'<p class="rl-verdict rl-warn" role="status"><b>▲</b> {esc(self._text.render(goal.snapped))}</p>'
             )
         self._sentence.show(sentence)

@@ -175,11 +175,15 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
 
 
 def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
-    """Returns why a jog cannot begin, what ended the last one, or else the message on the goal."""
+    """Returns why a jog cannot begin, what ended the last one, or else the message on the goal.
+
+    The goal is not what a rejected number asks for: beside one it has no verdict.
+    """
     reason = no_jog(state, status) if state.jog.robot else None
     sentence = reason or state.jog.sentence
     if sentence is None:
-        return reach_html(state, text)
+        is_rejected = any(field.startswith("joint.") for field in state.problems)
+        return "" if is_rejected else reach_html(state, text)
     return f'<p class="rl-verdict rl-warn" role="alert"><b>▲</b> {esc(text.render(sentence))}</p>'
 
 
