@@ -54,6 +54,7 @@ def test_a_limit_that_leaves_the_goal_or_the_arm_outside_is_named_at_once() -> N
         ask(PoseGoal(name="here"))
         wait(lambda: state().plan is None, "no plan at the goal")
         ask(TypeField(field="setup.joints.upper.0", text=f"{np.degrees(here[0]) - 10.0:.2f}"))
+        wait(lambda: state().model.limits.joint.upper[0] < here[0], "the limit")
         wait(lambda: not pending_parts(state(), bench.session.status()), "the controller to have it")
         reason = obstacle(state(), bench.session.status())
         assert reason is not None
