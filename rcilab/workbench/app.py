@@ -180,6 +180,7 @@ class Workbench:
         async def _(client: viser.ClientHandle) -> None:
             ask(PageClosed(page=client.client_id))
             self.live.forget(client.client_id)
+            self.renderer.forget(client.client_id)
             self._views.pop(client.client_id, None)
 
     def _decorate(self, index: bytes) -> bytes:
@@ -192,6 +193,8 @@ class Workbench:
         elif isinstance(message, live.Home):
             self._bring_back(page)
         else:
+            if isinstance(message, live.Tab):
+                self.renderer.open_tab(page, message.index)
             self.dispatcher.ask(self._request_of(page, message))
 
     def _request_of(self, page: int, message: live.PageMessage) -> Request:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import TYPE_CHECKING, Any
@@ -60,8 +61,8 @@ if TYPE_CHECKING:
 _PERIOD = 1.0 / 30.0  # [s] The display's rate, which leaves processor time to the robot.
 _AT_REST = 0.25  # [s] Interval of counters and clocks while nothing else changes.
 _READ = 0.25
-"""[s] During a drag with light graphics, numbers and plots follow the arm after this time: a page with software
-rendering shows the arm only once it has applied all updates that came with it."""
+"""[s] Interval at which panels of closed tabs follow. During a drag with light graphics, all numbers and plots: a page
+with software rendering shows the arm only once it has applied all updates that came with it."""
 _MAIN_WIDTH, _TIMELINE_WIDTH = 352, 380  # [px]
 _TABS = (
     ("tab.jog", "adjustments-horizontal", JogPanel, ToolJogPanel, ArmStatePanel, PosesPanel),
@@ -111,6 +112,9 @@ class Renderer:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
+        self._places: list[int] = []  # Of each panel, the number of its tab.
+        self._open: dict[int, int] = {}  # Number of the open tab, by page. Owned by the event loop.
+        self._closed_shown = -math.inf  # [s] When the panels of closed tabs were last shown.
         self._tabs: list[PersistentTab] = []  # Those of the main panel, then that of the timeline's window.
         self._built: tuple[object, ...] | None = None
         self._theme = ""
@@ -136,6 +140,16 @@ class Renderer:
         self._ending.set()
         if self._thread is not None:
             self._thread.join(5.0)
+
+    def open_tab(self, page: int, index: int) -> None:
+        """Shows a tab as it is now, counted from 0: a page has opened it."""
+        self._open[page] = index
+        self._closed_shown = self._next = -math.inf
+        self._store.changed.set()
+
+    def forget(self, page: int) -> None:
+        """Forgets the open tab of a page that has closed."""
+        self._open.pop(page, None)
 
     def place_at(self, share: float) -> float:
         """Returns the place in the motion, 0 to 1, at a place of the plots' time axis."""
@@ -182,8 +196,12 @@ class Renderer:
 
     def _show_panels(self, state: UiState, seen: UiState, status: SupervisorStatus) -> None:
         self._goal, self._drawn, self._owed = state.goal, _traits(status), None
-        for panel in self._panels:
-            panel.show(seen if panel is self._timeline else state, status)
+        now, opened = time.monotonic(), {len(_TABS), *list(self._open.values())}
+        is_all = now - self._closed_shown >= _READ
+        self._closed_shown = now if is_all else self._closed_shown
+        for place, panel in zip(self._places, self._panels, strict=True):
+            if is_all or place in opened:
+                panel.show(seen if panel is self._timeline else state, status)
 
     def _build(self, state: UiState) -> None:
         """Creates the panels again: another language or unit changes texts, another arm its joints."""
@@ -193,17 +211,20 @@ class Renderer:
         self._text = Text(state.language, state.units)
         self._built = _looks(state)
         gui.set_panel_label(self._text("panel.main"))
-        self._panels = []
-        for tab, (label, _, *kinds) in zip(self._tabs, _TABS, strict=False):
+        self._panels, self._places = [], []
+        self._closed_shown = -math.inf
+        for place, (tab, (label, _, *kinds)) in enumerate(zip(self._tabs, _TABS, strict=False)):
             with tab.rebuild(self._text(label)):
                 for kind in kinds:
                     panel = kind(self._text, self._ask)
                     panel.build(gui, state)
                     self._panels.append(panel)
+                    self._places.append(place)
         self._timeline = TimelinePanel(self._text, self._ask)
         with self._tabs[-1].rebuild(self._text("panel.timeline")):
             self._timeline.build(gui, state)
         self._panels.append(self._timeline)
+        self._places.append(len(_TABS))
 
     def _lay_out(self, gui: Any) -> None:
         """Creates the containers of the panels; they stay as arranged by the operator."""
