@@ -41,7 +41,7 @@ _CODE_WSL = "WSL_DISTRO_NAME"  # Windows shares its loopback with that server.
 class KernelReachability:
     """How the browser reaches a page that the kernel serves on loopback."""
 
-    way: Route
+    route: Route
     """loopback: by its own address; proxy: through the notebook server; static: not at all."""
     base: str = "/"
     """Path of the notebook server, with slashes at both ends."""
@@ -56,7 +56,7 @@ class KernelReachability:
         Args:
             url: Its address on loopback, http://127.0.0.1:PORT/PATH.
         """
-        if self.way != "proxy":
+        if self.route != "proxy":
             return url
         port, _, path = url.removeprefix("http://").partition(":")[2].partition("/")
         if self.ports:
@@ -88,7 +88,7 @@ def find_reachability(
     """
     known = os.environ if environment is None else environment
     if "COLAB_RELEASE_TAG" in known:
-        return KernelReachability(way="static", proxy_helps=False)
+        return KernelReachability(route="static", proxy_helps=False)
     found = _find_server(known) if server is None else server
     hub = known.get("JUPYTERHUB_SERVICE_PREFIX")
     base = hub or (found.base if found is not None else "/")
@@ -100,8 +100,8 @@ def find_reachability(
         return _find_code_reachability(known, is_proxied)
     if is_proxied:
         installed = find_spec("jupyter_server_proxy") is not None if has_proxy is None else has_proxy
-        return KernelReachability(way="proxy" if installed else "static", base=base)
-    return KernelReachability(way="loopback")
+        return KernelReachability(route="proxy" if installed else "static", base=base)
+    return KernelReachability(route="loopback")
 
 
 def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) -> bool:
@@ -114,10 +114,12 @@ def _is_code(known: Mapping[str, str], server: Server | None, cell: str | None) 
 def _find_code_reachability(known: Mapping[str, str], is_proxied: bool) -> KernelReachability:
     ports = known.get(_CODE_PORTS, "")
     if _CODE_SERVER in known and _PORT in ports:
-        return KernelReachability(way="proxy", ports=ports)
+        return KernelReachability(route="proxy", ports=ports)
     is_remote = _CODE_REMOTE in known and _CODE_WSL not in known
     is_elsewhere = is_proxied or is_remote or any(name in known for name in _CODE_REMOTE_SIGNS)
-    return KernelReachability(way="static", proxy_helps=False) if is_elsewhere else KernelReachability(way="loopback")
+    return (
+        KernelReachability(route="static", proxy_helps=False) if is_elsewhere else KernelReachability(route="loopback")
+    )
 
 
 def _find_cell() -> str | None:

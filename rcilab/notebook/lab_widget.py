@@ -44,7 +44,7 @@ class Lab(Part):
         view: View of the scene, see `Scene`.
         height: Height of the scene, [px].
         language: "en" or "zh"; defaults to that of a given part, else of the notebook.
-        place: Where the browser runs; detected by default.
+        reachability: How the browser reaches the kernel; detected by default.
 
     Raises:
         InvalidValueError: The subject, the view or the language is unknown.
@@ -58,11 +58,11 @@ class Lab(Part):
         view: View = "auto",
         height: int = 440,
         language: str | None = None,
-        place: KernelReachability | None = None,
+        reachability: KernelReachability | None = None,
     ) -> None:
         super().__init__(subject, language)
         text = self.text
-        self.scene = Scene(self, view=view, height=height, place=place)
+        self.scene = Scene(self, view=view, height=height, reachability=reachability)
         self.timeline = Timeline(self)
         self.plot = MotionPlot(self)
         self.jog = JogPanel(self)

@@ -188,7 +188,7 @@ def preview(
         InvalidValueError: The pose is not n finite numbers.
     """
     if live is None:
-        live = find_reachability().way != "static"
+        live = find_reachability().route != "static"
     return Preview(motion, model, live=live, height=height, language=language)
 
 

@@ -42,7 +42,7 @@ class Scene(Part):
             if the browser can reach the kernel (see `rcilab.notebook.kernel_reachability`), else the animation.
         height: [px]
         language: "en" or "zh"; defaults to that of a given part, else of the notebook.
-        place: Where the browser runs; detected by default.
+        reachability: How the browser reaches the kernel; detected by default.
 
     Raises:
         InvalidValueError: The subject, the view or the language is unknown.
@@ -56,27 +56,29 @@ class Scene(Part):
         view: View = "auto",
         height: int = 420,
         language: str | None = None,
-        place: KernelReachability | None = None,
+        reachability: KernelReachability | None = None,
     ) -> None:
         if view not in VIEWS:
             raise InvalidValueError("view", view, f"is unknown; known: {', '.join(VIEWS)}")
         require_installed("meshcat", "Scene")
         super().__init__(subject, language)
-        place = place or find_reachability()
+        reachability = reachability or find_reachability()
         self.height = height
-        reachable = place.way == "loopback" or (place.way == "proxy" and view != "viser")
+        reachable = reachability.route == "loopback" or (reachability.route == "proxy" and view != "viser")
         self.is_live = view != "static" and reachable
         self._frame, self._note = block(), block()
         self._picture: _LivePicture | None = None
         self.build([self._frame, self._note], flex="0 0 auto", min_width="300px")
         if self.is_live:
             self._picture = _LivePicture(self, "viser" if view == "viser" else "meshcat")
-            self._write_frame(f'src="{html.escape(place.address(self._picture.url))}"')
+            self._write_frame(f'src="{html.escape(reachability.address(self._picture.url))}"')
             for topic in ("goal", "moment", "robot"):
                 self.subscribe(topic, self._picture.draw)
             self.subscribe("plan", self._picture.draw_path)
         else:
-            helps = "scene.static" if place.way == "static" and place.proxy_helps else "scene.static_here"
+            helps = (
+                "scene.static" if reachability.route == "static" and reachability.proxy_helps else "scene.static_here"
+            )
             write(self._note, soft(self.text("scene.asked" if view == "static" else helps)))
             self.subscribe("plan", self._show_animation)
 

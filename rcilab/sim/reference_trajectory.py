@@ -42,7 +42,7 @@ class ReferenceTrajectory:
         self.version = 0
         self._arrays: tuple[JointVector, JointVector, JointVector] | None = None
         self._arrays_version = -1
-        self.place(q)
+        self.reset(q)
 
     @property
     def arrays(self) -> tuple[JointVector, JointVector, JointVector]:
@@ -53,7 +53,7 @@ class ReferenceTrajectory:
             self._arrays, self._arrays_version = (rows[:n], rows[n : 2 * n], rows[2 * n :]), self.version
         return self._arrays
 
-    def place(self, q: Sequence[float]) -> None:
+    def reset(self, q: Sequence[float]) -> None:
         """Sets the commanded angles of a stationary arm."""
         self.q = list(q)
         self.dq = [0.0] * len(self.q)

@@ -43,7 +43,7 @@ class ToolKinematics:
         self.matrix: Matrix
         self.twist = self.acceleration = _REST
         self.psi = self.dpsi = self.ddpsi = 0.0
-        self.place(q)
+        self.reset(q)
 
     @property
     def pose(self) -> Pose:
@@ -60,7 +60,7 @@ class ToolKinematics:
         """Whether nothing changes as long as the joints do not move."""
         return not (any(self.twist) or any(self.acceleration) or self.dpsi or self.ddpsi)
 
-    def place(self, q: Sequence[float]) -> None:
+    def reset(self, q: Sequence[float]) -> None:
         """Sets a stationary arm."""
         self._terms = self._body.tool_motion(np.array(q), np.zeros(len(q)))
         self.matrix = self._terms.matrix

@@ -163,8 +163,8 @@ class VirtualArm:
     def reset(self, q: JointVector) -> None:
         """Places the stationary arm at other joint angles."""
         measured = self.plant.reset(readonly_copy(q))
-        self.commanded.place(measured.q.tolist())
-        self.tool_c.place(self.commanded.q)
+        self.commanded.reset(measured.q.tolist())
+        self.tool_c.reset(self.commanded.q)
         self._tool_version = self.commanded.version
         self._dq_before = measured.dq
         self.measured_state.configure(self.model, measured)
@@ -312,7 +312,7 @@ class VirtualArm:
             commanded.move(measured.q.tolist())
             self._move_tool()
         elif law is ControlLaw.BRAKED and measured.q.tolist() != commanded.q:
-            commanded.place(measured.q.tolist())
+            commanded.reset(measured.q.tolist())
             self._move_tool()
         self._law, self._dq_before = law, last.dq
         if law.is_compliant:

@@ -19,7 +19,7 @@ from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.processes import processes
 
 PRO7 = rcilab.load_model("xMatePro7")
-HERE = KernelReachability(way="loopback")
+HERE = KernelReachability(route="loopback")
 
 
 class Shell:
@@ -113,7 +113,7 @@ def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
     monkeypatch.setattr(cells, "_kernel_cells", owner)
 
     def run_cell() -> None:
-        scene = notebook.Scene(PRO7, place=HERE)
+        scene = notebook.Scene(PRO7, reachability=HERE)
         notebook.Timeline(scene)
         notebook.RunPanel(scene)
 
@@ -126,8 +126,8 @@ def test_fifty_re_runs_leave_no_thread_no_socket_no_widget_and_no_process(
             patch.setattr("rcilab.notebook.scene.ArmView", Unseen)
             for _ in range(times):
                 shell.run(run_cell, "cell")
-        shell.run(lambda: notebook.Lab(PRO7, place=HERE), "lab")
-        shell.run(lambda: notebook.Lab(PRO7, place=HERE), "lab")
+        shell.run(lambda: notebook.Lab(PRO7, reachability=HERE), "lab")
+        shell.run(lambda: notebook.Lab(PRO7, reachability=HERE), "lab")
         shell.run(lambda: notebook.RunPanel(PRO7), "robot").connect.click()
         assert shell.run(lambda: notebook.RunPanel(PRO7), "robot").state.robot is None
 

@@ -32,9 +32,9 @@ LOCAL = Server(hostname="127.0.0.1", base="/")
     ],
 )
 def test_the_rule_of_where_the_browser_is(
-    environment: dict[str, str], server: Server | None, has_proxy: bool, way: Route
+    environment: dict[str, str], server: Server | None, has_proxy: bool, route: Route
 ) -> None:
-    assert find_reachability(environment, server, has_proxy).way == way
+    assert find_reachability(environment, server, has_proxy).route == route
 
 
 CODE_CELL = "vscode-notebook-cell:/home/ann/arm.ipynb#W0sZmlsZQ%3D%3D"
@@ -59,9 +59,9 @@ CODE_SERVER = {
     ],
 )
 def test_who_asks_is_told_by_the_cell(
-    cell: str, environment: dict[str, str], server: Server | None, way: Route
+    cell: str, environment: dict[str, str], server: Server | None, route: Route
 ) -> None:
-    assert find_reachability(environment, server, True, cell).way == way
+    assert find_reachability(environment, server, True, cell).route == route
 
 
 @pytest.mark.parametrize(
@@ -78,23 +78,23 @@ def test_code_server_says_where_a_port_is(ports: str, address: str) -> None:
 
 def test_where_ports_are_shown_to_a_login_only_nothing_is_framed() -> None:
     known = {"VSCODE_PROXY_URI": CODE_SERVER["VSCODE_PROXY_URI"], "SSH_CONNECTION": "x", "VSCODE_PID": "7"}
-    assert find_reachability(known, None, True, CODE_CELL) == KernelReachability(way="static", proxy_helps=False)
+    assert find_reachability(known, None, True, CODE_CELL) == KernelReachability(route="static", proxy_helps=False)
 
 
 def test_the_cell_that_runs_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     told: dict[str, Any] = {"metadata": {"cellId": CODE_CELL}}
     monkeypatch.setattr("rcilab.notebook.kernel_reachability.shell", lambda: SimpleNamespace(get_parent=lambda: told))
     server = Server(hostname="127.0.0.1", base="/arm/")
-    assert find_reachability({}, server, True).way == "static"
+    assert find_reachability({}, server, True).route == "static"
     told["metadata"] = {}  # A press.
-    assert find_reachability({}, server, True).way == "proxy"
+    assert find_reachability({}, server, True).route == "proxy"
 
 
 def test_an_address_goes_below_the_notebook_server_behind_a_proxy() -> None:
     place = find_reachability({"JUPYTERHUB_SERVICE_PREFIX": "/user/ann/"}, None, True)
     assert place.address("http://127.0.0.1:4711/static/?plain") == "/user/ann/proxy/4711/static/?plain"
     assert (
-        KernelReachability(way="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
+        KernelReachability(route="loopback").address("http://127.0.0.1:4711/static/") == "http://127.0.0.1:4711/static/"
     )
 
 
@@ -106,7 +106,7 @@ def test_the_server_that_started_the_kernel_is_known_by_what_it_wrote(
     file = tmp_path / "jpserver-4711.json"
     file.write_text('{"hostname": "0.0.0.0", "base_url": "/arm/", "pid": 4711}', encoding="utf-8")
     started = {"JPY_PARENT_PID": "4711"}
-    assert find_reachability(started, None, True) == KernelReachability(way="proxy", base="/arm/")
-    assert find_reachability({"JPY_PARENT_PID": "1"}, None, True).way == "loopback"  # Some other program started it.
+    assert find_reachability(started, None, True) == KernelReachability(route="proxy", base="/arm/")
+    assert find_reachability({"JPY_PARENT_PID": "1"}, None, True).route == "loopback"  # Some other program started it.
     file.write_text('{"hostname": "0.0', encoding="utf-8")
-    assert find_reachability(started, None, True).way == "loopback"
+    assert find_reachability(started, None, True).route == "loopback"

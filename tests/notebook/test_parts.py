@@ -37,7 +37,7 @@ GOAL = PRO7.home + np.array([0.5, -0.4, 0.3, -0.6, 0.4, -0.5, 0.6])
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
-    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
+    with notebook.Lab(PRO7, reachability=KernelReachability(route="loopback")) as made:
         yield made
 
 
@@ -95,7 +95,7 @@ def open_tabs(lab: Lab) -> None:
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_no_place_in_a_sentence_is_left_unfilled(language: str) -> None:
-    with notebook.Lab(PRO7, language=language, place=KernelReachability(way="loopback")) as made:
+    with notebook.Lab(PRO7, language=language, reachability=KernelReachability(route="loopback")) as made:
         open_tabs(made)
         made.jog.q = GOAL
         made.plan.plan.click()
@@ -119,15 +119,15 @@ def test_a_part_speaks_as_the_notebook_unless_somebody_says_otherwise(
 
 def test_every_tab_of_a_lab_speaks_as_the_lab(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JPY_SESSION_NAME", "05_s_curves_and_limits.zh.ipynb")
-    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
+    with notebook.Lab(PRO7, reachability=KernelReachability(route="loopback")) as made:
         open_tabs(made)
         assert {part.text.language for part in made._parts} == {"zh"}
         assert "关节 1" in list(said_by(made.widget))
 
 
 def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_with_the_lab() -> None:
-    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")) as made:
-        assert [len(place.children) for place in made.tabs.children] == [1, 0, 0, 0, 0, 0]
+    with notebook.Lab(PRO7, reachability=KernelReachability(route="loopback")) as made:
+        assert [len(reachability.children) for reachability in made.tabs.children] == [1, 0, 0, 0, 0, 0]
         made.tabs.selected_index = 2
         assert made.tabs.children[2].children == (made.plan.widget,)
         run = made.run
@@ -140,16 +140,16 @@ def test_what_is_on_a_tab_is_made_once_when_it_is_opened_or_asked_for_and_ends_w
 
 
 def test_a_session_is_looked_after_before_its_tab_is_opened() -> None:
-    with rcilab.simulate(PRO7) as robot, notebook.Lab(robot, place=KernelReachability(way="loopback")) as made:
+    with rcilab.simulate(PRO7) as robot, notebook.Lab(robot, reachability=KernelReachability(route="loopback")) as made:
         assert made.tabs.selected_index == 0
         assert made.state.robot is not None
 
 
 def test_the_lab_opens_with_few_messages() -> None:
     # Each widget is a message to the browser.
-    with notebook.Lab(PRO7, place=KernelReachability(way="loopback")):
+    with notebook.Lab(PRO7, reachability=KernelReachability(route="loopback")):
         before = len(widget._instances)
-        with notebook.Lab(PRO7, place=KernelReachability(way="loopback")):
+        with notebook.Lab(PRO7, reachability=KernelReachability(route="loopback")):
             assert len(widget._instances) - before < 120
 
 
@@ -324,10 +324,10 @@ def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
 
 
 def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
-    fresh.plan.way.value = "line"
+    fresh.plan.route.value = "line"
     fresh.jog.q = PRO7.home + 0.1
     fresh.plan.plan.click()
-    fresh.plan.way.value = "joint"
+    fresh.plan.route.value = "joint"
     said = text_of(fresh.plan._sentence)
     assert "Passed" in said or "No plan" in said
 
@@ -368,7 +368,7 @@ def test_a_six_axis_arm_has_no_arm_angle() -> None:
 
 
 def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
-    with notebook.Scene(XMATE3, place=KernelReachability(way="static")) as scene:
+    with notebook.Scene(XMATE3, reachability=KernelReachability(route="static")) as scene:
         assert scene.url is None
         assert "srcdoc=" in scene._frame.value
         assert "jupyter-server-proxy" in text_of(scene._note)
@@ -378,18 +378,18 @@ def test_where_nothing_is_live_a_film_is_shown_and_said() -> None:
 
 
 def test_a_film_advises_nothing_that_does_not_help() -> None:
-    with notebook.Scene(XMATE3, place=KernelReachability(way="static", proxy_helps=False)) as scene:
+    with notebook.Scene(XMATE3, reachability=KernelReachability(route="static", proxy_helps=False)) as scene:
         assert "an animation of the plan" in text_of(scene._note)
         assert "jupyter-server-proxy" not in text_of(scene._note)
 
 
 def test_behind_a_proxy_the_frame_goes_through_it() -> None:
-    with notebook.Scene(XMATE3, place=KernelReachability(way="proxy", base="/user/ann/")) as scene:
+    with notebook.Scene(XMATE3, reachability=KernelReachability(route="proxy", base="/user/ann/")) as scene:
         assert 'src="/user/ann/proxy/' in scene._frame.value
 
 
 def test_a_viser_frame_shows_the_same_arm() -> None:
-    with notebook.Scene(XMATE3, view="viser", place=KernelReachability(way="loopback")) as scene:
+    with notebook.Scene(XMATE3, view="viser", reachability=KernelReachability(route="loopback")) as scene:
         assert scene.url is not None
         assert scene.url.startswith("http://127.0.0.1:")
         scene.state.pose(XMATE3.home + 0.1)

@@ -16,7 +16,7 @@ def moving(velocity: np.ndarray, acceleration: np.ndarray) -> tuple[ReferenceTra
     commanded = ReferenceTrajectory(LIMITS, [0.0] * 7)
     t = np.arange(-5, 1)[:, None] * 1e-3
     rows = velocity * t + acceleration * t * t / 2.0
-    commanded.place(rows[0].tolist())
+    commanded.reset(rows[0].tolist())
     for row in rows[1:]:
         commanded.move(row.tolist())
     return commanded, list(rows[2:])

@@ -112,11 +112,11 @@ def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], mode
     begins = rows["t"][0] <= 0.0
     if begins:  # Before the first command the arm stood still.
         q = np.concatenate((np.repeat(rows["q_c"][:1], _HISTORY, axis=0), q))
-    for place, violations in _judge_joints(q, rows["command_psi"], limits):
+    for row, violations in _judge_joints(q, rows["command_psi"], limits):
         for violation in violations:
             if violation.condition.fault in faults:
                 remark = violation.remark
-                t = float(rows["t"][place - _HISTORY * begins])
+                t = float(rows["t"][row - _HISTORY * begins])
                 sentence = f"{remark} in the joint angles that follow from the pose at t = {t:.3f} s"
                 return Remark(sentence, remark.code, **remark.facts)
     return _describe_nearest(faults, record["q_c"][-_FOLLOWED:], limits)
@@ -151,8 +151,8 @@ def _describe_nearest(faults: tuple[Fault, ...], q: Array, limits: Limits) -> st
     ):
         if fault in faults and len(q) > order:
             values = np.diff(q, order, axis=0) / CYCLE_TIME**order
-            place = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
-            joint, value, bound = int(place[1]) + 1, float(values[place]), float(bounds[place[1]])
+            index = np.unravel_index((np.abs(values) / bounds).argmax(), values.shape)
+            joint, value, bound = int(index[1]) + 1, float(values[index]), float(bounds[index[1]])
             return Remark(
                 f"of the joints that follow from the poses joint {joint} came nearest, with a commanded {name} of "
                 f"{value:.4g} {unit} before the pose that broke its bound ({bound:g} {unit})",
@@ -189,12 +189,12 @@ def _describe_commanded(faults: tuple[Fault, ...], record: NDArray[np.void], lim
             stood = {"command": rows["q_c"][0], "command_pose": values[0], "command_tau": np.zeros_like(values[0])}
             values = np.concatenate((np.repeat(stood[field][np.newaxis], _HISTORY, axis=0), values))
         first = len(values) - len(rows)
-        for place, violations in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
+        for row, violations in find(values, np.pad(rows["command_psi"], (first, 0), "edge"), limits):
             is_violated = is_violated or bool(violations)
             for violation in violations:
                 if violation.condition.fault in faults:
                     remark = violation.remark
-                    sentence = f"{remark} in the command at t = {rows['t'][place - first]:.3f} s"
+                    sentence = f"{remark} in the command at t = {rows['t'][row - first]:.3f} s"
                     return Remark(sentence, remark.code, **remark.facts), True
         return f"last command at t = {rows['t'][-1]:.3f} s, {describe(values)}", is_violated
     return "", is_violated
@@ -206,9 +206,9 @@ def _judge_joints(q: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, l
     dq = np.diff(q[:_HISTORY], axis=0) / CYCLE_TIME
     monitor = JointMonitor(limits.joint, RCI_JOINT_CONDITIONS)
     monitor.reset(q[2].tolist(), dq[1].tolist(), ((dq[1] - dq[0]) / CYCLE_TIME).tolist())
-    for place in range(_HISTORY, len(q)):
-        monitor.step(q[place].tolist())
-        yield place, monitor.violations()
+    for row in range(_HISTORY, len(q)):
+        monitor.step(q[row].tolist())
+        yield row, monitor.violations()
 
 
 def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
@@ -216,18 +216,18 @@ def _judge_poses(T: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, li
     poses = [_pose(matrix) for matrix in T]
     angles = [angle if math.isfinite(angle) else None for angle in psi.tolist()]
     monitor.reset(poses[0], angles[0])
-    for place in range(1, len(poses)):
-        monitor.step(poses[place], angles[place])
-        if place >= _HISTORY:  # The first differences only fill the monitor's memory.
-            yield place, monitor.violations()
+    for row in range(1, len(poses)):
+        monitor.step(poses[row], angles[row])
+        if row >= _HISTORY:  # The first differences only fill the monitor's memory.
+            yield row, monitor.violations()
 
 
 def _judge_torques(tau: Array, psi: Array, limits: Limits) -> Iterator[tuple[int, list[LimitViolation]]]:
     monitor = TorqueMonitor(limits.joint, RCI_TORQUE_CONDITIONS)
     monitor.reset(tau[0].tolist())
-    for place in range(1, len(tau)):
-        monitor.step(tau[place].tolist())
-        yield place, monitor.violations()
+    for row in range(1, len(tau)):
+        monitor.step(tau[row].tolist())
+        yield row, monitor.violations()
 
 
 def _describe_joints(q: Array) -> str:

@@ -34,7 +34,7 @@ def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, addres
     require_same_arm(dh, name, lengths, address)
 
 
-def await_first_state(link: RciConnection, place: RciAddress, local: tuple[str, int], timeout: float) -> None:
+def await_first_state(link: RciConnection, address: RciAddress, local: tuple[str, int], timeout: float) -> None:
     """Returns once a state has arrived.
 
     Raises:
@@ -42,10 +42,10 @@ def await_first_state(link: RciConnection, place: RciAddress, local: tuple[str, 
     """
     if not link.poll(timeout):
         raise ConnectionLostError(
-            f"{place} accepted the connection but sent no state to {local[0]}:{local[1]} within {timeout:g} s; check "
+            f"{address} accepted the connection but sent no state to {local[0]}:{local[1]} within {timeout:g} s; check "
             "that the teach pendant's RCI page names this computer's address and that no firewall drops UDP; if the "
             "robot sends to another port of ours, add ?client_port=N to its address"
-        ).coded("no_state", address=str(place), seconds=f"{timeout:g}")
+        ).coded("no_state", address=str(address), seconds=f"{timeout:g}")
 
 
 def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:

@@ -49,29 +49,31 @@ def rise(slope: float, top: float, count: int) -> Array:
     return np.minimum(slope * np.maximum(np.arange(count) - _PAUSE, 0), top)
 
 
-def joint_stream(start: Array, joint: int, way: Array) -> Callback:
-    """Returns a callback that moves one joint, counted from 0, along a path; at its end it stands still."""
+def joint_stream(start: Array, joint: int, displacement: Array) -> Callback:
+    """Returns a callback that adds to one joint, counted from 0, a displacement per cycle, [rad]; then it stands still."""
 
     def callback(state: RobotState, t: float) -> JointPosition:
         cycle = round(t / CYCLE_TIME)
         q = np.array(start)
-        q[joint] += way[min(cycle, len(way) - 1)]
-        return JointPosition(readonly_copy(q), finished=cycle >= len(way))
+        q[joint] += displacement[min(cycle, len(displacement) - 1)]
+        return JointPosition(readonly_copy(q), finished=cycle >= len(displacement))
 
     return callback
 
 
-def tool_stream(start: Pose, offset: Callable[[float], tuple[Array, Array]], way: Array, psi: float) -> Callback:
-    """Returns a callback that moves and turns the tool along a path: `offset` gives translation and rotation vector."""
+def tool_stream(
+    start: Pose, offset: Callable[[float], tuple[Array, Array]], displacement: Array, psi: float
+) -> Callback:
+    """Returns a callback that moves and turns the tool: `offset` gives translation and rotation vector for each displacement."""
     held = None if np.isnan(psi) else psi
 
     def callback(state: RobotState, t: float) -> CartesianPosition:
         cycle = round(t / CYCLE_TIME)
-        shift, turn = offset(float(way[min(cycle, len(way) - 1)]))
+        shift, turn = offset(float(displacement[min(cycle, len(displacement) - 1)]))
         T = start.matrix
         T[:3, 3] += shift
         T[:3, :3] = T[:3, :3] @ _rotation(turn)
-        return CartesianPosition(readonly_copy(T), psi=held, finished=cycle >= len(way))
+        return CartesianPosition(readonly_copy(T), psi=held, finished=cycle >= len(displacement))
 
     return callback
 
@@ -113,12 +115,14 @@ def _box(scene: Scene) -> Callback:
 
 
 def _elbow(scene: Scene) -> Callback:
-    way = path(rise(0.4, 20.0, 120))
+    displacement = path(rise(0.4, 20.0, 120))
     T, psi = scene.start.T_base_tool_c, scene.start.psi_c
 
     def callback(state: RobotState, t: float) -> CartesianPosition:
         cycle = round(t / CYCLE_TIME)
-        return CartesianPosition(T, psi=psi + float(way[min(cycle, len(way) - 1)]), finished=cycle >= len(way))
+        return CartesianPosition(
+            T, psi=psi + float(displacement[min(cycle, len(displacement) - 1)]), finished=cycle >= len(displacement)
+        )
 
     return callback
 
@@ -157,8 +161,8 @@ def _singular(scene: Scene) -> Callback:
     wrist = flange.position - arm[-1].d * flange.rotation[:, 2]
     outwards = wrist - np.array([0.0, 0.0, arm[0].d])
     outwards /= np.linalg.norm(outwards)
-    way = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))
-    return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), way, scene.start.psi_c)
+    displacement = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))
+    return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), displacement, scene.start.psi_c)
 
 
 def _torque_rate(scene: Scene) -> Callback:

@@ -89,8 +89,8 @@ def _elbow(scene: Scene) -> Callback:
     """Along the only path of the elbow while the tool is held."""
     model, q = scene.robot.model, scene.start.q
     still = np.linalg.svd(model.jacobian(q))[2][-1]
-    way = model.rigid_body.link_jacobian(q, _ELBOW_LINK, np.zeros(3))[:3] @ still
-    force = way / np.linalg.norm(way)
+    direction = model.rigid_body.link_jacobian(q, _ELBOW_LINK, np.zeros(3))[:3] @ still
+    force = direction / np.linalg.norm(direction)
     return pushed(scene, _ramp((*force.tolist(), 0.0, 0.0, 0.0), 500.0, 90.0), link=_ELBOW_LINK, tool=True)
 
 
