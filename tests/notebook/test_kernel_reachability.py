@@ -13,7 +13,7 @@ LOCAL = Server(hostname="127.0.0.1", base="/")
 
 
 @pytest.mark.parametrize(
-    ("environment", "server", "has_proxy", "way"),
+    ("environment", "server", "has_proxy", "route"),
     [
         ({}, LOCAL, False, "loopback"),
         ({}, LOCAL, True, "loopback"),
@@ -47,7 +47,7 @@ CODE_SERVER = {
 
 
 @pytest.mark.parametrize(
-    ("cell", "environment", "server", "way"),
+    ("cell", "environment", "server", "route"),
     [
         (CODE_CELL, {}, LOCAL, "loopback"),
         (CODE_CELL, {}, Server(hostname="127.0.0.1", base="/arm/"), "static"),  # Its page has not the server's paths.

@@ -50,7 +50,7 @@ def rise(slope: float, top: float, count: int) -> Array:
 
 
 def joint_stream(start: Array, joint: int, displacement: Array) -> Callback:
-    """Returns a callback that adds to one joint, counted from 0, a displacement per cycle, [rad]; then it stands still."""
+    """Returns a callback that adds a displacement per cycle, [rad], to one joint, counted from 0, and then stops."""
 
     def callback(state: RobotState, t: float) -> JointPosition:
         cycle = round(t / CYCLE_TIME)
@@ -64,7 +64,7 @@ def joint_stream(start: Array, joint: int, displacement: Array) -> Callback:
 def tool_stream(
     start: Pose, offset: Callable[[float], tuple[Array, Array]], displacement: Array, psi: float
 ) -> Callback:
-    """Returns a callback that moves and turns the tool: `offset` gives translation and rotation vector for each displacement."""
+    """Returns a callback that moves and turns the tool: `offset` turns a displacement into a motion of it."""
     held = None if np.isnan(psi) else psi
 
     def callback(state: RobotState, t: float) -> CartesianPosition:
