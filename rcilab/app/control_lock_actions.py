@@ -100,9 +100,7 @@ class ControlLockActions:
         if after.holder == page:
             self._announce(page)
         elif after.asking == page:
-            self._store.notify(
-                "good", message("control_lock.asked", page=lock.number(page), holder=lock.number(lock.holder))
-            )
+            self._store.notify("good", message("control_lock.asked", holder=lock.number(lock.holder)), page=page)
         else:
             self._store.notify("warn", message("control_lock.busy", page=lock.number(lock.asking)), page=page)
 

@@ -68,7 +68,18 @@ def _describe_reason(error: RcilabError, scope: str = "error") -> Message | Lite
         name: _describe_reason(fact, inner) if isinstance(fact, RcilabError) else fact
         for name, fact in error.facts.items()
     }
-    return message(f"{scope if error.code in _WITH_ADVICE else 'error'}.{error.code}", **_with_names(facts))
+    return message(
+        f"{scope if error.code in _WITH_ADVICE else 'error'}.{error.code}", **_with_names(_with_digits(facts))
+    )
+
+
+def _with_digits(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the facts, with the angle of a joint in the digits that show on which side of its bound it is."""
+    if "angle" not in facts or not {"low", "high"} <= facts.keys():
+        return dict(facts)
+    bounds = (facts["limit"],) if "limit" in facts else (facts["low"], facts["high"])
+    nearest = min(bounds, key=lambda bound: abs(bound - facts["angle"]))
+    return {**facts, "angle": ComparedValue(facts["angle"], nearest, "rad")}
 
 
 def _with_names(facts: Mapping[str, object]) -> dict[str, object]:

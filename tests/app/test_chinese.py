@@ -49,7 +49,7 @@ MODEL = load_model("xMatePro7")
 HOME = np.array(MODEL.home)
 KEYS = "position wxyz psi via type model start speed blend dwell rounds q1 q2 joint line arc circle nullspace spline"
 ARMS = "xMatePro7 xMatePro3 xMate3 MuJoCo"
-WORDS = "rcilab RCI IP UDP URDF JSON CSV UTF StartMove AutomaticErrorRecovery rci rad mm deg kg MB"
+WORDS = "rcilab RCI IP UDP URDF JSON CSV UTF StartMove AutomaticErrorRecovery MoveJ MoveL MoveC rci rad mm deg kg MB"
 NAMES = rf"{f'{ARMS} {KEYS} {WORDS}'.replace(' ', '|')}|[xyzw]\b"
 """What is called the same in every language: names of arms, protocols and keys, units."""
 

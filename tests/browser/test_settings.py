@@ -61,6 +61,8 @@ def test_a_warning_stays_beside_later_good_news_and_keeps_its_colour(page):
 
 
 def test_another_arm_stands_there_without_a_restart(page):
+    page.open_tab("Setup")
+    page.unfold("Soft joint limits")
     page.open_tab("Settings")
     choose(page, "Robot", "xMate3")
     page.wait(lambda: page.state.model.name == "xMate3", "the other model", 30)
@@ -68,6 +70,9 @@ def test_another_arm_stands_there_without_a_restart(page):
     page.wait(lambda: page.shows("live", page.status.q), "the other arm in the scene", 30)
     page.open_tab("Jog")
     page.wait(lambda: page.rows().get_by_role("slider").count() == 6, "six sliders")
+    page.open_tab("Setup")
+    page.wait(lambda: page.tab.get_by_text("J6 ≥", exact=False).is_visible(), "the unfolded group with its content")
+    page.tab.locator("[aria-expanded]:visible", has_text="Soft joint limits").click()
     page.open_tab("Settings")
     choose(page, "Robot", "xMatePro7")
     page.wait(lambda: page.status.q is not None and len(page.status.q) == 7, "the first arm again", 30)
@@ -98,6 +103,8 @@ def test_the_second_page_watches_asks_for_the_controls_and_is_given_them(page, c
     question = page.tab.get_by_role("alertdialog", name="Page 2 asks for the controls")
     question.wait_for()
     assert other.tab.get_by_role("alertdialog").count() == 0
+    other.wait(lambda: "You have asked page 1" in other.toast(), "the page that asks to be told so")
+    assert "asked page 1" not in page.toast()
     question.get_by_role("button", name="Keep them").click()
     other.wait(lambda: "was refused" in other.toast(), "the answer")
     other.button("Ask for the controls").first.click()

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import json
+import math
 import pickle
 from collections.abc import Iterator
 from pathlib import Path
 from string import Formatter
 
+import numpy as np
 import pytest
 
 import rcilab
+from rcilab.app.text import Text as PageText
 from rcilab.control_process.messages import as_sendable
 from rcilab.core.errors import CommandRejectedError, PlanningError, RcilabError, UnreachableError, UsageError
 from rcilab.i18n.catalogue import MAKERS, load_catalogue, merge_catalogues
@@ -90,8 +93,16 @@ def test_the_english_sentence_stays_and_facts_come_along():
         assert isinstance(said, Message)
         assert (said.code, said.values["number"]) == ("error.waypoint", 2)
         assert said.values["reason"] == describe_error(inner)
-        assert Text("zh", "rcilab.i18n").render(said) == "路点 2（直线）：机械臂正在运动：请先停止，或等待到达"
+        assert Text("zh", "rcilab.i18n").render(said) == "路点 2（MoveL）：机械臂正在运动：请先停止，或等待到达"
     assert describe_error(RcilabError("nobody named this")) == LiteralText("nobody named this")
+
+
+def test_an_angle_has_the_digits_that_show_that_it_is_beyond_its_limit():
+    low, high = np.radians([-170.0, 170.0]).tolist()
+    for angle, shown in ((170.0004, "170.0004°"), (171.25, "171.2°"), (-170.03, "-170.03°")):
+        error = PlanningError("").coded("path_limit", joint=1, angle=math.radians(angle), low=low, high=high)
+        said = PageText("en").render(describe_error(error))
+        assert said.startswith(f"joint 1 would exceed its limit, at {shown} (allowed: -170° to 170°)")
 
 
 def test_a_note_keeps_its_words_in_a_file_of_its_own():

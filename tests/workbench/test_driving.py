@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from rcilab.app.goal.goal_actions import MoveJoint, SetLaw, SetSpeed
+from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, SetLaw, SetSpeed
 from rcilab.app.request import TypeField
 from rcilab.app.run.drive_state import control_field
 from rcilab.app.run.mode_actions import PressControl, SetDrive
@@ -28,6 +28,8 @@ from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.health import histogram_html
+from rcilab.workbench.panels.outcome import progress_html
+from rcilab.workbench.panels.run import RunPanel
 from tests.workbench.opened import opened, told, wait
 
 MODEL = load_model("xMatePro7")
@@ -157,6 +159,9 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     execute(idle)
     idle.dispatcher.ask(RobotCommand(what="pause"))
     wait(lambda: idle.session.status().code == "moving.held", "the pause")
+    shown = idle.session.status()
+    share = f"{100.0 * shown.motion_plan_time / motion.duration:.0f}%"
+    assert f"width:{share}" in progress_html(idle.store.state, shown, Text("en"))
     idle.dispatcher.ask(SetDrive(mode="torque"))
     wait(lambda: told(idle) == "notice.moving", "the refusal of another mode in mid-motion")
     idle.dispatcher.ask(SetDrive(speed_override=0.7))
@@ -185,6 +190,14 @@ def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motio
     wait(lambda: idle.session.status().speed_override == pytest.approx(0.2), "the slow motion")
     idle.dispatcher.ask(RobotCommand(what="stop"))
     wait(lambda: idle.session.status().phase == "idle", "rest")
+
+
+def test_an_arm_at_its_goal_has_one_line_that_says_so(idle):
+    idle.dispatcher.ask(PoseGoal(name="here"))
+    wait(lambda: idle.store.state.plan is None, "no plan")
+    panel = next(panel for panel in idle.renderer._panels if isinstance(panel, RunPanel))
+    wait(lambda: "already at the goal" in panel._planned._shown, "the line")
+    assert panel._reason._shown == ""
 
 
 def test_a_stop_undoes_what_was_pressed_before_it_and_not_yet_looked_at(idle, monkeypatch):

@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,6 +27,7 @@ from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
+from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
 from rcilab.workbench.panels.program_list import list_html, notes_html
@@ -264,7 +266,7 @@ def test_an_error_names_the_waypoint_and_marks_it(square):
     before = square.state.plan
     square.plan()
     assert square.program.failed == key
-    assert "waypoint 2 (line)" in Text("en").render(square.program.answer)
+    assert "waypoint 2 (MoveL)" in Text("en").render(square.program.answer)
     assert square.state.plan is before
     assert "rl-failed" in list_html(square.state, square.program.draft, None, Text("en"))
 
@@ -306,8 +308,7 @@ def test_a_bad_file_is_answered_by_line_and_another_arms_by_name_and_nothing_is_
     problem = Text("en").render(square.state.problems["program.0.file"])
     assert "bad.json, line 9" in problem
     assert "waypoint 2" in problem
-    assert square.told == "program.not_loaded"
-    assert problem in Text("en").render(square.state.notice.text)
+    assert square.told == "program.loaded", "said once, beside the button"
     far = SQUARE.to_json().replace(str(list(SQUARE.waypoints[1].position)), "[55.0, 10.0, 4.0]")
     square.actions.load(LoadProgram(name="far.json", content=far.encode()))
     problem = Text("en").render(square.state.problems["program.0.file"])
@@ -380,6 +381,21 @@ def test_a_program_that_was_changed_since_is_not_executed(square):
     assert obstacle(square.state, status) is None
 
 
+def test_a_plan_names_the_rejected_number_that_it_would_not_have(square):
+    assert square.type("speed", "500") is not None
+    square.actions.plan(PlanProgram())
+    assert square.state.busy is None
+    said = Text("en").render(square.state.notice.text)
+    assert said.startswith("Not planned: waypoint 1, Speed [%]: 500 is outside 0.1 to 100 %.")
+    square.type("speed", "50")
+    square.type("rounds", "0")
+    square.actions.plan(PlanProgram())
+    assert square.told == "program.mend_rounds"
+    square.type("rounds", "1")
+    square.plan()
+    assert square.program.planned is square.program.draft
+
+
 def test_a_number_typed_again_leaves_plan_and_history_as_they_are(square):
     square.plan()
     assert square.type("blend", "-5") is not None
@@ -407,6 +423,15 @@ def test_why_a_program_failed_is_not_said_of_another_configuration(square):
     square.actions.tick()
     assert square.program.answer is None
     assert square.program.failed is None
+
+
+def test_a_changed_setup_is_not_taken_for_a_changed_program(square):
+    square.plan()
+    plan = square.state.plan
+    square.store.update(model=MODEL.with_load(Payload(mass=1.0)))
+    square.store.update(program=replace(square.program, planned=None))  # As after a plan that failed.
+    assert square.state.plan is plan
+    assert outdated(square.state).code == "ready.stale"
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ from rcilab.makers.configuration import SETUP_PARTS, RobotConfiguration
 from rcilab.makers.rokae import wire as rci
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.check import CheckPanel
+from rcilab.workbench.panels.jog import reach_html
 from rcilab.workbench.panels.program_list import list_html
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.target import TargetPanel, planned_html
@@ -168,8 +169,13 @@ def test_an_arm_that_stands_outside_the_box_is_told_so_in_setup_and_beside_execu
     assert obstacle(bench.store.state, bench.session.status()).code == "ready.stale"
     wait(lambda: "Out of date" in panel._planned._shown, "Setup to look")
     assert "Outside" not in panel._verdict._shown
+    assert "The controller uses what was set here: safety box" in panel._verdict._shown
     type_in(ask, box_xmax=f"{x - 74.03:.2f}")
     wait(lambda: "74.0 mm outside the safety box, past its +x face" in panel._verdict._shown, "Setup to say so")
+    ask(PoseGoal(name="here"))
+    verdict = "▲ Reachable, but</b> 74.0 mm outside the safety box, past its +x face"
+    assert verdict in reach_html(bench.store.state, Text("en"))
+    ask(PoseGoal(name="undo"))
     ask(PressCheck(what="again"))
     wait(lambda: obstacle(bench.store.state, bench.session.status()) is None, "a motion that leads in to be allowed")
     arrived = replace(bench.session.status(), q_c=bench.store.state.plan.motion.goal)

@@ -25,10 +25,12 @@ def outdated(state: UiState) -> Message | None:
     plan, program = state.plan, state.program
     if plan is None:
         return None
+    stale = plan.stale_parts(state.model, state.setup.wanted.box)
     if plan.program is not None and program.planned is not program.draft:
-        fails = program.planned is None and program.tone == "bad" and program.answer is not None
-        return message("ready.program_fails" if fails else "ready.program")
+        if program.planned is None and program.tone == "bad" and program.answer is not None:
+            return message("ready.program_fails")
+        if program.planned is not None or not stale:  # Without a plan of its own it may be the program of this plan.
+            return message("ready.program")
     if plan.program is not None and not program.draft.has_tool_of(state.model):
         return message("ready.program_tool")
-    stale = plan.stale_parts(state.model, state.setup.wanted.box)
     return message("ready.stale", what=name_parts(stale)) if stale else None

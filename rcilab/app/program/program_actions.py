@@ -86,6 +86,10 @@ class ProgramActions:
         if reason is not None:
             self._store.notify("warn", message(reason))
             return
+        rejected = self._find_rejected()
+        if rejected is not None:
+            self._store.notify("warn", rejected)
+            return
         assert program is not None
         assert start is not None
         job = Job(
@@ -169,10 +173,21 @@ class ProgramActions:
         """Cancels the planning in progress."""
         self._planner.cancel()
 
+    def _find_rejected(self) -> Message | None:
+        """Returns which typed number the program does not have, and why; None if it has all."""
+        for field, why in self._store.state.problems.items():
+            _, key, name = (*field.split("."), "", "")[:3]
+            number = self._history.draft.place(int(key)) if key.isdecimal() else None
+            if name == "rounds":
+                return message("program.mend_rounds", why=why)
+            if field.startswith("program.") and number is not None:
+                label = message(f"program.field.{name}")
+                return message("program.mend", number=number + 1, field=label, why=why)
+        return None
+
     def _refuse_file(self, why: Message) -> None:
-        """Shows on every tab why a file was not loaded; on this one until the next file, edit or plan."""
+        """Shows why a file was not loaded, until the next file, edit or plan."""
         self._store.set_problem(FILE_FIELD, why)
-        self._store.notify("bad", message("program.not_loaded", why=why))
 
     def _drop_planning(self) -> bool:
         if self._planner.progress is None:

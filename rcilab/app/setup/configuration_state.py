@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,7 @@ from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.robots import describe_robot
 
 if TYPE_CHECKING:
+    from rcilab.app.goal.goal import Tone
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
 
@@ -113,6 +114,15 @@ def tool_outside(state: UiState, position: np.ndarray) -> Message | None:
         return None
     face, distance = box.exceeded_face(position)
     return message("ready.outside", distance=distance, face=face) if distance > _SEEN else None
+
+
+def goal_verdict(state: UiState) -> tuple[Tone, Message]:
+    """Returns whether the target is reachable, and why, with the safety box."""
+    reach, outside = state.goal.reach, tool_outside(state, state.goal.target.position)
+    if outside is None or reach.tone == "bad":
+        return reach.tone, reach.reason
+    sentence = replace(outside, code="reach.outside")
+    return "warn", sentence if reach.tone == "good" else message("reach.both", first=reach.reason, second=sentence)
 
 
 def name_parts(parts: tuple[str, ...]) -> Message:

@@ -12,6 +12,7 @@
     document.querySelectorAll(HEAD).forEach((head) => {
       const name = head.textContent.trim(), open = head.querySelector("svg").classList.contains("tabler-icon-chevron-up");
       if (!seen.has(head)) {
+        if (head.getClientRects().length === 0) return;  // Of a tab that is not open: viser would unfold it to no height.
         const wanted = name in folds ? folds[name] : open;
         seen.set(head, wanted);
         if (wanted !== open) head.click();
@@ -24,6 +25,6 @@
   };
   let timer = 0;
   const later = () => { if (!timer) timer = setTimeout(() => { timer = 0; sweep(); }, PAUSE); };
-  const watch = () => { new MutationObserver(later).observe(document.body, { childList: true, subtree: true }); later(); };
+  const watch = () => { new MutationObserver(later).observe(document.body, { childList: true, subtree: true, attributes: true, attributeFilter: ["aria-selected"] }); later(); };
   if (document.body) watch(); else document.addEventListener("DOMContentLoaded", watch);
 })();

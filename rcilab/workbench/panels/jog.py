@@ -12,6 +12,7 @@ from rcilab.app.goal.goal_actions import MoveJoint
 from rcilab.app.jog.jog_actions import SetJog
 from rcilab.app.jog.jog_state import AXES, FASTEST_JOINT, FASTEST_TOOL, FRAMES, STEPS, HoldJog, PressJog, no_jog
 from rcilab.app.request import Request
+from rcilab.app.setup.configuration_state import goal_verdict
 from rcilab.app.text import Text
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.translator import with_space
@@ -198,9 +199,9 @@ def problems_html(state: UiState, text: Text, fields: list[tuple[str, str]]) -> 
 
 def reach_html(state: UiState, text: Text) -> str:
     """Returns the status of the target, with its tone as a word and as a sign."""
-    reach = state.goal.reach
-    lead, reason = with_space(text("reach.tone." + reach.tone), text.render(reach.reason))
-    return f'<p class="rl-verdict rl-{reach.tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'
+    tone, why = goal_verdict(state)
+    lead, reason = with_space(text("reach.tone." + tone), text.render(why))
+    return f'<p class="rl-verdict rl-{tone}"><b>{esc(lead)}</b>{esc(reason)}</p>'
 
 
 def _joint_request(joint: int, factor: float):  # type: ignore[no-untyped-def]

@@ -30,7 +30,8 @@ def progress_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     )
     if status.code == "moving.held":
         sentence = text("run.held", place=f"{status.motion_plan_time:.1f}")
-    share = min(max(status.motion_plan_time / status.motion_duration, 0.0), 1.0)
+    duration = status.motion_duration if state.plan is None else state.plan.motion.duration
+    share = min(max(status.motion_plan_time / duration, 0.0), 1.0)
     return f'<p class="rl-note" role="status">{esc(sentence)}</p>{_bar(share)}'
 
 

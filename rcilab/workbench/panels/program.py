@@ -10,7 +10,7 @@ import numpy as np
 
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram
-from rcilab.app.program.program_draft import FILE_FIELD, Draft, Note, ProgramState, describe_place, number_at
+from rcilab.app.program.program_draft import Draft, Note, ProgramState, describe_place, number_at
 from rcilab.app.program.waypoint_fields import WAYPOINT_FIELDS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import time_shown
@@ -52,7 +52,6 @@ class ProgramPanel:
                     text(f"program.add_{source}"), icon=icon, hint=text(f"program.add_{source}_hint")
                 )
                 on_press(button, ask, _edit("add", source=source))
-        self._refused = Html(gui)
         self._list = Html(gui)
         with gui.add_folder(text("program.tools")):
             gui.add_html('<i class="rl-tools rl-bare"></i>')
@@ -90,7 +89,6 @@ class ProgramPanel:
         if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
             self._list.show(list_html(state, draft, running, text))
-        self._refused.show(problems_html(state, text, [(FILE_FIELD, text("program.load"))]))
         place, count = draft.place(program.selected), len(draft.steps)
         able = {
             "up": place is not None and place > 0, "down": place is not None and place < count - 1,
@@ -110,9 +108,7 @@ class ProgramPanel:
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
         sentence = problems_html(state, text, self._typed(program))
-        if FILE_FIELD in state.problems:  # The message below is about the program that the file did not replace.
-            sentence += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
-        elif sentence:  # A verdict beside it would seem to be about the number that was not taken.
+        if sentence:  # A verdict beside it would seem to be about the number that was not taken.
             sentence += f'<p class="rl-note">{esc(text("program.rejected"))}</p>'
         elif plan is not None:
             where = describe_place(plan, t)

@@ -56,6 +56,7 @@ class ProgramFilePanel:
                 text("program.script"), icon="brand-python", color="gray", hint=text("program.script_hint")
             )
             on_press(self._python, ask, lambda page: EditProgram(page=page, what="script"))
+            self._problems = Html(gui)  # Beside the button that was pressed.
             self._name = NumberField(
                 gui.add_text(text("program.name"), "", hint=text("program.name_hint")), ask, "program.0.name"
             )
@@ -63,7 +64,6 @@ class ProgramFilePanel:
                 text("program.take_tool"), icon="tool", color="gray", hint=text("program.take_tool_hint"), visible=False
             )
             on_press(self._tool, ask, lambda page: EditProgram(page=page, what="tool"))
-            self._problems = Html(gui)
             self._script = Html(gui)
             self._fetch = gui.add_button(text("program.script_save"), icon="download", color="gray", visible=False)
             self._fetch.on_click(lambda event: self._send(event, "py"))
@@ -80,7 +80,10 @@ class ProgramFilePanel:
         self._tool.visible = there and not draft.has_tool_of(state.model)
         self._name.show(draft.name, state.problems.get(self._name.field), state.entered)
         labels = [(FILE_FIELD, text("program.load")), ("program.0.name", text("program.name"))]
-        self._problems.show(problems_html(state, text, labels))
+        sentence = problems_html(state, text, labels)
+        if FILE_FIELD in state.problems:
+            sentence += f'<p class="rl-note">{esc(text("program.stays"))}</p>'
+        self._problems.show(sentence)
         is_shown = there and state.program.is_script_shown
         self._python.label = text("program.script_hide" if is_shown else "program.script")
         self._fetch.visible = is_shown

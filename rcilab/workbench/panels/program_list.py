@@ -35,7 +35,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         return f'<div class="rl-steps-none"><b>{esc(text("program.none"))}</b>{esc(text("program.none_long"))}</div>'
     arm = draft.arm(state.model)
     heads = "".join(
-        f'<span title="{esc(text(f"program.head.{name}_long"))}">{esc(text(f"program.head.{name}"))}</span>'
+        f'<span title="{esc(text(f"program.head.{name}_long"))}">{_head(text(f"program.head.{name}"))}</span>'
         for name in _HEADS
     )
     notes = state.program.notes
@@ -91,6 +91,12 @@ def _start_row(draft: Draft, arm: RobotModel, running: bool, text: Text) -> str:
         f'<div class="rl-step rl-start{look}" role="presentation"><span>0</span><span>{name}</span>'
         f"<span>{position}</span></div>"
     )
+
+
+def _head(label: str) -> str:
+    """Returns the label of a column as HTML; x, y and z stand above their numbers."""
+    parts = label.split(" ", 2)
+    return "".join(f"<b>{esc(part)}</b>" for part in parts) if len(parts) == 3 else esc(label)
 
 
 def _cells(waypoint: Waypoint, arm: RobotModel, text: Text) -> tuple[str, ...]:

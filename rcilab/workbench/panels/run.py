@@ -118,6 +118,7 @@ class RunPanel:
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
         is_said = moving or reason in (outdated(state), connection_note(state, status))  # The bar shows that it moves.
+        is_said |= reason is not None and reason.code == "ready.no_plan" and state.no_plan is not None
         unsaid = None if is_said else reason
         self._reason.show(why_html(text, unsaid))
         is_program = state.plan is not None and state.plan.program is not None

@@ -12,6 +12,7 @@ from rcilab.app.setup.configuration_state import (
     describe_held,
     describe_part,
     differing_tool,
+    name_parts,
     pending_parts,
     setup_obstacle,
     tool_outside,
@@ -95,8 +96,10 @@ class SetupPanel:
         if any(field.startswith("setup.") for field in state.problems):
             return _verdict("warn", text("setup.rejected"), text("setup.rejected_long"))
         if not setup.touched:
-            return f'<p class="rl-note">{esc(text("setup.untouched"))}</p>'
-        return _verdict("good", text("setup.given"), text("setup.given_long"))
+            sentence = text("setup.untouched") + ("" if setup.edited else text("setup.untouched_choose"))
+            return f'<p class="rl-note">{esc(sentence)}</p>'
+        sent = name_parts(tuple(part for part in LISTED if part in setup.touched))
+        return _verdict("good", text("setup.given"), text("setup.given_long", what=text.render(sent)))
 
     def _outside_html(self, state: UiState, status: SupervisorStatus) -> str:
         """Returns that the arm itself is outside the safety box, if it is."""

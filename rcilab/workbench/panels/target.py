@@ -95,5 +95,5 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if aside is not None:
         tone, sentence = "warn" if report.ok else tone, sentence + ". " + text.render(aside)
     if plan.note is not None:
-        sentence += (" " if report.ok else ". ") + text.render(plan.note)
+        sentence += (" " if sentence[-1:] in ".。" else ". ") + text.render(plan.note)
     return f'<p class="rl-verdict rl-{tone}"><b>{esc(text(word))}</b> {esc(sentence)}</p>'

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.app.goal.goal_actions import MoveTarget
+from rcilab.app.setup.configuration_state import goal_verdict
 from rcilab.app.text import Text
 from rcilab.i18n.translator import with_space
 from rcilab.workbench.scene.configuration_view import hides_target
@@ -94,11 +95,12 @@ class GoalView:
             self._target = goal.target
             self._label.position = _below(goal.target.position)
             self._mark.position = goal.target.position
-        if goal.reach.tone != self._tone:
-            self._tone = goal.reach.tone
+        tone, why = goal_verdict(state)
+        if tone != self._tone:
+            self._tone = tone
             self._mark.color = TONE_COLORS[self._tone]
-        tone, reason = goal.reach.tone, text.render(goal.reach.reason)
-        sentence = text("reach.label") if tone == "good" else "".join(with_space(text("reach.tone." + tone), reason))
+        lead = text("reach.tone." + tone)
+        sentence = text("reach.label") if tone == "good" else "".join(with_space(lead, text.render(why)))
         sentence = text("target.handles", verdict=sentence)
         if sentence != self._sentence:
             self._sentence = sentence
