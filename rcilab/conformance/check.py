@@ -145,10 +145,11 @@ class _MotionChecker:
         value = float(values[row, column])
         ok = bool(((lower < smallest) & (largest < upper)).all())
         is_violated = None if ok else ~((lower < values) & (values < upper))
+        bound = _nearest_bound(value, lower, upper, column)
         result = ConditionResult(
-            condition=condition,
+            condition=self._with_source(condition, column, bound),
             value=value,
-            bound=_nearest_bound(value, lower, upper, column),
+            bound=bound,
             ratio=float(reach[column]),
             joint=_axis(condition, column),
             time=first_time + row * CYCLE_TIME,
@@ -163,6 +164,12 @@ class _MotionChecker:
             runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # Only the worst.
         ratio = self._ratio(values, lower, upper)
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
+
+    def _with_source(self, condition: Condition, column: int, bound: float) -> Condition:
+        """Returns the condition, with the source of its bound if that is not the arm's own."""
+        if condition.signal != "joint" or condition.order or self._limits.joint.is_own(column + 1, bound):
+            return condition
+        return replace(condition, source=self._limits.source("joint.upper"))
 
     def usage(self, conditions: tuple[Condition, ...]) -> Usage:
         """Returns the worst of the necessary conditions on every row of the motion, by row."""

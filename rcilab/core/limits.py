@@ -51,6 +51,11 @@ class JointLimits:
         inwards = getattr(self, side)[joint - 1] - getattr(self.own, side)[joint - 1]
         return bool((inwards if side == "lower" else -inwards) > _ROUNDING)
 
+    def is_own(self, joint: int, bound: float) -> bool:
+        """Returns whether a bound of the angle of a joint, counted from 1, is the arm's own, not one that was set."""
+        own = self.own
+        return own is None or min(abs(bound - angle[joint - 1]) for angle in (own.lower, own.upper)) <= _ROUNDING
+
     def exceeded_soft_limit(self, joint: int, angle: float) -> float | None:
         """Returns the soft limit that an angle of a joint, counted from 1, reaches or exceeds, [rad], or None."""
         lower, upper = float(self.lower[joint - 1]), float(self.upper[joint - 1])

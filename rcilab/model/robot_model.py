@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.model.kinematics.collision import Clearance, CollisionGeometry
 
-_SOFT_LIMIT = "soft limit that was set at the controller"
+_SET_LIMIT = "limit that was set, not the arm's own"
 
 __all__ = ["RobotModel", "load_model", "require_model"]
 
@@ -129,7 +129,8 @@ class RobotModel(ReachingArm):
     def with_joint_limits(self, lower: ArrayLike, upper: ArrayLike) -> RobotModel:
         """Returns this arm with other bounds of its joint angles, such as soft limits (SetJointLimit).
 
-        Planners, solvers and `check` use them, and a certificate is valid for them only.
+        Planners, solvers and `check` use them, and a certificate is valid for them only. They may be wider than the
+        arm's own, at which its controller stops all the same.
 
         Args:
             lower: Shape (n,), [rad].
@@ -144,7 +145,7 @@ class RobotModel(ReachingArm):
                 f"lower, joint {joint + 1}", float(low[joint]), f"must be below {high[joint]:g} [rad]"
             )
         limits = self.limits
-        sources = {**limits.sources, "joint.lower": _SOFT_LIMIT, "joint.upper": _SOFT_LIMIT}
+        sources = {**limits.sources, "joint.lower": _SET_LIMIT, "joint.upper": _SET_LIMIT}
         joint = replace(limits.joint, lower=low, upper=high, own=limits.joint.own or limits.joint)
         limits = replace(limits, joint=joint, sources=MappingProxyType(sources))
         description = replace(self.description, limits=limits)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
+from rcilab.conformance.explain import explain_source
 from rcilab.conformance.html import COLORS
 from rcilab.conformance.report import Report
 from rcilab.i18n.rounding import format_pair
@@ -55,6 +56,16 @@ def test_rows_name_joint_time_value_bound_and_source():
     assert row.source == "RCI manual V1.3.1, 4.1 and 4.4"
     step = motion.q[round(row.time * 1000)] - motion.q[round(row.time * 1000) - 1]
     assert row.value == pytest.approx(step[row.joint - 1] / 0.001, rel=1e-9)
+
+
+def test_the_manual_is_the_source_of_the_arm_s_own_limits_only():
+    own = MODEL.limits.joint
+    for change, source in ((0.5, "limit that was set, not the arm's own"), (0.0, "RCI manual V1.3.1, 4.1 and 4.4")):
+        for lower, upper in ((own.lower - change, own.upper + change), (own.lower + change, own.upper - change)):
+            rows = {row.id: row for row in check(GOOD, MODEL.with_joint_limits(lower, upper)).rows}
+            assert rows["joint.position"].source == source
+            assert rows["joint.velocity"].source == "RCI manual V1.3.1, 4.1 and 4.4"
+            assert explain_source(rows["joint.position"].condition, "zh") != source
 
 
 def test_the_text_says_the_verdict_and_lists_every_condition():
