@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, drop_unread_output, show
-from rcilab.core.errors import RcilabError, RecordedError, UsageError
+from rcilab.core.errors import ControlError, InvalidValueError, RcilabError, RecordedError, UsageError
 from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 _DONE, _NOT_DONE = 0, 1
 _TO_START_SPEED = 0.2  # Fraction of the limits; slow, because this path is not part of the program.
+_TO_START = "rcilab run --to-start moves the arm to the start of the file, after a confirmation"
+_CLEAR = "rcilab run --to-start clears the fault and moves the arm to the start of the file, after a confirmation"
 _STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # Ctrl-C, kill, a closed terminal.
 
 
@@ -55,6 +57,13 @@ def add_parser(subparsers: Any) -> None:
         "--json",
         action="store_true",
         help="print one JSON object, also about an error; SI units; reports and questions go to stderr",
+    )
+    parser.add_argument(
+        "--save",
+        type=Path,
+        metavar="OUT",
+        help="write the recorded run, also of a motion that a fault ends: .rcirun for rcilab replay, .csv, .npz, "
+        ".parquet, .mcap or .html; with --to-start the last motion",
     )
     add_max_rows(parser)
     parser.add_argument(
@@ -134,7 +143,12 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     from rcilab.execution.command_validation import find_start_mismatch
     from rcilab.execution.session import connect
     from rcilab.model.robot_model import load_model
+    from rcilab.recording.export import require_ending
 
+    if args.save is not None:
+        require_ending(args.save.suffix)
+        if not args.save.parent.is_dir():  # Before anything moves.
+            raise InvalidValueError("--save", str(args.save), "is in a folder that does not exist")
     found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None
     with connect(args.robot, model, args.timeout) as robot:
@@ -145,13 +159,10 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             raise UsageError(
                 f"{args.file} has {motion.n} joints and {robot.model.name} has {robot.model.n}: it is for another arm"
             )
-        mismatch = find_start_mismatch(motion.q[0], state.q_c)
-        if mismatch is None or not args.to_start:
-            if mismatch is not None:  # Before the report, whose violations would all have this cause.
-                faults = f"the controller reports {name_faults(state.faults)}, and " if state.faults else ""
-                raise UsageError(
-                    f"{faults}{mismatch}; in the shell, rcilab run --to-start does that after a confirmation"
-                )
+        mismatch = find_start_mismatch(motion.q[0], state.q_c, _TO_START)
+        if not args.to_start:  # Before the report, whose violations would all have this cause.
+            _require_ready(mismatch, robot, state)
+        if mismatch is None:
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
@@ -183,6 +194,14 @@ def _show_json(
 def _text_stream(args: Namespace) -> TextIO:
     """Returns the stream for text: with --json, stdout is reserved for the JSON."""
     return sys.stderr if args.json else sys.stdout
+
+
+def _require_ready(mismatch: str | None, robot: RobotSession, state: RobotState) -> None:
+    faults = f"the controller reports {name_faults(state.faults)}" if state.faults else ""
+    if mismatch is not None:
+        raise UsageError(f"{faults}, and {mismatch}" if faults else mismatch)
+    if faults and robot.is_powered():  # Without power, switching it on can clear them.
+        raise UsageError(f"{faults}; {_CLEAR}")
 
 
 def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[Motion]:
@@ -238,16 +257,34 @@ def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespac
         result = stopper.execute(robot, motion, report.certificate)
     except RecordedError as error:
         moves.append(_Move(outcome="failed", report=report, run=error.run))
+        error.advice = _save_after_error(error.run, args)
+        if isinstance(error, ControlError) and error.faults:
+            error.advice = f"{_CLEAR}; {error.advice}"
         raise
     if not args.json:
         show(result)
     if result.stopped:
         print(
-            f"stopped {result.stopped} at t = {result.duration:.2f} s; the arm is at rest; plan the next motion from "
-            "its position (robot.state.q_c), or move it to the start of a file: rcilab run FILE --to-start",
+            f"stopped {result.stopped} at t = {result.duration:.2f} s; the arm is at rest; {_TO_START}",
             file=sys.stderr,
         )
     moves.append(_Move(outcome="stopped" if result.stopped else "done", report=report, run=result))
+    if args.save is not None:
+        result.save(args.save)
+        print(f"written: {args.save}", file=out)
+
+
+def _save_after_error(run: Run | None, args: Namespace) -> str:
+    """Writes the run up to an error, if that is wanted; returns where it is, or how to get it the next time."""
+    if run is None:
+        return "no cycle was recorded"
+    if args.save is None:
+        return "with --save FILE.rcirun the recorded run is written, also of a motion that ends like this"
+    try:
+        run.save(args.save)
+    except RcilabError as problem:  # The fault matters more.
+        return f"the run was not saved: {problem}"
+    return f"the run is in {args.save}"
 
 
 def _refuse(report: Report, args: Namespace) -> _Move:

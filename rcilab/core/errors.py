@@ -156,13 +156,18 @@ class RecordedError(RcilabError):
         record: The last cycles before the end, a structured array, one row per cycle; or None.
         run: The whole motion up to its end, an `rcilab.Run`, to plot, save and replay; None without a motion, or
             if it ran in another process.
+        advice: The end of the message: what to do next, with the calls of Python. A user interface sets its own.
     """
 
     run: Any = None
+    advice: str = ""
 
     def __init__(self, message: str, record: Any = None) -> None:
         super().__init__(message)
         self.record = record
+
+    def __str__(self) -> str:
+        return "; ".join(filter(None, (super().__str__(), self.advice)))
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the last cycles to a file; its ending selects the format: .csv or .npz. `run.save` writes all.

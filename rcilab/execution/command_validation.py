@@ -20,6 +20,10 @@ from rcilab.core.state import RobotState
 START_TOLERANCE = 1e-6  # [rad] or [m] Such an offset makes a jerk of 1000 rad/s^3, below every limit.
 _ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, except for the sign of zero.
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
+_START_ADVICE = (
+    "plan the motion from robot.state.q_c, or move the arm to its start first: "
+    "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
+)
 
 
 def require_command(command: Any, kind: type[Command], n: int, t: float) -> Command:
@@ -50,12 +54,13 @@ def require_command(command: Any, kind: type[Command], n: int, t: float) -> Comm
     return CartesianPosition(T, command.psi, command.finished)
 
 
-def find_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
+def find_start_mismatch(start: JointVector, q_c: JointVector, advice: str = _START_ADVICE) -> str | None:
     """Returns a message if a motion does not start at the arm's position, or None.
 
     Args:
         start: Start of the motion, shape (n,), [rad].
         q_c: Commanded joint angles of the arm, [rad].
+        advice: End of the message: what to do.
     """
     if len(start) != len(q_c):
         return f"the motion is for {len(start)} joints and the arm has {len(q_c)}; plan it for the right model"
@@ -69,8 +74,7 @@ def find_start_mismatch(start: JointVector, q_c: JointVector) -> str | None:
         f"the motion does not start at the arm's position: joint {joint + 1} starts at "
         f"{math.degrees(start[joint]):.4f} deg and is at {math.degrees(q_c[joint]):.4f} deg, "
         f"{math.degrees(off[joint]):.2g} deg apart{more} (tolerance {math.degrees(START_POSITION_TOLERANCE):.0e} deg); "
-        "plan the motion from robot.state.q_c, or move the arm to its start first: "
-        "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
+        f"{advice}"
     )
 
 

@@ -451,7 +451,7 @@ class ControlLoop:
             collision_thresholds=self._thresholds,
         )
         error = ControlError(report.sentence, state.faults, record)
-        error.finding = report.finding
+        error.finding, error.advice = report.finding, report.advice
         return error if pressed is None else error.coded("safety_stop", status=pressed.code)
 
     def _not_arrived_error(self, state: RobotState, command: Command) -> ControlError:
@@ -479,7 +479,7 @@ class ControlLoop:
 
     def _power_off_error(self) -> ControlError:
         record = self._log.recorder.last(RECORD_CYCLES)
-        message = "motor power was switched off during the motion, and the brakes hold the arm; call power_on()"
+        message = "motor power was switched off during the motion, and the brakes hold the arm; switch it on"
         return ControlError(f"{self._driver.name}: {message}", (), record)
 
     def _ended_error(self, state: RobotState) -> ControlError:

@@ -96,7 +96,9 @@ class FaultReport:
     """The diagnosis of the faults that ended a motion."""
 
     sentence: str
-    """The full sentence, with the remedy in Python."""
+    """The full sentence, with the remedy."""
+    advice: str
+    """What to do next in Python."""
     finding: Remark
     """Joint, value and bound, for user interfaces; empty if unknown."""
 

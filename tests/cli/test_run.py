@@ -17,8 +17,10 @@ from rcilab.core.command import JointPosition
 from rcilab.core.errors import ControlError
 from rcilab.execution.session import connect
 from rcilab.execution.simulation_control import SimulationControl
+from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint
+from rcilab.recording.run import load_run
 from tests.waiting import wait_for
 
 MODEL = load_model("xMatePro7")
@@ -54,8 +56,7 @@ def test_without_a_yes_nothing_is_sent_and_with_one_the_arm_arrives(address, mot
     assert captured.out == ""
     (line,) = captured.err.splitlines()
     assert line.startswith("rcilab: the motion does not start at the arm's position: joint ")
-    assert "plan_joint(robot.model, robot.state.q_c, motion.q[0])" in line
-    assert "rcilab run --to-start" in line
+    assert line.endswith("rcilab run --to-start moves the arm to the start of the file, after a confirmation")
 
 
 def test_the_way_to_the_start_has_a_report_and_a_question_of_its_own(address, tmp_path, monkeypatch, capsys):
@@ -83,7 +84,14 @@ def test_to_start_clears_a_fault_first(address, tmp_path, capsys):
     file = tmp_path / "motion.npz"
     plan_joint(MODEL, q + 0.05, q + 0.1, speed=1.0).save(file)
     assert main(["run", str(file), "--robot", address, "--yes"]) == 2
-    capsys.readouterr()
+    with connect(address) as robot:
+        q_c = robot.state.q_c
+    plan_joint(MODEL, q_c, q + 0.1).save(tmp_path / "here.npz")
+    assert main(["run", str(tmp_path / "here.npz"), "--robot", address, "--yes"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "()" not in captured.err
+    assert "rcilab run --to-start clears the fault" in captured.err
     assert main(["run", str(file), "--robot", address, "--yes", "--to-start"]) == 0
     assert "The robot is stopped by kCommandJoint" in capsys.readouterr().out
 
@@ -111,9 +119,14 @@ def test_json_names_what_ends_a_run_or_prevents_it(tmp_path, capsys):
         host, port = controller.world_address.split(":")
         with SimulationControl(host, int(port)) as world:
             world.push((0, 0, -200, 0, 0, 0))
-            assert main(["run", str(file), "--robot", controller.address, "--yes", "--json"]) == 2
+            saved = tmp_path / "fault.rcirun"
+            command = ["run", str(file), "--robot", controller.address, "--yes", "--json"]
+            assert main([*command, "--save", str(saved)]) == 2
         captured = capsys.readouterr()
         found = json.loads(captured.out)
+        assert captured.err.endswith(f"; the run is in {saved}\n")
+        assert "()" not in captured.err
+        assert load_run(saved).faults == (Fault.COLLISION,)
         assert found["outcome"] == "failed"
         assert found["error"]["type"] == "ControlError"
         assert found["error"]["faults"] == ["kCollision"]
@@ -231,6 +244,8 @@ def test_bad_input_is_one_line_and_exit_code_two(motion_file, capsys):
     assert main(["run", motion_file, "--robot", "rci://127.0.0.2:9", "--timeout", "0.5"]) == 2
     assert main(["run", "no-such-file.npz", "--robot", "rci://127.0.0.2:9"]) == 2
     assert main(["run", motion_file, "--robot", "http://x"]) == 2
+    for file in ("run.txt", "no-such-folder/run.csv"):
+        assert main(["run", motion_file, "--robot", "rci://127.0.0.2:9", "--save", file]) == 2
     lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 3
+    assert len(lines) == 5
     assert "teach pendant" in lines[0]

@@ -30,6 +30,7 @@ from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
 
+_HELD = "error.run holds the motion"
 _OF_JOINTS = (
     "poses inside the tool's limits are not enough: the joints that they lead to have limits of their own "
     "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
@@ -73,7 +74,7 @@ def describe_faults(
     if pressed:
         bits = name_faults(faults)
         sentence = f"the controller stopped the motion {when}: {pressed} (reported as {bits})"
-        return FaultReport(f"{sentence}; error.run holds the motion", Remark(""))
+        return FaultReport(sentence, _HELD, Remark(""))
     names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
     parts = [f"the controller stopped the motion {when}: {names}"]
     commanded, is_violated = _describe_commanded(faults, record, limits)
@@ -84,10 +85,9 @@ def describe_faults(
     parts += found
     if faults:
         parts.append(late or (_OF_JOINTS if followed else _remedy(faults[0], mode, is_violated=is_violated)))
-    clears = "" if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else "recover() clears the fault; "
-    parts.append(f"{clears}error.run holds the motion")
+    advice = _HELD if (RANGE_FAULTS | BOX_FAULTS) & set(faults) else f"recover() clears the fault; {_HELD}"
     finding = Remark.all(part for part in found if isinstance(part, Remark))
-    return FaultReport("; ".join(parts), finding)
+    return FaultReport("; ".join(parts), advice, finding)
 
 
 def _remedy(fault: Fault, mode: ControllerMode, *, is_violated: bool) -> str:

@@ -15,8 +15,8 @@ from rcilab.makers.rokae import wire as rci
 class Refusal(Enum):
     """The reason of a refusal; the value names its texts, `status.VALUE` of the catalogues."""
 
-    ESTOP = "estop", "an emergency stop is pressed: release it first, then switch the power on (power_on())"
-    GSTOP = "gstop", "the safety gate is open: close it first, then switch the power on (power_on())"
+    ESTOP = "estop", "an emergency stop is pressed: release it first, then switch the power on"
+    GSTOP = "gstop", "the safety gate is open: close it first, then switch the power on"
     FAULT = "fault", "a fault has stopped the arm: recover() clears it, or power_off() and power_on()"
     GUIDED = "guided", "the arm is guided by hand: end that first (stop_drag())"
     RECOVERING = "recovering", "an error recovery is in progress: try again when it is over"
