@@ -32,6 +32,23 @@ def test_an_integer_beyond_every_float_is_a_value_like_others(call):
         call()
 
 
+DEGREES = [0.0, 30.0, 0.0, 60.0, 0.0, 90.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("call", "name"),
+    [
+        (lambda: rcilab.plan_joint(MODEL, DEGREES, MODEL.home), "start"),
+        (lambda: rcilab.plan_joint(MODEL, MODEL.home, DEGREES), "goal"),
+        (lambda: MODEL.with_joint_limits(MODEL.limits.joint.lower, DEGREES), "upper"),
+        (lambda: rcilab.Motion.from_samples([MODEL.home, DEGREES], dt=1.0), "q"),
+    ],
+)
+def test_degrees_by_mistake_are_named_with_the_remedy(call, name):
+    with pytest.raises(InvalidValueError, match=rf"{name} of joint 6.*: 90\.0 rad .* np\.radians\({name}\)"):
+        call()
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [

@@ -24,6 +24,9 @@ Vector3: TypeAlias = Array
 Matrix: TypeAlias = Array
 """Two-dimensional."""
 
+MAX_ANGLE = 4.0 * math.pi
+"""[rad] Largest accepted joint or arm angle: two turns. Larger values are usually degrees by mistake."""
+
 
 def scalar(value: float) -> Array:
     """Returns a number as a read-only array of shape (), which numpy need not convert in every product."""
@@ -137,6 +140,25 @@ def as_path(value: ArrayLike, columns: int | None, name: str, unit: str = "") ->
         raise InvalidValueError(where, float(array[row, column]), f"must be finite{_in(unit)}").coded("not_finite")
     array.flags.writeable = False
     return array
+
+
+def require_radians(q: Array, name: str) -> Array:
+    """Returns joint angles, shape (n,) or (N, n), [rad], if none is more than two turns.
+
+    Args:
+        q: The angles.
+        name: Their name in an error.
+
+    Raises:
+        InvalidValueError: One is; the values are probably degrees.
+    """
+    turned = np.abs(q)
+    if float(turned.max()) <= MAX_ANGLE:
+        return q
+    *rows, joint = (int(i) for i in np.unravel_index(turned.argmax(), q.shape))
+    where = f"{name} of joint {joint + 1}" + "".join(f" at row {row} (from 0)" for row in rows)
+    problem = f"rad is more than two turns; the unit is rad, use np.radians({name}) for degrees"
+    raise InvalidValueError(where, float(q[*rows, joint]), problem)
 
 
 def as_rows(value: ArrayLike, columns: int, name: str, unit: str = "", like: Array | None = None) -> Array:

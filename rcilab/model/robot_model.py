@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_path, as_rows, as_vector, described
+from rcilab.core.arrays import JointVector, as_path, as_rows, as_vector, described, require_radians
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.limits import Limits
@@ -137,9 +137,10 @@ class RobotModel(ReachingArm):
             upper: Above `lower`, shape (n,), [rad].
 
         Raises:
-            InvalidValueError: Not n finite numbers, or a bound is not below its upper one.
+            InvalidValueError: Not n finite numbers, more than two turns, or a bound is not below its upper one.
         """
-        low, high = as_vector(lower, self.n, "lower", "rad"), as_vector(upper, self.n, "upper", "rad")
+        low = require_radians(as_vector(lower, self.n, "lower", "rad"), "lower")
+        high = require_radians(as_vector(upper, self.n, "upper", "rad"), "upper")
         for joint in np.flatnonzero(low >= high).tolist():
             raise InvalidValueError(
                 f"lower, joint {joint + 1}", float(low[joint]), f"must be below {high[joint]:g} [rad]"

@@ -8,7 +8,7 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import JointVector, as_number, as_vector
+from rcilab.core.arrays import JointVector, as_number, as_vector, require_radians
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import require_model
@@ -77,13 +77,15 @@ def plan_joint(
         start_acceleration: Joint accelerations at the start, shape (n,), [rad/s^2]; None is zero.
 
     Raises:
-        InvalidValueError: Wrong shape, not finite, an unknown law, a speed out of range, or not an arm.
+        InvalidValueError: Wrong shape, not finite, more than two turns, an unknown law, a speed out of range, or not an
+            arm.
         PlanningError: A joint is outside its limits, or cannot stay inside them.
     """
     if not hasattr(model, "limits"):
         require_model(model)
     n, limits = model.n, model.limits.joint
-    start, goal = as_vector(start, n, "start", "rad"), as_vector(goal, n, "goal", "rad")
+    start = require_radians(as_vector(start, n, "start", "rad"), "start")
+    goal = require_radians(as_vector(goal, n, "goal", "rad"), "goal")
     dq = as_vector(np.zeros(n) if start_velocity is None else start_velocity, n, "start_velocity", "rad/s")
     ddq = as_vector(np.zeros(n) if start_acceleration is None else start_acceleration, n, "start_acceleration")
     speed = as_number(speed, "speed")

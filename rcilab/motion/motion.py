@@ -12,7 +12,17 @@ from typing import IO, BinaryIO, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rcilab.core.arrays import Array, JointPath, JointVector, as_number, as_path, as_vector, described, readonly_copy
+from rcilab.core.arrays import (
+    Array,
+    JointPath,
+    JointVector,
+    as_number,
+    as_path,
+    as_vector,
+    described,
+    readonly_copy,
+    require_radians,
+)
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_rows
@@ -99,7 +109,8 @@ class Motion:
             times: Time of each sample, shape (N,), increasing, [s]; instead of `dt`.
 
         Raises:
-            InvalidValueError: Not finite, neither or both of `dt` and `times`, or the times do not increase.
+            InvalidValueError: Not finite, more than two turns, neither or both of `dt` and `times`, or the times do not
+                increase.
         """
         if dt is None and times is None:
             problem = (
@@ -108,7 +119,7 @@ class Motion:
             raise InvalidValueError("dt", None, problem)
         if dt is not None and times is not None:
             raise InvalidValueError("dt", dt, "is not needed if the samples have times; pass one of the two")
-        rows = as_path(q, None, "q", "rad")
+        rows = require_radians(as_path(q, None, "q", "rad"), "q")
         if dt is not None:
             if not 0.0 < (dt := as_number(dt, "dt", "s")) < math.inf:
                 raise InvalidValueError("dt", dt, "must be above 0: the seconds between two samples")

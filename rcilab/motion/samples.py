@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, JointPath, Unquoted, as_number, as_path, as_vector
+from rcilab.core.arrays import MAX_ANGLE, Array, JointPath, Unquoted, as_number, as_path, as_vector
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
@@ -23,9 +23,6 @@ from rcilab.motion.storage import KIND
 from rcilab.motion.table import Table, read_table
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
-
-MAX_ANGLE = 4.0 * math.pi
-"""Larger angles are not those of a joint, [rad]; they are probably in degrees."""
 
 _ON_GRID = 1e-6
 """Tolerance of times at whole cycles, [s]: the rounding to six decimals."""

@@ -9,13 +9,12 @@ from typing import Any, Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Unquoted, as_number, as_vector, described
+from rcilab.core.arrays import MAX_ANGLE, Unquoted, as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.model.kinematics.solvers.build import build_solver
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.path import CircleOrientation, ElbowDirection
-from rcilab.motion.samples import MAX_ANGLE
 from rcilab.robots.description import RobotDescription
 
 WaypointType: TypeAlias = Literal["joint", "line", "arc", "circle", "nullspace"]

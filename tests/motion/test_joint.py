@@ -155,7 +155,7 @@ def test_a_start_that_runs_into_a_limit_is_refused_with_joint_and_time():
 
 
 @pytest.mark.parametrize(
-    ("joint", "angle", "which"), [(4, 2.3, "goal"), (2, -2.2, "start"), (7, 2 * np.pi, "goal"), (1, 100.0, "start")]
+    ("joint", "angle", "which"), [(4, 2.3, "goal"), (2, -2.2, "start"), (7, 2 * np.pi, "goal"), (1, 10.0, "start")]
 )
 def test_angles_outside_the_limits_are_refused_with_joint_value_and_bound(joint, angle, which):
     q = {"start": np.zeros(7), "goal": np.zeros(7)}

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, JointVector, as_path, as_rows, as_vector
+from rcilab.core.arrays import MAX_ANGLE, Array, JointVector, as_path, as_rows, as_vector, require_radians
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import IDENTITY, Pose, as_pose
 from rcilab.model.kinematics import forward as forward_kinematics
@@ -17,9 +17,6 @@ from rcilab.model.kinematics.frames import Frame, locate
 from rcilab.model.kinematics.jacobian import jacobian
 from rcilab.model.kinematics.least_norm import JointRates, least_norm
 from rcilab.robots.description import DhRow
-
-MAX_ANGLE = 4.0 * math.pi
-"""[rad] Largest accepted joint or arm angle: two turns. Larger values are usually degrees by mistake."""
 
 
 class MovingArm:
@@ -209,9 +206,4 @@ class MovingArm:
             values = q.tolist()
             if math.hypot(*values) <= MAX_ANGLE:  # False also for nan.
                 return values
-        values = as_vector(q, self.n, "q", "rad").tolist()
-        joint = max(range(self.n), key=lambda i: abs(values[i]))
-        if abs(values[joint]) > MAX_ANGLE:
-            problem = "rad is more than two turns; the unit is rad, use np.radians(q) for degrees"
-            raise InvalidValueError(f"q of joint {joint + 1}", values[joint], problem)
-        return values
+        return require_radians(as_vector(q, self.n, "q", "rad"), "q").tolist()

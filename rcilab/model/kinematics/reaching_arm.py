@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import as_number, as_vector, described
+from rcilab.core.arrays import MAX_ANGLE, as_number, as_vector, described
 from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
@@ -16,7 +16,7 @@ from rcilab.model.kinematics.closest_pose import ClosestPose, closest_reachable
 from rcilab.model.kinematics.elbow_circle import ElbowCircle, elbow_circle
 from rcilab.model.kinematics.elbow_ranges import FeasibleArcs
 from rcilab.model.kinematics.inverse_search import InverseSearch
-from rcilab.model.kinematics.moving_arm import MAX_ANGLE, MovingArm
+from rcilab.model.kinematics.moving_arm import MovingArm
 from rcilab.model.kinematics.solution_batch import SolutionBatch, as_pose_batch
 from rcilab.model.kinematics.solutions import Solutions
 from rcilab.model.kinematics.solvers.solver import KinematicsSolver, Redundancy
