@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
 _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
-    "fault.released": "phase.released",
+    "fault.released": "phase.released", "lost.rebooted": "phase.rebooted",
 }  # fmt: skip
 """States that have a text of their own instead of that of their phase."""
 _SAFETY_STOPS = {"fault.pressed": "ready.pressed", "fault.released": "ready.released"}
@@ -109,7 +109,7 @@ def _describe_loss(code: str, status: SupervisorStatus) -> Message:
     if code == "lost.other_arm":
         return message("incident.lost.other_arm", address=status.target)
     if status.target == "virtual":
-        return message("incident.lost.virtual")
+        return message("incident.lost.rebooted_virtual" if code == "lost.rebooted" else "incident.lost.virtual")
     known = code if code in _LOST else "lost.unreachable"
     return message(f"incident.{known}", address=status.target, seconds=f"{ANSWER_TIMEOUT:g}")
 

@@ -14,6 +14,7 @@ from rcilab.app.run.drive_state import control_field
 from rcilab.app.run.mode_actions import PressControl, SetDrive
 from rcilab.app.run.mode_parameters import find_group, format_ranges
 from rcilab.app.run.played_motion import played_path
+from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.run.world_actions import PressSafety, SetNetwork
@@ -228,6 +229,8 @@ def test_the_cable_is_pulled_in_a_motion_and_plugged_in_again(idle):
     execute(idle, 0.1)
     idle.dispatcher.ask(SetNetwork(pulled=True))
     wait(lambda: idle.session.status().phase == "lost", "the loss to be noticed")
+    wait(lambda: told(idle) == "incident.lost.pulled", "the way out: the plug, not a restart")
+    assert obstacle(idle.store.state, idle.session.status()).code == "incident.lost.pulled"
     idle.dispatcher.ask(SetNetwork(pulled=False))
     wait(lambda: not idle.store.state.world.pulled, "the cable in")
     idle.dispatcher.ask(SetNetwork(name="loss", value=9.0))

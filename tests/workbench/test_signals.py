@@ -9,9 +9,11 @@ import pytest
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.signal_actions import PressSignals, SetOutput
 from rcilab.app.run.world_actions import SetWiring
+from rcilab.app.status_text import describe_status, phase_code
 from rcilab.app.text import Text
 from rcilab.workbench.app import Workbench
 from rcilab.workbench.panels.signals import levels_html
+from rcilab.workbench.panels.target_robot import TargetRobotPanel
 from tests.workbench.opened import opened, wait
 
 
@@ -32,7 +34,14 @@ def test_an_output_is_set_and_the_input_it_is_wired_to_is_shown(bench: Workbench
     wait(lambda: status().inputs == (False, False, True, False, False, False), "the input")
     shown = levels_html(bench.store.state.model, status(), Text("zh"))
     assert "<th>DO0_2</th><td>开</td><th>DI0_2</th><td>开</td>" in shown
-    ask(SetOutput(signal=2, level=False))
+    ask(SetWiring(name="loop_back", on=False))
+    ask(SetOutput(signal=3, level=True))
+    wait(lambda: status().outputs[3] is True, "an output without a wire")
+    assert status().inputs[3] is False
+    ask(SetWiring(name="loop_back", on=True))
+    wait(lambda: status().inputs[3] is True, "the input, read as soon as it is wired")
+    for signal in (2, 3):
+        ask(SetOutput(signal=signal, level=False))
     wait(lambda: status().outputs[2] is False and status().inputs == (False,) * 6, "the output taken back")
 
 
@@ -49,6 +58,10 @@ def test_a_restart_is_asked_about_and_ends_the_connection_until_connect(bench: W
     ask(PressSignals(what="reboot"))
     ask(PressSignals(what="confirm"))
     wait(lambda: status().code == "lost.rebooted", "the end of the connection")
+    assert phase_code(status()) == "phase.rebooted"
+    assert describe_status(status()).code == "incident.lost.rebooted_virtual"
+    panel = next(panel for panel in bench.renderer._panels if isinstance(panel, TargetRobotPanel))
+    wait(lambda: 'rl-warn"><b>virtual controller, ideal arm</b> restarting' in panel._where._shown, "no trouble")
     ask(RobotCommand(what="reconnect"))
     wait(lambda: status().phase == "idle", "another connection")
     assert status().outputs == (None,) * 6

@@ -33,7 +33,7 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     if status.code == "moving.held":
         return message("ready.held")
     if status.phase == "crashed" or (status.phase == "lost" and state.target == "virtual"):
-        return describe_status(status)
+        return _describe_arm(state, status)
     is_released = status.code == "fault.released"
     resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed, is_released=is_released)
     if resting is not None:
@@ -104,5 +104,14 @@ def connection_note(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns the message next to the destination, at the top of Run: why no motion can run there; None: none."""
     missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
     if status.phase in ("fault", "lost", "crashed"):
-        return describe_status(status)
+        return _describe_arm(state, status)
     return message("destination.note") if missing is None and destination(state, status) == "preview" else missing
+
+
+def pulled_cable(state: UiState, status: SupervisorStatus) -> Message | None:
+    """Returns that the connection is lost because the operator has pulled the cable of the network lab, or None."""
+    return message("incident.lost.pulled") if status.phase == "lost" and state.world.pulled else None
+
+
+def _describe_arm(state: UiState, status: SupervisorStatus) -> Message:
+    return pulled_cable(state, status) or describe_status(status)

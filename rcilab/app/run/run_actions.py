@@ -14,7 +14,7 @@ from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import TOOL, is_guided
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.run.readiness import obstacle
+from rcilab.app.run.readiness import obstacle, pulled_cable
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, drawn_parts, name_parts, setup_obstacle
 from rcilab.app.state_store import ROBOT_TROUBLE
@@ -237,6 +237,7 @@ class RunActions:
             self._trouble = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
                 sentence = describe_incident(status.incident.code, status.incident.message, status)
+                sentence = pulled_cable(self._store.state, status) or sentence
                 self._store.notify("bad", sentence, trouble=ROBOT_TROUBLE)
         if self._guided and status.code == "idle.operator":
             self._store.notify("warn", message("notice.operator"))
@@ -331,7 +332,8 @@ class RunActions:
 
     def _report_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
         if _is_trouble(error):
-            return "bad", explain_error(error, self._connection.status())
+            status = self._connection.status()
+            return "bad", pulled_cable(self._store.state, status) or explain_error(error, status)
         if isinstance(error, ControlError) and outcome.what == "execute":
             return "warn", message("notice.operator" if outcome.is_operator_absent else _stopped(self._store.state))
         return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=explain_error(error))

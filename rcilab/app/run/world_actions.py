@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -14,6 +15,7 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.world_state import CABLE_PULLED, NETWORK_LAB, WorldState
 from rcilab.app.state_store import StateStore
 from rcilab.app.status_text import explain_error
+from rcilab.core.errors import RcilabError
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.execution.simulation_status_poller import SimulationStatusPoller
 from rcilab.i18n.translator import message
@@ -67,6 +69,7 @@ class WorldActions:
         self._store, self._connection = store, connection
         self._watch: SimulationStatusPoller | None = None
         self._address: str | None = None
+        self._is_rewired = False  # The inputs that are shown were read before.
 
     @property
     def handlers(self) -> Handlers:
@@ -114,6 +117,7 @@ class WorldActions:
         if watch is None or request.name not in _WIRING:
             return
         watch.ask(_WIRING[request.name](request.on))
+        self._is_rewired |= request.name == "loop_back"
         self._store.update(world=replace(self._store.state.world, **{request.name: request.on}))
 
     def tick(self, status: SupervisorStatus) -> None:
@@ -133,6 +137,10 @@ class WorldActions:
         if error is not None:
             self._store.notify("bad", explain_error(error))
         is_settled, world, sentence = self._watch.is_settled, self._store.state.world, self._watch.status
+        if self._is_rewired and is_settled and status.phase in ("idle", "fault"):
+            self._is_rewired = False
+            with suppress(RcilabError):  # Then they are read with the next output.
+                self._connection.robot().read_inputs()
         if sentence is not world.status:
             world = replace(world, status=sentence)
         if is_settled and sentence is not None and sentence.auto_limit not in (None, world.auto_limit):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from rcilab.app.run.drive_state import destination
 from rcilab.app.text import Text
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import state_cycles
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
 from rcilab.recording.html_facts import describe_goal, describe_stop
@@ -91,7 +93,11 @@ def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -
 def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     run = recording.run
     assert run is not None
-    facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=run.timing.lost)
+    lost = run.timing.lost
+    facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=lost)
+    missing = round(run.duration / (CYCLE_TIME * state_cycles(run.cycles))) + 1 - len(run.t) - lost
+    if missing > 0:
+        facts += " " + text("record.missing", count=missing)
     moment = "" if recording.moment is None else f"{recording.moment:.3f}"
     if run.is_safety_stop:
         return "bad", text("record.safety_stop", moment=moment, why=_describe_stop(run, text)), facts

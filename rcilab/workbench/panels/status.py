@@ -26,6 +26,7 @@ _TONES = {
     "stopping": "warn",
     "closed": "warn",
     "fault.released": "warn",
+    "lost.rebooted": "warn",
 }
 
 

@@ -87,7 +87,7 @@ class TargetRobotPanel:
         self._yes.visible = self._no.visible = bool(asked)
         self._again.visible = where in ("ideal", "mujoco") and status.phase in ("lost", "crashed")
         self._leave.disabled = moving or where == "preview"
-        tone = _TONES.get(status.phase, "bad")
+        tone = "warn" if status.code == "lost.rebooted" else _TONES.get(status.phase, "bad")
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name
         address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
