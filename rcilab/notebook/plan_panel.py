@@ -39,9 +39,9 @@ class PlanPanel(Part):
         super().__init__(subject, language)
         state, text = self.state, self.text
         wide = {"width": "24em"}
-        self.way = shared_style_widget(
+        self.path_type = shared_style_widget(
             ipywidgets.Dropdown, description=text("plan.way"),
-            options=[(text(f"way.{way}"), way) for way in PATH_TYPES],
+            options=[(text(f"way.{path_type}"), path_type) for path_type in PATH_TYPES],
             value=state.now.path_type,
             layout=wide,
         )  # fmt: skip
@@ -74,7 +74,7 @@ class PlanPanel(Part):
         self.progress, self.cancel = self._work.progress, self._work.cancel
         self._slowed: tuple[Plan, SlowDown] | None = None  # Result of the last slow-down, with the plan it applies to.
         self.build([
-            self.way,
+            self.path_type,
             shared_style_widget(
                 ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}
             ),
@@ -88,7 +88,7 @@ class PlanPanel(Part):
             ),
             self._sentence,
         ], min_width="360px")  # fmt: skip
-        self.way.observe(self._on_way, names="value")
+        self.path_type.observe(self._on_path_type, names="value")
         self.law.observe(self._on_law, names="value")
         self._echo = SliderEcho(self.speed)
         self.speed.observe(self._on_speed, names="value")
@@ -109,7 +109,7 @@ class PlanPanel(Part):
         if self._echo.is_drag(change["new"]):
             self._set_speed(change["new"])
 
-    def _on_way(self, change: Any) -> None:
+    def _on_path_type(self, change: Any) -> None:
         self.state.ask(SetPathType(kind=change["new"]))
 
     def _on_law(self, change: Any) -> None:

@@ -324,10 +324,10 @@ def test_a_motion_that_no_slow_down_mends_says_so(fresh: Lab) -> None:
 
 
 def test_a_straight_line_is_planned_or_refused_in_words(fresh: Lab) -> None:
-    fresh.plan.route.value = "line"
+    fresh.plan.path_type.value = "line"
     fresh.jog.q = PRO7.home + 0.1
     fresh.plan.plan.click()
-    fresh.plan.route.value = "joint"
+    fresh.plan.path_type.value = "joint"
     said = text_of(fresh.plan._sentence)
     assert "Passed" in said or "No plan" in said
 
