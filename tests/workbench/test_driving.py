@@ -12,7 +12,7 @@ from rcilab.app.goal.goal_actions import MoveJoint, PoseGoal, SetLaw, SetSpeed
 from rcilab.app.request import TypeField
 from rcilab.app.run.drive_state import control_field
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import find_group, format_ranges
+from rcilab.app.run.mode_parameters import find_group, format_ranges, name_group, name_parameter
 from rcilab.app.run.played_motion import played_path
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.run_actions import RobotCommand
@@ -102,6 +102,9 @@ def test_what_the_page_takes_for_defaults_is_what_the_virtual_controller_wakes_u
 def test_every_part_says_its_unit_and_range_and_has_its_words():
     groups = parameters_of(MODEL)
     assert format_ranges(find_group(groups, "joint_stiffness")) == "[0…3000, 300 N·m/rad]"
+    thresholds = find_group(groups, "collision_thresholds")
+    assert name_group(Text("en"), thresholds) == "Collision thresholds [N·m]"  # It fits into one line.
+    assert name_parameter(Text("en"), thresholds, 2) == "J3 [0…60]"
     words = load_ui_catalogue("rcilab.app", "en")
     for mode in MODES:
         assert {f"mode.{mode}", f"mode.{mode}_note"} <= words.keys()

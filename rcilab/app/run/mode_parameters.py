@@ -68,8 +68,21 @@ def ask_to_send(address: str) -> Message:
 
 
 def name_group(text: Text, group: ParameterGroup) -> str:
-    """Returns the name of a group, with units and ranges."""
-    return f"{text(f'control.{group.name}')} {format_ranges(group)}"
+    """Returns the name of a group, with units, and with its ranges if there are few."""
+    ranges = f"[{group.parameters[0].unit}]" if has_own_ranges(group) else format_ranges(group)
+    return f"{text(f'control.{group.name}')} {ranges}"
+
+
+def has_own_ranges(group: ParameterGroup) -> bool:
+    """Returns whether the ranges of a group are too many for its name: each stands beside its parameter."""
+    return len({item.unit for item in group.parameters}) == 1 and len({item.high for item in group.parameters}) > 2
+
+
+def name_parameter(text: Text, group: ParameterGroup, index: int) -> str:
+    """Returns the label of a parameter, with its range if that is not in the name of the group."""
+    item = group.parameters[index]
+    label = text.render(item.label)
+    return f"{label} [{item.low:g}…{item.high:g}]" if has_own_ranges(group) else label
 
 
 def format_ranges(group: ParameterGroup) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_part, is_only_planned
 from rcilab.app.run.drive_state import is_pending
 from rcilab.app.run.mode_actions import PressControl, SetDrive
-from rcilab.app.run.mode_parameters import held_rows, name_group, shown_numbers
+from rcilab.app.run.mode_parameters import held_rows, name_group, name_parameter, shown_numbers
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.text import Text
 from rcilab.core.state import MODES, Mode
@@ -64,7 +64,8 @@ class ModePanel:
             with folder:
                 gui.add_html('<i class="rl-pairs"></i>')
                 names = [text.render(parameter.label) for parameter in group.parameters]
-                fields = [self._build_field(gui, group, index, name) for index, name in enumerate(names)]
+                shown = [name_parameter(text, group, index) for index in range(len(names))]
+                fields = [self._build_field(gui, group, index, label) for index, label in enumerate(shown)]
                 self._labels[group.name] = [(field.field, name) for field, name in zip(fields, names, strict=True)]
                 self._fields[group.name], self._problems[group.name] = fields, Html(gui)
             self._folders[group.name] = folder

@@ -32,7 +32,7 @@ class SignalsPanel:
             self._output = output = gui.add_dropdown(
                 text("signals.output"), names or ("—",), hint=text("signals.output_hint")
             )
-            gui.add_html('<i class="rl-buttons"></i>')
+            gui.add_html('<i class="rl-buttons rl-signals"></i>')
             self._buttons: list[Any] = []
             for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
                 button = gui.add_button(text(f"signals.{word}"), icon=icon, color="blue" if level else "gray")
