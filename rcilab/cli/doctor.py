@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 
+from rcilab.cli.output import show
 from rcilab.core.errors import InvalidValueError
 from rcilab.diagnostics.doctor.finding import Finding, summary
 
@@ -48,11 +49,11 @@ def run(args: argparse.Namespace) -> int:
         findings.append(finding)
         shown.clear()
         if not args.json:
-            print(finding, flush=True)
+            show(finding)
     if args.json:
-        print(json.dumps([finding.as_json() for finding in findings], indent=1))
+        show(json.dumps([finding.as_json() for finding in findings], indent=1))
     else:
-        print(f"\n{summary(findings)}")
+        show(f"\n{summary(findings)}")
     return 1 if any(finding.verdict == "bad" for finding in findings) else 0
 
 

@@ -55,7 +55,7 @@ def as_motion(
     show: Callable[[str], None] = print,
     max_rows: int = DEFAULT_MAX_ROWS,
 ) -> Motion:
-    """Returns the motion; a program is planned, and the notes of its planner are shown.
+    """Returns the motion and shows its notes; a program is planned.
 
     Args:
         found: Result of `read_file`.
@@ -71,15 +71,16 @@ def as_motion(
     from rcilab.core.errors import PlanningError
     from rcilab.motion import Program, plan_program
 
-    if not isinstance(found, Program):
-        return found
-    try:
-        motion = plan_program(model, found, law="torque_rate_limited", max_rows=max_rows)
-    except PlanningError as error:
-        if error.waypoint is None:
-            raise
-        line = _line_of(error.waypoint, file)
-        raise PlanningError(f"{file.name}, line {line}, {error}", waypoint=error.waypoint) from error
+    if isinstance(found, Program):
+        try:
+            motion = plan_program(model, found, law="torque_rate_limited", max_rows=max_rows)
+        except PlanningError as error:
+            if error.waypoint is None:
+                raise
+            line = _line_of(error.waypoint, file)
+            raise PlanningError(f"{file.name}, line {line}, {error}", waypoint=error.waypoint) from error
+    else:
+        motion = found
     for note in motion.notes:
         show(f"note: {note}")
     return motion

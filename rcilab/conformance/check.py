@@ -18,7 +18,7 @@ from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
-from rcilab.core.arrays import Array, described
+from rcilab.core.arrays import Array, Unquoted, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -76,7 +76,7 @@ def check(
     require_motion(motion)
     require_model(model)
     if motion.n != model.n:
-        raise InvalidValueError("motion", motion, f"is for {motion.n} joints, {model.name} has {model.n}")
+        raise InvalidValueError("motion", Unquoted("it"), f"is for {motion.n} joints, {model.name} has {model.n}")
     box = active_box(box)
     if distance is not None and not isinstance(distance, ClearanceLimit):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise InvalidValueError(

@@ -175,7 +175,7 @@ class SimulationControl(Closeable):
         """Returns the status of the simulation, which is not part of the robot's state."""
         answer = self.ask(GetStatus())
         if not isinstance(answer, WorldStatus):
-            raise ProtocolError(f"{self}: the response to a status request is {answer}")
+            raise ProtocolError(f"{self._name}: the response to a status request is {answer}")
         return answer
 
     def close(self) -> None:
@@ -185,6 +185,10 @@ class SimulationControl(Closeable):
 
     def __repr__(self) -> str:
         return "<World at {}:{}>".format(*self._address)
+
+    @property
+    def _name(self) -> str:
+        return "the simulation port {}:{}".format(*self._address)
 
     def ask(self, request: WorldRequest) -> WorldAnswer:
         """Returns the response to a request.
@@ -203,7 +207,8 @@ class SimulationControl(Closeable):
             except (OSError, DecodeError) as error:
                 self._disconnect()
                 raise ConnectionLostError(
-                    f"{self} does not respond to {request.name} ({error}); check that the virtual controller is running"
+                    f"{self._name} does not respond to {request.name} ({error}); check that the virtual controller "
+                    "is running"
                 ).coded("world_silent") from error
             if self._is_refused:
                 self._disconnect()

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from rcilab.core.arrays import Unquoted
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, plain_text
 
 MAX_BYTES = 8_000_000
 """Largest text, [bytes]; tuning value: a program of 10 000 waypoints has 4 million."""
@@ -27,6 +27,7 @@ _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _NUMBER = re.compile(r"-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][+-]?\d+)?(?![\w.])", re.ASCII)
 _WORD = re.compile(r"[^\s,:\[\]{}\"]+")
 _DECODER = JSONDecoder()  # For strings with escapes, and to count items.
+_SHOWN = 60  # [characters] Of the text in an error.
 _CONSTANTS = {"true": True, "false": False, "null": None}
 
 Content: TypeAlias = "dict[str, Node] | list[Node] | str | float | bool | None"
@@ -106,6 +107,10 @@ class _Reader:
         self._line_breaks = [match.start() for match in re.finditer("\n", text)]
 
     def read(self) -> Node:
+        if not self._peek():
+            raise InvalidValueError(self._name, Unquoted("the text"), "is empty").coded(
+                "file_json_end", file=self._name, line=1
+            )
         node = self._value(0)
         if self._peek():
             raise self._error("follows the end of the first value; a file contains one object")
@@ -149,9 +154,10 @@ class _Reader:
             start = self._position
             key = self._string()
             if key in found:
+                shown, first = self._text[start : self._position], found[key].line
                 self._position = start
-                raise self._error(f"is a duplicate of the key in line {found[key].line}; keep one").coded(
-                    "file_json_twice", file=self._name, line=self._line(), key=key, first=found[key].line
+                raise self._error(f"is a duplicate of the key in line {first}; keep one", shown).coded(
+                    "file_json_twice", file=self._name, line=self._line(), key=plain_text(key, _SHOWN), first=first
                 )
             if not self._accept(":"):
                 raise self._error(f"is not a colon; the key {key!r} needs one")
@@ -205,11 +211,13 @@ class _Reader:
     def _line(self) -> int:
         return bisect_right(self._line_breaks, self._position - 1) + 1
 
-    def _error(self, problem: str) -> InvalidValueError:
-        word = _WORD.match(self._text, self._position)
-        shown = word[0] if word else self._text[self._position : self._position + 20].split("\n")[0]
-        found = Unquoted(shown[:60]) if shown else Unquoted("the end of the text")
+    def _error(self, problem: str, shown: str = "") -> InvalidValueError:
+        if not shown:
+            word = _WORD.match(self._text, self._position)
+            shown = word[0] if word else self._text[self._position : self._position + 20].split("\n")[0]
+        shown = plain_text(shown, _SHOWN)
+        found = Unquoted(shown or "the end of the text")
         error = InvalidValueError(f"{self._name}, line {self._line()}", found, problem)
         if not shown:
             return error.coded("file_json_end", file=self._name, line=self._line())
-        return error.coded("file_json", file=self._name, line=self._line(), found=str(found))
+        return error.coded("file_json", file=self._name, line=self._line(), found=shown)

@@ -31,7 +31,7 @@ from rcilab.i18n.notebook_language import language
 from rcilab.i18n.translator import Remark, Text
 from rcilab.motion import storage
 from rcilab.motion.piecewise import DERIVATIVES, PiecewisePolynomial
-from rcilab.motion.samples import is_on_grid, read_samples
+from rcilab.motion.samples import is_on_grid, notes_on, read_samples
 from rcilab.motion.spline import spline_through
 
 TimeLaw: TypeAlias = Literal["jerk_limited", "torque_rate_limited", "s_profile", "stop", "samples"]
@@ -283,7 +283,7 @@ class Motion:
         times, q = read_samples(file, None, "rad", max_rows)  # type: ignore[arg-type]  # Streams are .npz.
         if is_on_grid(times):
             return cls.from_cycles(q)
-        return _require_length(motion_through(times, q), max_rows, file)  # type: ignore[arg-type]
+        return _through_samples(times, q, max_rows, file)  # type: ignore[arg-type]
 
     @classmethod
     def load_samples(
@@ -313,7 +313,7 @@ class Motion:
             InvalidValueError: The file does not exist, or its samples are not valid or too many; the message names the
                 line.
         """
-        return _require_length(motion_through(*read_samples(file, rate_hz, unit, max_rows)), max_rows, file)
+        return _through_samples(*read_samples(file, rate_hz, unit, max_rows), max_rows, file)
 
     def __reduce__(self) -> tuple[object, ...]:
         return _rebuild, (self.polynomial, self.goal, self.law, self.speed, self.segment_starts, self.notes)
@@ -381,8 +381,13 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
     )
 
 
-def _require_length(motion: Motion, max_rows: int, file: str | PathLike[str]) -> Motion:
-    require_rows(len(motion), max_rows, "samples", Path(file).name)
+def _through_samples(times: Array, q: JointPath, max_rows: int, file: str | PathLike[str]) -> Motion:
+    motion = replace(motion_through(times, q), notes=notes_on(times))
+    try:
+        require_rows(len(motion), max_rows, "samples", Path(file).name)
+    except InvalidValueError as error:
+        requirement = "; ".join((error.requirement, *motion.notes))
+        raise InvalidValueError(error.name, error.value, requirement).coded(error.code, **error.facts) from None
     return motion
 
 

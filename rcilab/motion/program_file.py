@@ -101,12 +101,13 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
     for key, expected in (("format", FORMAT), ("version", float(VERSION))):
         if key not in found:
             raise InvalidValueError(
-                f"{name}, {key}", None, f"is missing; a program has {json.dumps(_as_json_number(expected))}"
+                f"{name}, {key}", None, f'is missing; a program has "{key}": {json.dumps(_as_json_number(expected))}'
             ).coded("file_missing", file=name, key=key)
         value = found[key].value
         if key == "version" and value != expected:
             what = f"{name}, line {found[key].line}, version"
-            raise VersionMismatchError(what, value, VERSION, "write it again with the rcilab that reads it")
+            advice = "the rcilab that wrote it reads it; a program written by hand has version 1"
+            raise VersionMismatchError(what, _as_json_number(value), VERSION, advice)
         if value != expected:
             raise InvalidValueError(
                 _location(name, found[key], key), found[key].plain(), f"must be {expected!r}"
@@ -221,7 +222,7 @@ def _location(name: str, node: Node, key: str) -> str:
 
 
 def _as_json_number(value: object) -> object:
-    return int(value) if isinstance(value, float) else value
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _as_json_object(waypoint: Waypoint) -> dict[str, object]:

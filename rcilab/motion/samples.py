@@ -30,6 +30,7 @@ _ON_GRID = 1e-6
 _MAX_TIME = 1e20
 """Largest time in a file, [s]: nanoseconds since 1970, read as seconds."""
 
+_MANY_SAMPLES = 20
 _TIME_KEYS = ("t", "time", "times")
 _MOST_JOINTS = 7
 _TIME = re.compile(r"(?:t|time|times|timestamp)[ _]*[\[(]?(s|ms|us|ns)?[\])]?")
@@ -41,6 +42,14 @@ def is_on_grid(times: Array) -> bool:
     """Returns whether times, shape (N,), [s], are one controller cycle apart."""
     grid = times[0] + CYCLE_TIME * np.arange(len(times))
     return bool(np.abs(times - grid).max() < _ON_GRID)
+
+
+def notes_on(times: Array) -> tuple[str, ...]:
+    """Returns a note if many samples, shape (N,), [s], are a second or more apart: perhaps they are in milliseconds."""
+    if len(times) < _MANY_SAMPLES or float(np.diff(times).min()) < 1.0:
+        return ()
+    span = float(times[-1] - times[0])
+    return (f"the samples span {span:g} s, at least 1 s apart; if the times are in ms, name their column t [ms]",)
 
 
 def read_samples(

@@ -29,6 +29,10 @@ _PIECES_PER_ROW = 5
 
 _SIGNATURES = (b"PK", b"\x93NUMPY")
 """First bytes of a NumPy archive and of a single array."""
+_OTHER_FILES = {
+    ".rcirun": "it is a recorded run, which rcilab.load_run reads",
+    ".json": "it is a program, which Program.load reads",
+}
 
 
 def write_arrays(stream: IO[bytes], content: Mapping[str, ArrayLike]) -> None:
@@ -140,7 +144,8 @@ def _read(file: str | PathLike[str] | BinaryIO, name: str, max_rows: int) -> dic
     if not content:
         raise InvalidValueError("motion file", name, "cannot be read as a motion: it is empty")
     if not content.startswith(_SIGNATURES):
-        raise InvalidValueError("motion file", name, "cannot be read as a motion: it was not written by Motion.save")
+        problem = _OTHER_FILES.get(Path(name).suffix.lower(), "it was not written by Motion.save")
+        raise InvalidValueError("motion file", name, f"cannot be read as a motion: {problem}")
     problem = "cannot be read as a motion: it is damaged, or has another content; save the motion again"
     return read_arrays(
         content, "motion file", name, problem, max_rows, lambda shapes: _require_shapes(shapes, name, max_rows)

@@ -56,6 +56,8 @@ def decode_chunks(content: bytes, name: str, max_chunks: int) -> tuple[Chunk, ..
     """
     if not content.startswith(MAGIC):
         problem = "is empty" if not content else "is not a run: rcilab did not write it, or its beginning is missing"
+        if not name.endswith(".rcirun"):
+            problem += "; the files of runs are .rcirun"
         raise InvalidValueError("run file", name, problem).coded("no_run", file=name)
     if len(content) < _HEADER.size:
         raise InvalidValueError("run file", name, "ends before its first cycle; nothing was recorded in it").coded(

@@ -24,6 +24,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.plant import Drive, Measurement, Setpoint
 from rcilab.sim.push import Push
 
+_REMEDY = "use plant='mujoco' (in a shell: rcilab controller --plant mujoco)"
 _CYCLE, _HALF = scalar(CYCLE_TIME), scalar(CYCLE_TIME / 2.0)  # [s]
 
 
@@ -68,25 +69,23 @@ class IdealPlant:
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Refuses: this plant does not simulate contact."""
-        raise UsageError(f"box {name!r}: the ideal plant does not simulate contact; use plant='mujoco'").coded(
-            "no_contact"
-        )
+        raise UsageError(f"box {name!r}: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
 
     def remove_box(self, name: str) -> None:
         """Refuses: this plant does not simulate contact."""
-        raise UsageError(
-            f"box {name!r}: the ideal plant does not simulate contact and has no boxes; use plant='mujoco'"
-        ).coded("no_contact")
+        raise UsageError(f"box {name!r}: the ideal plant does not simulate contact and has no boxes; {_REMEDY}").coded(
+            "no_contact"
+        )
 
     def set_floor(self, on: bool) -> None:
         """Refuses a floor."""
         if on:
-            raise UsageError("floor: the ideal plant does not simulate contact; use plant='mujoco'").coded("no_contact")
+            raise UsageError(f"floor: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
 
     def set_walls(self, box: SafetyBox | None) -> None:
         """Refuses walls."""
         if box is not None:
-            raise UsageError("walls: the ideal plant does not simulate contact; use plant='mujoco'").coded("no_contact")
+            raise UsageError(f"walls: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Advances by one cycle."""

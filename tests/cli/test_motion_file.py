@@ -99,7 +99,13 @@ def test_json_has_the_verdict_every_condition_and_the_slow_down(file, tmp_path, 
 
 def test_a_reader_that_goes_away_leaves_the_exit_code_and_no_traceback(file):
     command = [sys.executable, "-m", "rcilab.cli"]
-    for arguments, code in ((["check", str(file)], 0), (["check", "no.npz"], 2), (["urdf", "xMatePro7"], 141)):
+    doctor = main(["doctor", "--seconds", "0"])
+    for arguments, code in (
+        (["check", str(file)], 0),
+        (["check", "no.npz"], 2),
+        (["urdf", "xMatePro7"], 141),
+        (["doctor", "--seconds", "0"], doctor),
+    ):
         process = subprocess.Popen([*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         process.stdout.close()
         err = process.stderr.read()

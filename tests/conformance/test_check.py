@@ -131,7 +131,7 @@ def test_require_returns_the_report_or_raises_with_all_violations():
 
 
 def test_a_motion_or_start_for_another_arm_is_refused():
-    with pytest.raises(InvalidValueError, match="for 7 joints, xMate3 has 6"):
+    with pytest.raises(InvalidValueError, match="motion: it is for 7 joints, xMate3 has 6"):
         check(MOTION, load_model("xMate3"))
     with pytest.raises(InvalidValueError, match="start"):
         check(MOTION, MODEL, start=np.zeros(6))

@@ -190,6 +190,18 @@ def test_samples_that_go_on_for_hours_are_refused_before_they_fill_the_memory(tm
         Motion.load_samples(file_of(tmp_path, "0.1\n0.2\n"), rate_hz=1e-6)
 
 
+def test_times_that_are_probably_milliseconds_get_a_note(tmp_path):
+    slow, fast = (
+        file_of(tmp_path, "\n".join(f"{step * i},0,0.5,0,1,0,1,{1e-3 * i}" for i in range(30)), name)
+        for step, name in ((1.0, "ms.csv"), (0.01, "s.csv"))
+    )
+    assert Motion.load(fast).notes == ()
+    (note,) = Motion.load(slow).notes
+    assert note.endswith("if the times are in ms, name their column t [ms]")
+    with pytest.raises(InvalidValueError, match=r"pass max_rows=29001 .*; .* name their column t \[ms\]"):
+        Motion.load(slow, max_rows=1000)
+
+
 def test_the_csv_of_a_recorded_run_is_read_by_its_columns_t_and_q(tmp_path):
     run = some_run()
     run.save(tmp_path / "run.csv")

@@ -144,6 +144,13 @@ def test_a_single_array_and_pickles_are_refused(tmp_path):
         Motion.load(tmp_path / "y.npz")
 
 
+def test_a_file_of_another_kind_is_named_with_the_function_that_loads_it(tmp_path):
+    for name, function in (("a.rcirun", r"rcilab\.load_run"), ("a.json", r"Program\.load")):
+        (tmp_path / name).write_text("{}")
+        with pytest.raises(InvalidValueError, match=function):
+            Motion.load(tmp_path / name)
+
+
 def test_missing_and_unwritable_files_are_named(tmp_path):
     with pytest.raises(InvalidValueError, match=r"nothing\.npz.*does not exist"):
         Motion.load(tmp_path / "nothing.npz")
