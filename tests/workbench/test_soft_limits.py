@@ -17,8 +17,11 @@ from rcilab.app.setup.configuration_state import pending_parts
 from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.text import Text
 from rcilab.execution.simulation_control import SimulationControl
+from rcilab.model.robot_model import load_model
 from rcilab.workbench.app import Workbench
 from tests.workbench.opened import opened, wait
+
+OWN = load_model("xMatePro7").limits.joint
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +53,11 @@ def test_a_limit_that_leaves_the_goal_or_the_arm_outside_is_named_at_once() -> N
         wait(lambda: state().goal.reach.reason.code == "reach.at_soft", "the goal's new verdict")
         assert state().goal.reach.reason.values["joint"] == 1
         ask(PressSetup(what="undo"))
-        wait(lambda: state().goal.reach.tone == "good", "the old verdict")
+        wait(lambda: state().goal.reach.tone == "good" and outdated(state()) is None, "the old verdict")
+        outside = state().model.with_joint_limits(OWN.lower, np.r_[here[0] - 0.1, OWN.upper[1:]])
+        reason = obstacle(replace(state(), model=outside), bench.session.status())
+        assert reason is not None
+        assert reason.code == "plan.start_soft"
         ask(PoseGoal(name="here"))
         wait(lambda: state().plan is None, "no plan at the goal")
         ask(TypeField(field="setup.joints.upper.0", text=f"{np.degrees(here[0]) - 10.0:.2f}"))

@@ -38,12 +38,12 @@ def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     resting = arm_obstacle(status.phase, status.powered, is_pressed=status.is_pressed, is_released=is_released)
     if resting is not None:
         return resting
+    outside = None if status.q_c is None else explain_outside(state.model, "start", status.q_c)
     if state.plan is None:
-        outside = None if status.q_c is None else explain_outside(state.model, "start", status.q_c)
         return outside or plan_obstacle(None, status.q_c)
     changed = outdated(state)
     if changed is not None:
-        return changed
+        return outside or changed
     unset = setup_obstacle(state, status)
     if unset is not None:
         return unset
