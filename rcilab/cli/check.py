@@ -33,7 +33,7 @@ def add_parser(subparsers: Any) -> None:
         "--slow-down",
         type=Path,
         metavar="OUT",
-        help="also write the motion (.npz or .csv), slowed down by the smallest factor that conforms; none if none does",
+        help="also write the motion (.npz or .csv), slowed by the smallest factor that conforms; nothing if none does",
     )
     parser.add_argument(
         "--mode",

@@ -85,10 +85,10 @@ def _motion_row(row: Condition) -> Condition:
             row,
             necessity="necessary",
             fault=FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
-            source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: ours)",
+            source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: rcilab)",
             bounds=joint_tolerance(START_TOLERANCE),
         )
-    ours = "" if row.signal == "torque" else "; tolerance: ours"
+    ours = "" if row.signal == "torque" else "; tolerance: rcilab"
     return replace(row, source=f"{_PAGE}, recommended (printed for Cartesian trajectories{ours})")
 
 
@@ -106,7 +106,7 @@ def _inverse_row(row: Condition) -> Condition:
 def _tool_row(row: Condition) -> Condition:
     source = f"{_PAGE}, Cartesian trajectory, necessary; {_ERRORS}"
     if row.signal != "arm_angle":
-        return replace(row, fault=_TOOL_ERRORS[row.order], source=f"{source} (norm: ours)")
+        return replace(row, fault=_TOOL_ERRORS[row.order], source=f"{source} (norm: rcilab)")
     elbow = replace(
         row,
         quantity=row.quantity.replace("arm angle", "elbow"),
@@ -154,14 +154,14 @@ _TOOL = (
         CARTESIAN_FRAME,
         formula="T_c proper, reachable, not singular at q_3",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG,
-        source=f"{_PAGE}, Cartesian trajectory, necessary (singular: ours)",
+        source=f"{_PAGE}, Cartesian trajectory, necessary (singular: rcilab)",
     ),
     *(_tool_row(row) for row in TOOL_CONDITIONS if row is not CARTESIAN_POSITION),
     _ELBOW_SIGN,
     *(_inverse_row(row) for row in JOINT_CONDITIONS),
     replace(
         START_POSE,
-        source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: ours)",
+        source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: rcilab)",
         bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
         necessity="necessary",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
@@ -172,7 +172,7 @@ _TOOL = (
         formula="q_3,c = q_3",
         necessity="necessary",
         unit="rad",
-        source=f"{_ERRORS} (tolerance: ours)",
+        source=f"{_ERRORS} (tolerance: rcilab)",
         fault=FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID,
         stage="start",
         signal="arm_angle",
@@ -180,7 +180,7 @@ _TOOL = (
         bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
     ),
     *(
-        replace(row, source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: ours)")
+        replace(row, source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: rcilab)")
         for row in TOOL_STANDSTILL_CONDITIONS
     ),
 )
@@ -199,7 +199,7 @@ _TORQUES = (
         formula="tau_c = 0",
         necessity="recommended",
         unit="N m",
-        source=f"{_PAGE}, controller, recommended (tolerance: ours, what one cycle may change)",
+        source=f"{_PAGE}, controller, recommended (tolerance: rcilab, what one cycle may change)",
         fault=None,
         stage="start",
         signal="torque",
@@ -214,7 +214,7 @@ _BEHAVIOUR = (
         replace(
             row,
             fault=_MEASURED_ERRORS[row.signal, row.order],
-            source=f"{_ERRORS}; bound: the commanded one with our allowance",
+            source=f"{_ERRORS}; bound: the commanded one with rcilab's allowance",
         )
         for row in MEASURED_CONDITIONS
         if (row.signal, row.order) in _MEASURED_ERRORS

@@ -55,9 +55,9 @@ def _tool_row(row: Condition) -> Condition:
         if row.order:
             source = "4.6 (elbow); bound: the vendor SDK's rate limiter, the manual gives none"
     elif row.order == 1:
-        fault, source = Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION, "4.2 and 4.4 (norm: ours)"
+        fault, source = Fault.COMMAND_CARTESIAN_VELOCITY_LIMITS_VIOLATION, "4.2 and 4.4 (norm: rcilab)"
     else:
-        fault, source = Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, "4.2 and 4.4 (norm: ours)"
+        fault, source = Fault.COMMAND_CARTESIAN_ACCELERATION_LIMITS_VIOLATION, "4.2 and 4.4 (norm: rcilab)"
     if row.order == 3 and row.signal != "arm_angle":
         source += ": the acceleration's bit, because a Cartesian jerk has no bit of its own"
     return replace(row, fault=fault, source=f"{MANUAL}, {source}")
@@ -79,13 +79,13 @@ _MEASURED_FAULTS = {
 def _measured_row(row: Condition) -> Condition:
     bound = "4.6; bound: the commanded one"
     if row.signal == "position":
-        source = f"3.1.4 and 4.6; bound: the box and {BOX_ALLOWANCE:g} m (our allowance)"
+        source = f"3.1.4 and 4.6; bound: the box and {BOX_ALLOWANCE:g} m (rcilab's allowance)"
     elif row.order == 0:
-        source = f"{bound} and {math.degrees(ANGLE_ALLOWANCE):g} deg (our allowance)"
+        source = f"{bound} and {math.degrees(ANGLE_ALLOWANCE):g} deg (rcilab's allowance)"
     elif row.order == 1:
-        source = f"{bound} x {VELOCITY_ALLOWANCE:g} (our allowance)"
+        source = f"{bound} x {VELOCITY_ALLOWANCE:g} (rcilab's allowance)"
     else:
-        source = f"{bound} x {ACCELERATION_ALLOWANCE:g} (our allowance), low-passed at {ACCELERATION_CUTOFF:g} Hz"
+        source = f"{bound} x {ACCELERATION_ALLOWANCE:g} (rcilab's allowance), low-passed at {ACCELERATION_CUTOFF:g} Hz"
     return replace(row, fault=_MEASURED_FAULTS[row.signal, row.order], source=f"{MANUAL}, {source}")
 
 
@@ -99,7 +99,7 @@ _TORQUES = tuple(replace(row, source=f"{MANUAL}, 4.1 and 4.4 (gravity excepted)"
 _MOTION = (
     *RCI_JOINT_CONDITIONS,
     *_TORQUES,
-    *(replace(row, source=f"{MANUAL}, 4.1 (tolerance: ours)") for row in JOINT_END_CONDITIONS),
+    *(replace(row, source=f"{MANUAL}, 4.1 (tolerance: rcilab)") for row in JOINT_END_CONDITIONS),
 )
 
 RCI_TOOL_CONDITIONS: tuple[Condition, ...] = tuple(_tool_row(row) for row in TOOL_CONDITIONS)
@@ -109,7 +109,7 @@ _FRAME = replace(
     CARTESIAN_FRAME, fault=Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME, source=f"{MANUAL}, 4.2 and 4.6"
 )
 _TOOL_ENDS = tuple(
-    replace(row, source=f"{MANUAL}, 4.2 (tolerance: ours)") for row in (START_POSE, *TOOL_STANDSTILL_CONDITIONS)
+    replace(row, source=f"{MANUAL}, 4.2 (tolerance: rcilab)") for row in (START_POSE, *TOOL_STANDSTILL_CONDITIONS)
 )
 
 RCI_TORQUE_CONDITIONS: tuple[Condition, ...] = (

@@ -44,7 +44,7 @@ def await_first_state(link: RciConnection, address: RciAddress, local: tuple[str
         raise ConnectionLostError(
             f"{address} accepted the connection but sent no state to {local[0]}:{local[1]} within {timeout:g} s; check "
             "that the teach pendant's RCI page names this computer's address and that no firewall drops UDP; if the "
-            "robot sends to another port of ours, add ?client_port=N to its address"
+            "robot sends to another port of this computer, add ?client_port=N to its address"
         ).coded("no_state", address=str(address), seconds=f"{timeout:g}")
 
 
