@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, drop_unread_output, show
-from rcilab.core.errors import ControlError, InvalidValueError, RcilabError, RecordedError, UsageError
+from rcilab.core.errors import (
+    ControlError,
+    InvalidValueError,
+    ManualRecoveryError,
+    RcilabError,
+    RecordedError,
+    UsageError,
+)
 from rcilab.core.fault import name_faults
 
 if TYPE_CHECKING:
@@ -218,7 +225,10 @@ def _plan_to_start(motion: Motion, robot: RobotSession, q: JointVector) -> list[
 def _recover(robot: RobotSession, state: RobotState, args: Namespace) -> None:
     names = name_faults(state.faults)
     print(f"The robot is stopped by {names}; clearing it. Nothing moves yet.", file=_text_stream(args))
-    robot.recover()
+    try:
+        robot.recover()
+    except ManualRecoveryError:  # Too far outside; switching the power off clears the fault, too.
+        robot.power_off()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

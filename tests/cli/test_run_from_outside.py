@@ -16,13 +16,14 @@ from rcilab.execution.session import connect
 MODEL = load_model("xMate3")
 
 
-def test_the_way_to_the_start_leads_back_inside_the_joint_ranges_first(tmp_path, capsys):
+@pytest.mark.parametrize("speed", [0.5, 1.5])  # Recovered, and too far outside for that: the power is switched.
+def test_the_way_to_the_start_leads_back_inside_the_joint_ranges_first(tmp_path, capsys, speed):
     near = MODEL.home.copy()
     near[4] = MODEL.limits.joint.upper[4] - np.radians(3.0)
 
     def swing(state, t):
         q = near.copy()
-        q[4] += 0.5 * (t - np.sin(2.0 * np.pi * min(t, 1.0)) / (2.0 * np.pi))
+        q[4] += speed * (t - np.sin(2.0 * np.pi * min(t, 1.0)) / (2.0 * np.pi))
         return JointPosition(q, finished=t > 2.0)
 
     file = tmp_path / "motion.csv"
