@@ -23,6 +23,7 @@ is not a margin for lost packets; the streaming client adds that.
 RECOVERY_RANGE = radians(20.0)
 """Largest distance of a joint from its range at which a recovery may start, [rad]. The arms stop within 18 degrees from
 full speed, so a larger distance is not caused by a late stop."""
+_BACK = "plan_recovery(model, q) moves back inside (in a shell: rcilab run --to-start)"
 _ROUNDING = 1e-6  # [rad] Widening that covers rounding at the start.
 
 
@@ -46,7 +47,7 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
-        soft, back = limits.exceeded_soft_limit(i + 1, angle), "plan_recovery(model, q) moves back inside"
+        soft, back = limits.exceeded_soft_limit(i + 1, angle), _BACK
         if soft is None and what == "start":
             raise PlanningError(f"{message}if the arm is there, {back}").coded("range_start", **facts)
         if soft is None:

@@ -399,7 +399,9 @@ def require_motion(motion: object) -> Motion:
     """
     if isinstance(motion, Motion):
         return motion
-    raise InvalidValueError("motion", described(motion), "must be a motion; use plan_joint or Motion.from_samples")
+    raise InvalidValueError(
+        "motion", described(motion), "must be a motion; use plan_joint, plan_program or Motion.from_samples"
+    )
 
 
 def stationary_motion(q: ArrayLike, *, law: TimeLaw = "jerk_limited", speed: float = 1.0) -> Motion:

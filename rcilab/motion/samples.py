@@ -77,7 +77,9 @@ def read_samples(
     if times is None:
         if rate_hz is None:
             raise InvalidValueError(
-                "samples", path.name, "has no times; pass rate_hz, the samples per second, or add a column t [s]"
+                "samples",
+                path.name,
+                "has no times; add a column t [s] or, in Python, pass rate_hz, the samples per second",
             ).coded("table_no_times", file=path.name)
         times = np.arange(len(q)) / rate_hz
     elif rate_hz is not None:
@@ -98,7 +100,7 @@ def _from_csv(
     first = 0 if has_rate else 1
     if table.columns == first:
         raise InvalidValueError(
-            locations[0], "a single column", "needs a time and the joints, or rate_hz and the joints"
+            locations[0], "a single column", "needs a time and the joints; in Python, rate_hz replaces the time"
         )
     q = np.stack([table.column(i) for i in range(first, table.columns)], axis=1)
     return None if has_rate else table.column(0), np.radians(q) if unit == "deg" else q, locations

@@ -110,7 +110,7 @@ def test_csv_and_npz_in_every_dress_give_the_same_motion(tmp_path):
         ("t,q1,joint_1\n0,1,1\n", {}, "line 1: 'joint_1' is a second column for joint 1"),
         ("t,time,q1\n0,0,1\n", {}, "line 1: 'time' is a second column of times"),
         ("speed,power\n0,1\n", {}, "line 1: .*names the joints none"),
-        ("q1,q2\n0,1\n", {}, "no times; pass rate_hz"),
+        ("q1,q2\n0,1\n", {}, r"no times; add a column t \[s\] or, in Python, pass rate_hz"),
         ("t,q1\n0,1\n", {"rate_hz": 100}, "is not needed"),
         ("t,q1\n0,1\n1,90\n", {}, r"line 3: 90.0 rad of joint 1 .*unit='deg'"),
         (b"t,q1\n0,1\n\xff\xfe,2\n", {}, "line 3: .*not UTF-8 text"),
