@@ -75,7 +75,8 @@ def test_a_program_is_written_by_keyboard_planned_saved_and_loaded(writing, tmp_
         choosing.value.set_files(path)
         if path is bad:
             page.wait(lambda: any("bad.json, line" in text for text in page.alerts()), "the line that is wrong")
-            page.wait(lambda: "Not loaded" in page.toast(), "to be told on any tab")
+            assert sum("bad.json" in text for text in page.alerts()) == 1, "said once, beside the button"
+            assert "bad.json" not in page.toast()
             assert page.tab.get_by_text("Uploading", exact=False).locator("visible=true").count() == 0
             assert len(steps()) == 2
     page.wait(lambda: page.state.program.selected not in (first, second), "the saved program back")

@@ -216,7 +216,7 @@ class Plots:
         """Returns the height of each plot, [px]."""
         hint = 0 if state.plan is not None else _HINT
         spare = state.height - _OTHER_HEIGHT - self._above - hint - _TIMES - _TITLE * rows
-        return max(72, min(int(spare / max(rows, 1)), 260)) // 4 * 4
+        return max(56, min(int(spare / max(rows, 1)), 260)) // 4 * 4
 
 
 def _wanted(state: UiState) -> tuple[str, ...]:
