@@ -177,11 +177,11 @@ def still(camera: Camera, path: Path) -> None:
     ask, state = camera.ask, camera.bench.store
     ask(SetSetup(name="box", value=True))
     ask(SetSetup(name="active", value=True))
-    for face, place in BOX.items():
-        ask(TypeField(field=f"setup.box.{face}", text=str(place)))
+    for face, playhead in BOX.items():
+        ask(TypeField(field=f"setup.box.{face}", text=str(playhead)))
     camera.pose(GOAL)
     camera.wait(lambda: state.state.plan is not None and not state.state.plan.report.ok)
-    ask(Seek(place=0.45))
+    ask(Seek(playhead=0.45))
     camera.tab_named("Check").click()
     camera.tab.wait_for_timeout(1500)
     camera.settle(4)
@@ -217,8 +217,8 @@ def turn(camera: Camera) -> None:
     camera.glide(camera.spot("/elbow/handle"), 4, drawn=1)
     places = [camera.spot("/live", point) for point in goal[1:]]
     with camera.held():
-        for place in places:
-            camera.glide(place, 3, drawn=1)
+        for playhead in places:
+            camera.glide(playhead, 3, drawn=1)
     camera.take(600)
     camera.say("Every branch of the inverse, before it is chosen")
     for row in (1, 2):

@@ -68,7 +68,7 @@ class AppState:
     """How the tool moves to the goal."""
     via: Pose | None = None
     """Via point of an arc."""
-    place: float = 0.0
+    playhead: float = 0.0
     """Place of the preview in the plan, 0 to 1."""
     playing: bool = False
     notices: tuple[Toast, ...] = ()

@@ -50,9 +50,9 @@ class DrawInSoftware(Request):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seek(Request):
-    """Go to a place in the planned motion."""
+    """Go to a position in the planned motion."""
 
-    place: float
+    playhead: float
     """0 to 1."""
 
     @property
@@ -112,9 +112,9 @@ class ViewActions:
         }
 
     def seek(self, request: Seek) -> None:
-        """Moves the preview to a place of the plan and pauses it."""
-        if math.isfinite(request.place):
-            self._store.update(place=min(max(request.place, 0.0), 1.0), playing=False)
+        """Moves the preview to a position of the plan and pauses it."""
+        if math.isfinite(request.playhead):
+            self._store.update(playhead=min(max(request.playhead, 0.0), 1.0), playing=False)
 
     def play(self, request: Play) -> None:
         """Starts the preview, from the beginning if it is at the end, or pauses it."""
@@ -123,7 +123,7 @@ class ViewActions:
         if state.plan is None:
             self._store.notify("warn", message("ready.no_plan"))
         elif playing:
-            self._store.update(playing=True, place=0.0 if state.place >= 1.0 else state.place)
+            self._store.update(playing=True, playhead=0.0 if state.playhead >= 1.0 else state.playhead)
         else:
             self._store.update(playing=False)
 
@@ -132,10 +132,10 @@ class ViewActions:
         state = displayed_state(self._store.state)
         if not state.playing or state.plan is None:
             return
-        place = state.place + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
-        if state.loop and place >= 1.0:
-            place = 0.0
-        self._store.update(place=min(place, 1.0), playing=place < 1.0)
+        playhead = state.playhead + elapsed * state.rate / max(state.plan.motion.duration, 1e-3)
+        if state.loop and playhead >= 1.0:
+            playhead = 0.0
+        self._store.update(playhead=min(playhead, 1.0), playing=playhead < 1.0)
 
     def enter(self, request: CommitField) -> None:
         """Takes the typed text of a page at once."""

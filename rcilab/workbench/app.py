@@ -199,8 +199,8 @@ class Workbench:
 
     def _request_of(self, page: int, message: live.PageMessage) -> Request:
         match message:
-            case live.Seek(place):
-                return Seek(page=page, place=self.renderer.place_at(min(max(place, 0.0), 1.0)))
+            case live.Seek(share):
+                return Seek(page=page, playhead=self.renderer.playhead_at(min(max(share, 0.0), 1.0)))
             case live.Size(height):
                 return SetView(page=page, name="height", value=min(max(height, _LOWEST), _HIGHEST))
             case live.Tab(index):
@@ -219,8 +219,8 @@ class Workbench:
                 return ChooseBranch(page=page, index=index)
             case live.Condition(id):
                 return PressCheck(page=page, what="row", row=id)
-            case live.Edit(what, key, place):
-                return EditProgram(page=page, what=what, key=key, place=place)
+            case live.Edit(what, key, index):
+                return EditProgram(page=page, what=what, key=key, index=index)
         raise AssertionError(message)
 
     def _bring_back(self, page: int) -> None:

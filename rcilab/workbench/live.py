@@ -50,9 +50,9 @@ class Home(PageMessage):
 
 
 class Seek(PageMessage):
-    """A plot was clicked at this place of its time axis, 0 to 1."""
+    """A plot was clicked at this share of its time axis, 0 to 1."""
 
-    place: float
+    share: float
 
 
 class Size(PageMessage):
@@ -109,8 +109,8 @@ class Edit(PageMessage):
     what: Literal["select", "move", "up", "down", "delete", "duplicate", "undo", "redo"]
     key: _Key
     """Key of the waypoint."""
-    place: _Key
-    """Its new place, from 0."""
+    index: _Key
+    """Its new index, from 0."""
 
 
 _DECODER = msgspec.json.Decoder(

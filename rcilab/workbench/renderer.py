@@ -112,7 +112,7 @@ class Renderer:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
-        self._places: list[int] = []  # Of each panel, the number of its tab.
+        self._tab_numbers: list[int] = []  # Of each panel, that of its tab.
         self._open: dict[int, int] = {}  # Number of the open tab, by page. Owned by the event loop.
         self._closed_shown = -math.inf  # [s] When the panels of closed tabs were last shown.
         self._tabs: list[PersistentTab] = []  # Those of the main panel, then that of the timeline's window.
@@ -151,8 +151,8 @@ class Renderer:
         """Forgets the open tab of a page that has closed."""
         self._open.pop(page, None)
 
-    def place_at(self, share: float) -> float:
-        """Returns the place in the motion, 0 to 1, at a place of the plots' time axis."""
+    def playhead_at(self, share: float) -> float:
+        """Returns the position in the motion, 0 to 1, at a share of the plots' time axis."""
         state = displayed_state(self._store.state)
         if state.plan is None:
             return 0.0
@@ -199,8 +199,8 @@ class Renderer:
         now, opened = time.monotonic(), {len(_TABS), *list(self._open.values())}
         is_all = now - self._closed_shown >= _READ
         self._closed_shown = now if is_all else self._closed_shown
-        for place, panel in zip(self._places, self._panels, strict=True):
-            if is_all or place in opened:
+        for number, panel in zip(self._tab_numbers, self._panels, strict=True):
+            if is_all or number in opened:
                 panel.show(seen if panel is self._timeline else state, status)
 
     def _build(self, state: UiState) -> None:
@@ -211,20 +211,20 @@ class Renderer:
         self._text = Text(state.language, state.units)
         self._built = _looks(state)
         gui.set_panel_label(self._text("panel.main"))
-        self._panels, self._places = [], []
+        self._panels, self._tab_numbers = [], []
         self._closed_shown = -math.inf
-        for place, (tab, (label, _, *kinds)) in enumerate(zip(self._tabs, _TABS, strict=False)):
+        for number, (tab, (label, _, *kinds)) in enumerate(zip(self._tabs, _TABS, strict=False)):
             with tab.rebuild(self._text(label)):
                 for kind in kinds:
                     panel = kind(self._text, self._ask)
                     panel.build(gui, state)
                     self._panels.append(panel)
-                    self._places.append(place)
+                    self._tab_numbers.append(number)
         self._timeline = TimelinePanel(self._text, self._ask)
         with self._tabs[-1].rebuild(self._text("panel.timeline")):
             self._timeline.build(gui, state)
         self._panels.append(self._timeline)
-        self._places.append(len(_TABS))
+        self._tab_numbers.append(len(_TABS))
 
     def _lay_out(self, gui: Any) -> None:
         """Creates the containers of the panels; they stay as arranged by the operator."""

@@ -169,7 +169,7 @@ def test_what_one_page_is_told_takes_no_place_of_what_another_is_told(desk):
     for number in range(3):
         desk.store.notify("bad", message("notice.taken", page=number), page=1)
         for _ in range(100):
-            dispatcher.act(Seek(page=2, place=0.5))
+            dispatcher.act(Seek(page=2, playhead=0.5))
             dispatcher.act(TakeControls(page=2))
     notices = desk.store.state.notices
     assert [notice.text.values["page"] for notice in notices if notice.page == 1] == [0, 1, 2]

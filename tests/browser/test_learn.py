@@ -48,7 +48,7 @@ def test_a_row_leads_to_its_moment_and_a_slow_down_can_be_taken_back(page):
     page.tab.keyboard.press("Enter")
     page.wait(lambda: page.state.check.row == "joint.torque_rate", "the row")
     found = next(row for row in fast.report.rows if row.id == "joint.torque_rate")
-    assert np.isclose(page.state.place * fast.motion.duration, min(found.time, fast.motion.duration))
+    assert np.isclose(page.state.playhead * fast.motion.duration, min(found.time, fast.motion.duration))
     page.button("Slow down to fit").click()
     page.wait(lambda: page.tab.get_by_text("slowed down as a whole").is_visible(), "by how much")
     assert all(row.ok for row in page.state.plan.report.rows)

@@ -91,8 +91,8 @@ def test_play_moves_only_the_translucent_arm(page):
     page.plan_to(2, float(np.degrees(page.status.q_c[1])) - 25.0)
     before = np.array(page.status.q_c)
     page.button("Play").click()
-    page.wait(lambda: page.state.place > 0.3, "the preview to play")
-    page.wait(lambda: page.state.place == 1.0 and not page.state.playing, "the preview to end")
+    page.wait(lambda: page.state.playhead > 0.3, "the preview to play")
+    page.wait(lambda: page.state.playhead == 1.0 and not page.state.playing, "the preview to end")
     assert np.array_equal(page.status.q_c, before)
 
 
@@ -102,10 +102,10 @@ def test_a_click_in_a_plot_moves_the_timeline(page):
 
     def click_until_it_moves() -> bool:  # A plot is drawn anew for the new plan; a click on the old one is lost.
         box = over.bounding_box()
-        if box is not None and page.state.place == 0.0:
+        if box is not None and page.state.playhead == 0.0:
             page.tab.mouse.click(box["x"] + box["width"] * 0.3, box["y"] + box["height"] / 2)
-        return page.state.place > 0.0
+        return page.state.playhead > 0.0
 
     page.wait(click_until_it_moves, "the timeline to move")
-    t = page.state.place * page.state.plan.motion.duration
+    t = page.state.playhead * page.state.plan.motion.duration
     page.wait(lambda: page.shows("plan", page.state.plan.motion.at(t).q, 1e-4), "the plan's arm at that moment")

@@ -85,9 +85,9 @@ def _page_messages(bench: Workbench) -> list[bytes]:
 
 def _words(page: int, key: str) -> list[bytes]:
     kinds = ("seek", "size", "here", "tab", "entered", "home", "peek", "software", "branch", "condition")
-    fields = {"place": 0.5, "height": 700.0, "index": 1, "branch": 1, "id": "joint.velocity"}
+    fields = {"share": 0.5, "height": 700.0, "index": 1, "branch": 1, "id": "joint.velocity"}
     said = [{"kind": kind, **fields} for kind in kinds]
-    said += [{"kind": "edit", "what": what, "key": 1, "place": 0} for what in ("select", "move", "delete", "undo")]
+    said += [{"kind": "edit", "what": what, "key": 1, "index": 0} for what in ("select", "move", "delete", "undo")]
     return [json.dumps(words).encode() for words in ({"kind": "hello", "page": page, "key": key}, *said)]
 
 

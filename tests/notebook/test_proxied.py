@@ -42,10 +42,10 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]
 def test_a_scene_is_live_through_the_proxy(server: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     import_module("ipykernel")  # What makes this process look like a kernel.
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", server["runtime"])
-    place = find_reachability({"JPY_PARENT_PID": str(server["pid"])})
-    assert (place.way, place.base) == ("proxy", "/arm/")
+    reachability = find_reachability({"JPY_PARENT_PID": str(server["pid"])})
+    assert (reachability.route, reachability.base) == ("proxy", "/arm/")
     model = rcilab.load_model("xMate3")
-    with notebook.Scene(model, place=place) as scene:
+    with notebook.Scene(model, reachability=reachability) as scene:
         found = re.search(r'src="(/arm/proxy/[^"]*)"', scene._frame.value)
         assert found is not None
         origin = f"http://127.0.0.1:{server['port']}"

@@ -85,7 +85,7 @@ def test_an_angle_that_is_no_number_changes_nothing(bench, ask, angle):
     ask(MoveTarget(position=(0.5, 0.0, 0.5), wxyz=(0.0, 0.0, 0.0, 0.0)))
     ask(SetArmAngle(psi=angle))
     ask(SetSpeed(speed=angle))
-    ask(Seek(place=angle))
+    ask(Seek(playhead=angle))
     assert bench.store.state.goal is before
 
 
@@ -262,7 +262,7 @@ def test_execute_runs_the_plan_records_it_and_then_asks_for_a_new_one(bench, ask
     ask(RobotCommand(what="execute"))
     wait(lambda: told(bench) == "notice.arrived", "the arrival")
     assert np.abs(bench.session.status().q_c - goal).max() < 1e-9
-    wait(lambda: bench.store.state.place == 1.0, "the preview to stand where the arm has arrived")
+    wait(lambda: bench.store.state.playhead == 1.0, "the preview to stand where the arm has arrived")
     recording = bench.store.state.recording
     assert recording is not None
     duration = bench.store.state.plan.motion.duration
@@ -293,7 +293,7 @@ def test_a_motion_that_was_seldom_looked_at_leaves_the_preview_where_it_ended(be
     wait(lambda: told(bench) == ("notice.arrived" if what == "execute" else "notice.stopped"), "its end to be told")
     left = bench.session.status().motion_plan_time / bench.store.state.plan.motion.duration
     assert (left == 1.0) is (what == "execute")
-    wait(lambda: bench.store.state.place == left, "the preview to stand there")
+    wait(lambda: bench.store.state.playhead == left, "the preview to stand there")
 
 
 def test_stop_ends_a_motion_and_says_so(bench, ask):
@@ -309,12 +309,12 @@ def test_stop_ends_a_motion_and_says_so(bench, ask):
     wait(lambda: told(bench) == "notice.stopped", "the stop to be told")
     assert bench.session.status().phase == "idle"
     assert abs(float(bench.session.status().q_c[0]) - start) < 0.7
-    wait(lambda: 0.0 < bench.store.state.place < 0.9, "the preview to stand where the arm has left the plan")
+    wait(lambda: 0.0 < bench.store.state.playhead < 0.9, "the preview to stand where the arm has left the plan")
 
 
 def test_while_the_arm_moves_the_timeline_is_where_the_arm_is(bench):
     plan = make_plan(bench.store.state.model, np.zeros(7), np.full(7, 0.2), 0.5, "jerk_limited")
-    state = replace(bench.store.state, plan=plan, place=0.25)
+    state = replace(bench.store.state, plan=plan, playhead=0.25)
     still, moving = (replace(bench.session.status(), phase=phase, motion_plan_time=0.1) for phase in ("idle", "moving"))
     assert time_shown(state, still) == pytest.approx(0.25 * plan.motion.duration)
     assert time_shown(state, moving) == 0.1

@@ -92,7 +92,7 @@ def bench() -> Bench:
 def test_a_row_leads_to_its_worst_moment_and_its_joint(bench: Bench) -> None:
     row = next(row for row in bench.plan.report.rows if row.id == "joint.velocity")
     bench.press("row", row.id)
-    assert bench.state.place * bench.plan.motion.duration == pytest.approx(row.time)
+    assert bench.state.playhead * bench.plan.motion.duration == pytest.approx(row.time)
     assert bench.state.plot_joint == row.joint
     bench.press("row", "joint.torque_rate")
     assert "tau" in bench.state.plots
@@ -151,10 +151,10 @@ def test_where_a_lower_speed_does_it_the_plan_is_made_anew_with_that(bench: Benc
 
 
 def planned_program(bench: Bench) -> Draft:
-    place = MODEL.forward(HOME)
+    playhead = MODEL.forward(HOME)
     waypoints = (
         Waypoint.joint(HOME + np.array([1.0, 0.8, 0.0, -0.6, 0.0, 0.0, 0.0]), speed=1.0),
-        Waypoint.line(Pose(place.position, place.wxyz), speed=0.5),
+        Waypoint.line(Pose(playhead.position, playhead.wxyz), speed=0.5),
     )
     bench.program.restore(Program(model=MODEL.name, start=MODEL.home, waypoints=waypoints))
     bench.program.plan(PlanProgram())

@@ -180,7 +180,7 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
     assert np.degrees(np.nanmax(np.abs(run.tracking.joint))) < 2.0  # Against what was asked for, pauses and all.
     assert run.has_speed_override
     assert np.array_equal(played_path(idle.store.state)[1], run.plan.q)  # And so it is drawn.
-    assert idle.renderer.place_at(1.0) == 1.0
+    assert idle.renderer.playhead_at(1.0) == 1.0
 
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):

@@ -84,7 +84,7 @@ def test_a_fault_is_shown_at_its_moment_and_the_plan_of_the_page_is_kept(bench: 
     assert [row.id for row in show.displayed.plan.report.rows if not row.ok and row.fault] == ["joint.jerk"]
     assert (
         np.abs(
-            seen.plan.motion.at(seen.place * seen.plan.motion.duration).q - show.demo.moved.q[show.demo.sample]
+            seen.plan.motion.at(seen.playhead * seen.plan.motion.duration).q - show.demo.moved.q[show.demo.sample]
         ).max()
         < 1e-3
     )
@@ -109,7 +109,7 @@ def test_the_controlled_stop_after_the_fault_is_shown_too_and_its_moment_marked(
     assert recording.moment == demo.time == demo.cycles["t"][-1]
     assert 0.1 < recording.t[-1] - demo.time <= 0.3
     assert np.abs(recording.dq[-1]).max() < 1e-3, "it stands still"
-    assert 0.0 < bench.state.place == show.place < 1.0
+    assert 0.0 < bench.state.playhead == show.playhead < 1.0
     assert (
         show.displayed.scene.motion.duration
         == show.displayed.plan.motion.duration
@@ -164,7 +164,7 @@ def test_the_first_lesson_ticks_itself_off(bench: Bench) -> None:
     bench.goal.set_joints(HOME + 0.3)
     assert bench.step() == 1
     assert bench.step() == 1
-    bench.store.update(place=0.4)
+    bench.store.update(playhead=0.4)
     assert bench.step() == 2
     bench.store.update(plan=bench.state.plan.completed())
     bench.step()

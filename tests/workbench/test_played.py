@@ -63,8 +63,8 @@ def test_the_cursor_stands_where_the_plan_was_when_it_was_run_and_a_click_finds_
     assert t > moment + 0.1
     assert slowed.recording.paced.q[round(t / CYCLE_TIME)] == pytest.approx(slowed.plan.motion.at(moment).q, abs=1e-3)
     assert moment_played(slowed, t) == pytest.approx(moment, abs=2 * CYCLE_TIME)
-    bar = status_values(replace(slowed, place=0.6), status(), Text("en"), 2.0 * t)
-    assert bar["cursor"]["place"] == pytest.approx(0.5, abs=1e-3)
+    bar = status_values(replace(slowed, playhead=0.6), status(), Text("en"), 2.0 * t)
+    assert bar["cursor"]["share"] == pytest.approx(0.5, abs=1e-3)
 
 
 def test_the_legend_says_so_in_both_languages(slowed):

@@ -130,7 +130,7 @@ def test_waypoints_are_added_after_the_selected_one_moved_copied_and_deleted_and
     assert bench.types == ["joint", "line", "line"]
     bench.edit("select", key=first)
     bench.edit("down")
-    bench.edit("move", key=second, place=2)
+    bench.edit("move", key=second, index=2)
     assert [step.key for step in bench.program.draft.steps][::2] == [first, second]
     bench.edit("delete", key=second)
     assert len(bench.types) == 2
@@ -205,7 +205,7 @@ def test_the_plan_of_a_program_is_the_pages_plan_with_a_certificate_and_names_it
     assert said == "to waypoint 3 of 3, MoveL"
     second = square.program.draft.steps[1].key
     square.edit("select", key=second)
-    assert square.state.place == pytest.approx(time_at(plan, 2) / plan.motion.duration)
+    assert square.state.playhead == pytest.approx(time_at(plan, 2) / plan.motion.duration)
     square.plan(upto=True)
     assert len(square.state.plan.program.waypoints) == 2
 
@@ -410,7 +410,7 @@ def test_a_chosen_row_is_the_one_that_the_preview_shows(square):
     for number, step in enumerate(square.program.draft.steps, start=1):
         square.edit("select", key=step.key)
         plan = square.state.plan
-        assert number_at(plan, square.state.place * plan.motion.duration) == number
+        assert number_at(plan, square.state.playhead * plan.motion.duration) == number
 
 
 def test_why_a_program_failed_is_not_said_of_another_configuration(square):

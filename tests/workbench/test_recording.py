@@ -75,7 +75,7 @@ def test_a_motion_is_recorded_whole_judged_against_its_plan_and_kept_in_a_file(b
     assert recording.tracking.joint_max.max() < 1e-6  # The ideal plant is where it is told to be.
     shown, end = bench.renderer, bench.renderer._timeline.end
     assert end > run.plan.duration
-    assert shown.place_at(0.2) * run.plan.duration == pytest.approx(0.2 * end)  # A click goes where it was clicked.
+    assert shown.playhead_at(0.2) * run.plan.duration == pytest.approx(0.2 * end)  # A click goes where it was clicked.
     back = rcilab.load_run(recording.file)
     assert back.is_complete
     assert back.cycles.tobytes() == run.cycles.tobytes()
@@ -171,8 +171,8 @@ def test_a_run_is_replayed_with_nothing_connected_until_it_is_asked_for(monkeypa
     with Workbench(WorkbenchConfig(port=0, quality="light", replay=run)) as bench:
         assert bench.store.state.model is run.model
         assert bench.store.state.recording.run is run
-        bench.dispatcher.ask(Seek(place=0.5))
-        wait(lambda: bench.store.state.place == 0.5, "the middle of the run")
+        bench.dispatcher.ask(Seek(playhead=0.5))
+        wait(lambda: bench.store.state.playhead == 0.5, "the middle of the run")
         middle = replayed_pose(bench.store.state)
         row = int(np.searchsorted(run.t, 0.5 * run.plan.duration + 1e-3))
         assert np.array_equal(middle, run.q[row])

@@ -210,7 +210,7 @@ def test_a_plan_that_leaves_the_box_has_a_bead_that_leads_to_its_moment(bench):
     bead = ribbon.markers[0]
     assert box.excess(bead.position) > 0.0
     bench.scene.show_violation(ShowViolation(number=0))
-    assert bench.state.place == pytest.approx(bead.place)
+    assert bench.state.playhead == pytest.approx(bead.playhead)
     assert bench.state.notice.tone == "bad"
     for language in LANGUAGES:
         assert "condition." not in bead_words(bead, Text(language))

@@ -191,14 +191,14 @@ def test_a_client_can_set_a_value_but_neither_nan_nor_anything_else(door):
 
 GARBAGE: tuple[str | bytes, ...] = (
     "", "{", "[]", "1", "x" * 9000, "[" * 4000, b"\xff\x00", '{"kind": []}', '{"kind": "clear"}',
-    json.dumps({"kind": "seek", "place": "x"}), '{"kind":"seek","place":NaN}', '{"kind":"seek","place":1e999}',
-    json.dumps({"kind": "seek", "place": True}), json.dumps({"kind": "answer", "yes": 1}),
+    json.dumps({"kind": "seek", "share": "x"}), '{"kind":"seek","share":NaN}', '{"kind":"seek","share":1e999}',
+    json.dumps({"kind": "seek", "share": True}), json.dumps({"kind": "answer", "yes": 1}),
     json.dumps({"kind": "condition", "id": "joint.velocity\n"}), json.dumps({"kind": "condition", "id": "a" * 61}),
     json.dumps({"kind": "peek"}), json.dumps({"kind": "peek", "branch": -1}),
     json.dumps({"kind": "branch", "index": 10**30}), json.dumps({"kind": "tab", "index": -1}),
     *(json.dumps({"kind": "edit", **edit}) for edit in (
-        {"what": "select", "key": 1}, {"what": "clear", "key": 1, "place": 1}, {"what": ["up"], "key": 1, "place": 0},
-        {"what": "select", "key": "x", "place": 0}, {"what": "select", "key": -1, "place": 0},
+        {"what": "select", "key": 1}, {"what": "clear", "key": 1, "index": 1}, {"what": ["up"], "key": 1, "index": 0},
+        {"what": "select", "key": "x", "index": 0}, {"what": "select", "key": -1, "index": 0},
     )),
 )  # fmt: skip
 
@@ -209,12 +209,12 @@ def test_stop_and_seek_arrive_over_the_live_channel_and_garbage_does_not_hurt_it
     door.malformed = 0
     with door.connect("/rcilab/live") as page:
         assert isinstance(json.loads(page.recv(timeout=10)), dict)
-        page.send(json.dumps({"kind": "seek", "place": 0.5}))  # Of nobody that we know.
+        page.send(json.dumps({"kind": "seek", "share": 0.5}))  # Of nobody that we know.
         page.send(json.dumps({"kind": "hello", "page": 7, "key": door.live.introduce(7)}))
         for garbage in GARBAGE:
             page.send(garbage)
-        page.send(json.dumps({"kind": "seek", "place": 7.0}))
-        page.send(json.dumps({"kind": "seek", "place": 0.25}))
+        page.send(json.dumps({"kind": "seek", "share": 7.0}))
+        page.send(json.dumps({"kind": "seek", "share": 0.25}))
         page.send(json.dumps({"kind": "stop"}))
         assert door.stops.wait(10.0)
     assert door.received == [(7, Here()), (7, Seek(7.0)), (7, Seek(0.25))]

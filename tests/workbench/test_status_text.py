@@ -175,13 +175,13 @@ def test_a_held_motion_has_its_own_word_and_the_cursor_stands_where_it_is_held()
     state = initial_state()
     plan = make_plan(state.model, state.model.home, state.model.home + 0.1, 0.5, "jerk_limited")
     assert isinstance(plan, Plan)
-    state = replace(state, plan=plan, place=1.0)
+    state = replace(state, plan=plan, playhead=1.0)
     held = status(phase="moving", code="moving.held", motion_time=1.9, motion_plan_time=0.25, motion_duration=9.0)
     for language, word in (("en", "paused"), ("zh", "已暂停")):
         bar = status_values(state, held, Text(language), 2.0)
         chip = next(chip for chip in bar["chips"] if chip["id"] == "phase")
         assert (chip["value"], chip["tone"], chip["hint"]) == (word, "warn", word)
-        assert bar["cursor"] == {"place": 0.125}, "the place in the plan, not how long it took to come there"
+        assert bar["cursor"] == {"share": 0.125}, "the place in the plan, not how long it took to come there"
 
 
 def test_health_says_how_many_commands_were_lost_in_a_row():

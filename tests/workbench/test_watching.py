@@ -106,7 +106,7 @@ def test_no_control_of_a_watching_page_leads_anywhere(bench):
         for name, handle in controls(bench).items():
             if "controls" not in name:
                 watcher.set(handle, True if handle._impl.is_button else poke(handle.value, handle))
-        for kind, values in (("seek", {"place": 0.7}), ("size", {"height": 333.0}), ("peek", {"branch": 1})):
+        for kind, values in (("seek", {"share": 0.7}), ("size", {"height": 333.0}), ("peek", {"branch": 1})):
             watcher.say(kind, **values)
         watcher.settle()
         wait(lambda: told(bench) == "notice.watching", "the watching page to be told")
@@ -136,7 +136,7 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
         key = before.program.draft.steps[0].key
         rows: list[tuple[str, dict[str, Any]]] = [
             ("condition", {"id": "joint.velocity"}), ("branch", {"index": 1}),
-            *(("edit", {"what": what, "key": key, "place": 0}) for what in ("delete", "duplicate", "undo", "select")),
+            *(("edit", {"what": what, "key": key, "index": 0}) for what in ("delete", "duplicate", "undo", "select")),
         ]  # fmt: skip
         with pytest.MonkeyPatch.context() as patch:
             handlers = {kind: recorded(act) for kind, act in bench.dispatcher._handlers.items()}
@@ -146,7 +146,7 @@ def test_no_row_of_a_watching_page_leads_anywhere(bench):
             watcher.settle()
             after = bench.store.state
             assert (after.program, after.goal, after.check) == (before.program, before.goal, before.check)
-            operator.say("edit", what="delete", key=key, place=0)
+            operator.say("edit", what="delete", key=key, index=0)
             wait(lambda: not bench.store.state.program.draft.steps, "the operator's message to be acted on")
         assert {type(request) for request in acted if request.page == watcher.page} <= {Refuse, CommitField}
 

@@ -106,10 +106,10 @@ class CheckActions:
         row = next((row for row in plan.report.rows if row.id == name), None)
         if row is None:
             return
-        place = row.time / max(plan.motion.duration, 1e-3)
+        playhead = row.time / max(plan.motion.duration, 1e-3)
         plot, plots = plot_of(row.condition), self._store.state.plots
         shown = plots if plot is None else plots | {plot}
-        self._store.update(place=min(max(place, 0.0), 1.0), playing=False, plot_joint=row.joint, plots=shown)
+        self._store.update(playhead=min(max(playhead, 0.0), 1.0), playing=False, plot_joint=row.joint, plots=shown)
         self._set(seek_count=self._check.seek_count + 1, row=name)
 
     def _plan_again(self, plan: Plan | None) -> None:
@@ -155,7 +155,7 @@ class CheckActions:
             self._program.exchange(result.draft, result.plan)
             sentence = message("check.slowed_program", **facts, scale=f"{100 * result.scale:.1f}")
         else:
-            self._store.update(plan=result.plan, speed=speed, recording=None, place=0.0, playing=False)
+            self._store.update(plan=result.plan, speed=speed, recording=None, playhead=0.0, playing=False)
             sentence = message("check.slowed", **facts, from_=f"{100 * state.speed:.1f}", to=f"{100 * speed:.1f}")
         if result.is_stretched:
             sentence = message("check.stretched", **facts)
@@ -171,7 +171,7 @@ class CheckActions:
             self._program.editing.edit(EditProgram(what="undo"))
             self._program.keep_plan(slowed.before)
         else:
-            self._store.update(plan=slowed.before, speed=slowed.speed, recording=None, place=0.0, playing=False)
+            self._store.update(plan=slowed.before, speed=slowed.speed, recording=None, playhead=0.0, playing=False)
         self._set(slowed=None, answer=None)
 
     def _explain(self, plan: Plan) -> None:

@@ -340,11 +340,13 @@ class GoalActions:
             if request is not None:  # Nothing has changed: the plan is kept.
                 self._store.notify("warn", message("plan.no_arm"))
             elif state.recording is None:  # A displayed run stays, whatever the goal is.
-                self._store.update(plan=None, no_plan=message("plan.no_arm"), recording=None, place=0.0, playing=False)
+                self._store.update(
+                    plan=None, no_plan=message("plan.no_arm"), recording=None, playhead=0.0, playing=False
+                )
             return
         if state.path_type != "joint" and request is None:
             self._due = time.monotonic() + SETTLED
-            self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, place=0.0, playing=False)
+            self._store.update(plan=None, no_plan=message("plan.soon"), recording=None, playhead=0.0, playing=False)
             return
         self._make(state, readonly_copy(start), is_asked=request is not None)
 
@@ -379,9 +381,9 @@ class GoalActions:
     def show(self, made: Plan | Message) -> None:
         """Shows a plan from its start, or why planning failed."""
         if isinstance(made, Plan):
-            self._store.update(plan=made, no_plan=None, recording=None, place=0.0, playing=False)
+            self._store.update(plan=made, no_plan=None, recording=None, playhead=0.0, playing=False)
         else:
-            self._store.update(plan=None, no_plan=made, recording=None, place=0.0, playing=False)
+            self._store.update(plan=None, no_plan=made, recording=None, playhead=0.0, playing=False)
 
     def settle(self) -> None:
         """Checks for collisions, too, once the goal has not changed for a moment."""

@@ -63,7 +63,7 @@ class LearnActions:
             case "close":
                 self._close()
             case "moment" if self._learn.show is not None:
-                self._store.update(place=self._learn.show.place, playing=False)
+                self._store.update(playhead=self._learn.show.playhead, playing=False)
             case "script":
                 self._set(is_script_shown=not self._learn.is_script_shown)
             case "lesson" if request.name in lessons_of(self._store.state.model):
@@ -121,12 +121,12 @@ class LearnActions:
         plan_motion = None if state.plan is None else state.plan.motion
         show = build_display(result, plan_motion)
         self._set(provoking=None, show=show)
-        self._store.update(place=show.place, playing=False)
+        self._store.update(playhead=show.playhead, playing=False)
 
     def _close(self) -> None:
         if self._learn.show is not None:
             self._set(show=None)
-            self._store.update(place=0.0, playing=False)
+            self._store.update(playhead=0.0, playing=False)
 
     def _look_beside(self) -> None:
         """Closes the display once there is something else to show: another plan, another arm, a motion."""

@@ -29,7 +29,7 @@ class Show:
     """The plan of the page when the display opened; another plan closes the display."""
 
     @property
-    def place(self) -> float:
+    def playhead(self) -> float:
         """Place of the fault on the timeline, 0 to 1; the controlled stop follows it."""
         return self.demo.moment / max(self.displayed.plan.motion.duration, CYCLE_TIME)
 

@@ -48,7 +48,7 @@ def _checked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
 
 
 def _looked(then: UiState, now: UiState, status: SupervisorStatus) -> bool:
-    return now.plan is not None and (now.playing or now.place != then.place)
+    return now.plan is not None and (now.playing or now.playhead != then.playhead)
 
 
 def _moving(then: UiState, now: UiState, status: SupervisorStatus) -> bool:

@@ -34,8 +34,8 @@ class EditProgram(Request):
     source: Literal["here", "target"] = "here"
     """Source of a waypoint, or its via point: the arm, or the goal."""
     type: str = ""
-    place: int = 0
-    """New place of a step, from 0."""
+    index: int = 0
+    """New index of a step, from 0."""
 
 
 class EditActions:
@@ -78,7 +78,7 @@ class EditActions:
             whole[request.what]()
             return
         key = self._history.state.selected if request.key is None else request.key
-        if key is None or self._draft.place(key) is None:
+        if key is None or self._draft.index(key) is None:
             self._store.notify("warn", message("program.select"))
             return
         self._edits[request.what](request, key)
@@ -150,12 +150,12 @@ class EditActions:
         if key != self._history.state.selected:
             self._store.clear_problems("program.")
         self._history.set(selected=key)
-        state, place = self._store.state, self._draft.place(key)
+        state, index = self._store.state, self._draft.index(key)
         plan = state.plan
-        if plan is None or plan.program is None or place is None or self._history.state.planned is not self._draft:
+        if plan is None or plan.program is None or index is None or self._history.state.planned is not self._draft:
             return
-        if place < len(plan.program.waypoints):
-            self._store.update(place=time_at(plan, place + 1) / max(plan.motion.duration, 1e-3), playing=False)
+        if index < len(plan.program.waypoints):
+            self._store.update(playhead=time_at(plan, index + 1) / max(plan.motion.duration, 1e-3), playing=False)
 
     def _teach(self, request: EditProgram, key: int) -> None:
         q, waypoint = self._configuration(request.source), self._draft.waypoint(key)
@@ -192,9 +192,9 @@ class EditActions:
         self._history.change(self._draft.changed(key, waypoint.retyped(request.type, via)), key)
 
     def _delete(self, request: EditProgram, key: int) -> None:
-        place = self._draft.place(key) or 0
+        index = self._draft.index(key) or 0
         draft = self._draft.without(key)
-        left = draft.steps[min(place, len(draft.steps) - 1)].key if draft.steps else None
+        left = draft.steps[min(index, len(draft.steps) - 1)].key if draft.steps else None
         self._history.change(draft, left)
 
     def _duplicate(self, request: EditProgram, key: int) -> None:
@@ -203,13 +203,13 @@ class EditActions:
         self._history.change(*self._draft.inserted(waypoint, key))
 
     def _move(self, key: int, step: int) -> None:
-        place = self._draft.place(key)
-        if place is not None and 0 <= place + step < len(self._draft.steps):
-            self._history.change(self._draft.moved(key, place + step), key)
+        index = self._draft.index(key)
+        if index is not None and 0 <= index + step < len(self._draft.steps):
+            self._history.change(self._draft.moved(key, index + step), key)
 
     def _move_to(self, request: EditProgram, key: int) -> None:
-        if self._draft.place(key) != request.place:
-            self._history.change(self._draft.moved(key, request.place), key)
+        if self._draft.index(key) != request.index:
+            self._history.change(self._draft.moved(key, request.index), key)
 
     def _aim(self, request: EditProgram, key: int) -> None:
         waypoint = self._draft.waypoint(key)

@@ -148,7 +148,7 @@ class ProgramActions:
 
     def keep_plan(self, plan: Plan) -> None:
         """Takes the plan of the unchanged program."""
-        self._store.update(plan=plan, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
+        self._store.update(plan=plan, no_plan=None, recording=None, playhead=0.0, playing=False, asked=None)
         self._history.set(planned=self._history.draft, answer=None, notes=notes_of(plan, self._history.draft.steps))
 
     def tick(self) -> None:
@@ -177,7 +177,7 @@ class ProgramActions:
         """Returns which typed number the program does not have, and why; None if it has all."""
         for field, why in self._store.state.problems.items():
             _, key, name = (*field.split("."), "", "")[:3]
-            number = self._history.draft.place(int(key)) if key.isdecimal() else None
+            number = self._history.draft.index(int(key)) if key.isdecimal() else None
             if name == "rounds":
                 return message("program.mend_rounds", why=why)
             if field.startswith("program.") and number is not None:
@@ -220,7 +220,7 @@ class ProgramActions:
         tone, answer, failed = "good", [], None
         if self._was_stretched():
             tone, answer = "warn", [message("program.unslowed")]
-        self._store.update(plan=result, no_plan=None, recording=None, place=0.0, playing=False, asked=None)
+        self._store.update(plan=result, no_plan=None, recording=None, playhead=0.0, playing=False, asked=None)
         if is_led_in(result):
             tone = "warn"
             answer.append(_describe_approach(job, result))

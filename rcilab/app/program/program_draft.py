@@ -48,19 +48,19 @@ class Draft:
     tool: Floats | None = None
     """Pose of the tool in the flange frame, as in `Program`; None: the tool of the page."""
 
-    def place(self, key: int | None) -> int | None:
-        """Returns the place of a step, from 0, or None for an unknown key."""
-        return next((place for place, step in enumerate(self.steps) if step.key == key), None)
+    def index(self, key: int | None) -> int | None:
+        """Returns the index of a step, from 0, or None for an unknown key."""
+        return next((index for index, step in enumerate(self.steps) if step.key == key), None)
 
     def waypoint(self, key: int | None) -> Waypoint | None:
         """Returns the waypoint of a step, or None."""
-        place = self.place(key)
-        return None if place is None else self.steps[place].waypoint
+        index = self.index(key)
+        return None if index is None else self.steps[index].waypoint
 
     def inserted(self, waypoint: Waypoint, after: int | None) -> tuple[Draft, int]:
         """Returns the draft with one more waypoint, after a step or at the end, and its key."""
-        place, step = self.place(after), Step(next(_KEYS), waypoint)
-        at = len(self.steps) if place is None else place + 1
+        index, step = self.index(after), Step(next(_KEYS), waypoint)
+        at = len(self.steps) if index is None else index + 1
         return replace(self, steps=(*self.steps[:at], step, *self.steps[at:])), step.key
 
     def without(self, key: int) -> Draft:
@@ -68,7 +68,7 @@ class Draft:
         return replace(self, steps=tuple(step for step in self.steps if step.key != key))
 
     def moved(self, key: int, to: int) -> Draft:
-        """Returns the draft with a step at another place, from 0, or at the nearest end."""
+        """Returns the draft with a step at another index, from 0, or at the nearest end."""
         step = next(step for step in self.steps if step.key == key)
         others = [other for other in self.steps if other.key != key]
         others.insert(min(max(to, 0), len(others)), step)
@@ -83,7 +83,7 @@ class Draft:
 
         The tool of the page is written into it, so that file and script describe the same motion anywhere.
         """
-        last = self.place(upto)
+        last = self.index(upto)
         steps = self.steps if last is None else self.steps[: last + 1]
         if not steps or self.start is None:
             return None

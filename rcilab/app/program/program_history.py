@@ -116,7 +116,7 @@ class ProgramHistory:
 
     def _exchange(self, draft: Draft, selected: int | None) -> None:
         is_dropped, history = self.interrupt(), self._current
-        if draft.place(selected) is None:
+        if draft.index(selected) is None:
             selected = draft.steps[-1].key if draft.steps else None
         self.set(
             draft=draft, selected=selected, can_undo=bool(history.past), can_redo=bool(history.future), failed=None,

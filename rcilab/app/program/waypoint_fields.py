@@ -108,11 +108,11 @@ def arm_angle_of(waypoint: Waypoint, arm: RobotModel) -> float | None:
 
 def default_via(draft: Draft, key: int, arm: RobotModel) -> Array | None:
     """Returns a point next to the straight line to a step, for an arc over it, [m]; None if there is no line."""
-    place = draft.place(key)
-    if place is None or draft.start is None:
+    index = draft.index(key)
+    if index is None or draft.start is None:
         return None
-    goal = target_of(draft.steps[place].waypoint, arm)
-    start = target_of(draft.steps[place - 1].waypoint, arm) if place else arm.forward(draft.start)
+    goal = target_of(draft.steps[index].waypoint, arm)
+    start = target_of(draft.steps[index - 1].waypoint, arm) if index else arm.forward(draft.start)
     if goal is None or start is None:
         return None
     way = goal.position - start.position

@@ -87,7 +87,7 @@ def time_shown(state: UiState, status: SupervisorStatus) -> float:
     """Returns the time of the plan, [s], at the scrubber and cursor: that of the arm during its motion."""
     if is_moving(status) and status.motion_plan_time is not None:
         return status.motion_plan_time
-    return 0.0 if state.plan is None else state.place * state.plan.motion.duration
+    return 0.0 if state.plan is None else state.playhead * state.plan.motion.duration
 
 
 def is_connected(status: SupervisorStatus) -> bool:

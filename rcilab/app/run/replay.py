@@ -46,7 +46,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
     recording = whole_recording(run)
     return replace(
-        state, model=model, setup=setup, plan=plan, goal=goal, recording=recording, last_run=recording, place=0.0
+        state, model=model, setup=setup, plan=plan, goal=goal, recording=recording, last_run=recording, playhead=0.0
     )
 
 
@@ -55,6 +55,6 @@ def replayed_pose(state: UiState) -> JointVector | None:
     recording = state.recording
     if recording is None or recording.run is None or state.plan is None:
         return None
-    t = state.place * state.plan.motion.duration + recording.delay * CYCLE_TIME
+    t = state.playhead * state.plan.motion.duration + recording.delay * CYCLE_TIME
     row = min(int(np.searchsorted(recording.t, t)), len(recording.t) - 1)
     return recording.q[row]

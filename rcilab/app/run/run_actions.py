@@ -199,7 +199,7 @@ class RunActions:
             state = replace(state, model=model, setup=setup, drive=replace(state.drive, control=None))
         # First: from here on no state of the old arm is shown on the new one.
         self._connection.open(model, target, state.plant, _own_setup(state, target))
-        self._store.update(place=0.0, playing=False, **changes)
+        self._store.update(playhead=0.0, playing=False, **changes)
 
     def _forget_robot(self) -> None:
         self.requests.forget()
@@ -272,9 +272,9 @@ class RunActions:
         if is_moving(status):
             return
         if self._reached is not None and plan is not None:
-            place = min(self._reached / max(plan.motion.duration, CYCLE_TIME), 1.0)
+            playhead = min(self._reached / max(plan.motion.duration, CYCLE_TIME), 1.0)
             self._reached = None
-            self._store.update(place=place)
+            self._store.update(playhead=playhead)
 
     def _switch_on(self, status: SupervisorStatus) -> None:
         """Switches the virtual arm's motors on, and tries again until that has succeeded once."""

@@ -22,7 +22,7 @@ _TOGETHER = 0.02  # [s] Violations closer in time than this share a bead.
 class ViolationMarker:
     """One or more violations at a place of the path."""
 
-    place: float
+    playhead: float
     """Where in the motion, 0 to 1."""
     position: Array
     """Where the tool is then, shape (3,), [m]."""
@@ -64,6 +64,6 @@ def _beads(plan: Plan) -> tuple[ViolationMarker, ...]:
     times = [min(max(group[0].worst_time, 0.0), plan.motion.duration) for group in groups]
     positions = plan.model.position_path(np.stack([plan.motion.at(t).q for t in times]))
     return tuple(
-        ViolationMarker(place=t / duration, position=position, violations=tuple(group))
+        ViolationMarker(playhead=t / duration, position=position, violations=tuple(group))
         for t, position, group in zip(times, positions, groups, strict=True)
     )

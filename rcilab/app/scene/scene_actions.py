@@ -119,7 +119,7 @@ class SceneActions:
         if ribbon is None or not 0 <= request.number < len(ribbon.markers):
             return
         bead = ribbon.markers[request.number]
-        self._store.update(place=bead.place, playing=False)
+        self._store.update(playhead=bead.playhead, playing=False)
         self._store.notify("bad", message("notice.plain", text=bead.violations[0]))
 
     def show_extra(self, request: ShowExtra) -> None:

@@ -57,7 +57,7 @@ def bench_scrub() -> Measurement:
             wait_for("the controls", lambda: bench.store.state.control_lock.holder == _PAGE, 30.0)
             for position in np.random.default_rng(1).uniform(0.02, 0.98, _SEEKS).tolist():
                 start = time.perf_counter()
-                link.send(json.dumps({"kind": "seek", "place": position}))
+                link.send(json.dumps({"kind": "seek", "share": position}))
                 while "cursor" not in (message := json.loads(link.recv(timeout=30.0))):
                     if "beat" in message:
                         link.send('{"kind": "here"}')

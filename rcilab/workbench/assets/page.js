@@ -282,11 +282,11 @@
         over.appendChild(line);
         over.addEventListener("click", (event) => {
           const box = over.getBoundingClientRect();
-          if (box.width > 0) send({ kind: "seek", place: (event.clientX - box.left) / box.width });
+          if (box.width > 0) send({ kind: "seek", share: (event.clientX - box.left) / box.width });
         });
       }
-      const place = cursor ? (cursor.place * 100).toFixed(2) + "%" : "";
-      if (line.style.left !== place) line.style.left = place;
+      const left = cursor ? (cursor.share * 100).toFixed(2) + "%" : "";
+      if (line.style.left !== left) line.style.left = left;
       line.style.display = cursor ? "" : "none";
     });
   };

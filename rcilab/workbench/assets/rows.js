@@ -13,14 +13,14 @@
     return mine >= 0 ? mine : find(list, (row) => row.getAttribute("aria-selected") === "true");
   };
 
-  const say = (what, key, place = 0) => {
+  const say = (what, key, index = 0) => {
     if (what === "select") { picked = key; since = performance.now(); }
     if (["delete", "duplicate", "undo", "redo"].includes(what)) picked = null;  // Another row will be chosen for us.
-    window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "edit", what, key: Number(key), place: Number(place) } }));
+    window.dispatchEvent(new CustomEvent("rl-act", { detail: { kind: "edit", what, key: Number(key), index: Number(index) } }));
   };
 
-  const choose = (list, place) => {
-    const all = rows(list), row = all[Math.min(Math.max(place, 0), all.length - 1)];
+  const choose = (list, index) => {
+    const all = rows(list), row = all[Math.min(Math.max(index, 0), all.length - 1)];
     if (!row) return;
     mark(list, row);
     say("select", row.dataset.key);
@@ -103,7 +103,7 @@
   });
   document.addEventListener("drop", (event) => {
     const row = dragged && listOf(event.target) && event.target.closest("[data-key]");
-    if (row) { event.preventDefault(); say("move", dragged, row.dataset.place); }
+    if (row) { event.preventDefault(); say("move", dragged, row.dataset.index); }
     dragged = null;
     clear();
   });

@@ -89,17 +89,17 @@ class ProgramPanel:
         if drawn != self._drawn:  # The positions of waypoints take some time to compute.
             self._drawn = drawn
             self._list.show(list_html(state, draft, running, text))
-        place, count = draft.place(program.selected), len(draft.steps)
+        index, count = draft.index(program.selected), len(draft.steps)
         able = {
-            "up": place is not None and place > 0, "down": place is not None and place < count - 1,
-            "duplicate": place is not None, "delete": place is not None, "undo": program.can_undo,
+            "up": index is not None and index > 0, "down": index is not None and index < count - 1,
+            "duplicate": index is not None, "delete": index is not None, "undo": program.can_undo,
             "redo": program.can_redo,
         }  # fmt: skip
         for what, button in self._tools.items():
             button.disabled = not able[what]
         planning = program.progress is not None
         self._plan.disabled = not count or planning or is_moving(status)
-        self._upto.disabled = place is None or planning or is_moving(status)
+        self._upto.disabled = index is None or planning or is_moving(status)
         self._loop.show(state.loop)
         self._rounds.show(str(program.rounds), state.problems.get(self._rounds.field), state.entered)
         now = time.monotonic()

@@ -50,7 +50,7 @@ def list_html(state: UiState, draft: Draft, running: int | None, text: Text) -> 
         cells = (f"{number}{sign}", *_cells(step.waypoint, arm, text))
         rows.append(
             f'<div class="rl-step{look}" role="option" id="rl-step-{step.key}" data-key="{step.key}" '
-            f'data-place="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true">'
+            f'data-index="{number - 1}" aria-selected="{"true" if chosen else "false"}" draggable="true">'
             + "".join(f"<span>{cell}</span>" for cell in cells)
             + "</div>"
         )

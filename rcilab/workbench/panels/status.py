@@ -130,4 +130,4 @@ def _cursor(state: UiState, status: SupervisorStatus, end: float) -> dict[str, f
     if state.plan is None or end <= 0.0:
         return None
     t = played_at(state, time_shown(state, status))
-    return {"place": round(min(max(t / end, 0.0), 1.0), 4)}
+    return {"share": round(min(max(t / end, 0.0), 1.0), 4)}

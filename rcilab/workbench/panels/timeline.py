@@ -42,7 +42,7 @@ class TimelinePanel:
         self._play = gui.add_button(text("timeline.play"), icon="player-play", hint=text("timeline.play_hint"))
         on_press(self._play, ask, lambda page: Play(page=page))
         scrub = gui.add_slider(text("timeline.time"), 0.0, 100.0, 0.1, 0.0, marks=(), hint=text("timeline.scrub_hint"))
-        self._scrub = BoundControl(scrub, ask, lambda v, p: Seek(page=p, place=v / 100.0))
+        self._scrub = BoundControl(scrub, ask, lambda v, p: Seek(page=p, playhead=v / 100.0))
         rates = {f"{rate:g}×": rate for rate in RATES}
         self._rates = {rate: label for label, rate in rates.items()}
         rate = gui.add_dropdown(text("timeline.rate"), tuple(rates), initial_value="1×")

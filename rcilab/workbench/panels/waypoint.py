@@ -66,8 +66,8 @@ class WaypointPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the selected waypoint."""
         draft, key = state.program.draft, state.program.selected
-        place, waypoint = draft.place(key), draft.waypoint(key)
-        if draft.model != state.model.name or waypoint is None or place is None:
+        index, waypoint = draft.index(key), draft.waypoint(key)
+        if draft.model != state.model.name or waypoint is None or index is None:
             for folder in (self._folder, self._pose, self._via, self._teach):
                 folder.visible = False
             self._source.show("")
@@ -75,7 +75,7 @@ class WaypointPanel:
         arm = draft.arm(state.model)
         values = _values(waypoint, arm)
         self._folder.visible = self._teach.visible = True
-        self._folder.label = self._text("program.selected", number=place + 1)
+        self._folder.label = self._text("program.selected", number=index + 1)
         self._pose.visible, self._via.visible = "x" in values, waypoint.type == "arc"
         self._show_kind(waypoint)
         for name, field in self._fields.items():

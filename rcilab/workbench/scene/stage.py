@@ -139,10 +139,10 @@ class Stage:
 
     def _show_plan(self, state: UiState, status: SupervisorStatus, live: np.ndarray) -> None:
         plan = state.plan
-        if plan is None or is_moving(status) or not (state.playing or 0.0 < state.place < 1.0):
+        if plan is None or is_moving(status) or not (state.playing or 0.0 < state.playhead < 1.0):
             self._see("plan", None, False)
             return
-        q = plan.motion.at(state.place * plan.motion.duration).q
+        q = plan.motion.at(state.playhead * plan.motion.duration).q
         self._see("plan", q, _apart(q, live) > _SAME_POSE)
 
     def _see(self, name: _Ghost, q: JointVector | None, visible: bool) -> None:
