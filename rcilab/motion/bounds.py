@@ -47,16 +47,16 @@ def require_inside(what: str, q: JointVector, limits: JointLimits) -> None:
             f"joint {i + 1}: {what} {angle_text(angle)} is not strictly between {angle_text(low)} and "
             f"{angle_text(high)}; "
         )
-        soft, back = limits.exceeded_soft_limit(i + 1, angle), _BACK
+        soft = limits.exceeded_soft_limit(i + 1, angle)
         if soft is None and what == "start":
-            raise PlanningError(f"{message}if the arm is there, {back}").coded("range_start", **facts)
+            raise PlanningError(f"{message}if the arm is there, {_BACK}").coded("range_start", **facts)
         if soft is None:
             raise PlanningError(f"{message}choose an angle between them").coded("range", **facts)
         message += f"{degrees(soft):.2f}° is the soft limit that was set; "
         facts["limit"] = soft
         widen = "widen the soft limit"
         if what == "start":
-            raise PlanningError(f"{message}if the arm is there, {back}, or {widen}").coded("range_start_soft", **facts)
+            raise PlanningError(f"{message}if the arm is there, {_BACK}, or {widen}").coded("range_start_soft", **facts)
         raise PlanningError(f"{message}choose an angle between them, or {widen}").coded("range_soft", **facts)
 
 
