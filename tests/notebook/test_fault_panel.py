@@ -48,7 +48,7 @@ def test_a_fault_is_provoked_on_a_private_controller_looked_at_and_the_session_i
         own = processes()
         with (
             notebook.FaultPanel(robot, language="zh") as panel,
-            notebook.Scene(panel, place=KernelReachability(way="loopback")) as scene,
+            notebook.Scene(panel, reachability=KernelReachability(route="loopback")) as scene,
         ):
             panel.fault.value = Fault.COMMAND_JOINT_ACCELERATION_DISCONTINUITY
             panel.provoke.click()
