@@ -86,11 +86,11 @@ class MotionPlot(Part):
             self._move_cursor()
             return
         joint, limits, run = int(self.joint.value), self.model.limits.joint, state.shown_run
-        is_paced = run is not None and run.has_speed_override
+        is_scaled = run is not None and run.has_speed_override
         times = None if run is None else run.t - run.delay * CYCLE_TIME
         panels: list[Panel] = []
         for quantity in self._quantities:
-            planned = streamed_curves(plan.q, quantity) if is_paced else plan_curves(plan, quantity)
+            planned = streamed_curves(plan.q, quantity) if is_scaled else plan_curves(plan, quantity)
             actual = None
             if run is not None and times is not None and len(times):
                 recorded = recorded_curves(run.t, run.q, run.q_c, run.dq, quantity)
@@ -104,7 +104,7 @@ class MotionPlot(Part):
         self._end = panels[0].frame.end
         write(self._curves, draw(panels, joints, self.text("plot.time"), self.text("legend.limit")))
         delay = 0 if run is None else run.delay
-        kinds = "plot.kinds" if run is None or not run.has_speed_override else "plot.kinds_paced"
+        kinds = "plot.kinds" if run is None or not run.has_speed_override else "plot.kinds_speed_override"
         write(self._kinds, "" if run is None else soft(self.text(kinds, delay=delay)))
         self._move_cursor()
 

@@ -30,7 +30,7 @@ def tracking_notes(run: Run, tracking: Tracking, text: Text) -> list[str]:
     if run.plan is not None and run.stop_time is not None:
         notes.append(text("tracking.until", time=f"{run.stop_time:.3f}"))
     if run.has_speed_override:
-        notes.append(text("tracking.paced"))
+        notes.append(text("tracking.speed_override"))
     if run.setup.plant == "ideal" and tracking.joint_max.max(initial=0.0) < _EXACT:
         notes.append(text("tracking.ideal"))
     return notes

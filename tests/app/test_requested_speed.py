@@ -13,15 +13,15 @@ MOVING = SupervisorStatus(phase="moving", code="moving", motion_duration=3.0, sp
 HELD = replace(MOVING, code="moving.held", speed_override=0.0)
 
 
-def due(wish: RequestedSpeed, status: SupervisorStatus, *, is_under_way: bool = False) -> float | None:
-    return wish.due(status, is_under_way=is_under_way)
+def due(wish: RequestedSpeed, status: SupervisorStatus, *, is_pending: bool = False) -> float | None:
+    return wish.due(status, is_pending=is_pending)
 
 
 def test_of_many_wishes_only_the_newest_is_handed_over_and_only_once() -> None:
     wish = RequestedSpeed()
     for speed_override in (0.9, 0.5, 0.3):
         wish.choose(speed_override, MOVING)
-    assert due(wish, MOVING, is_under_way=True) is None
+    assert due(wish, MOVING, is_pending=True) is None
     assert due(wish, MOVING) == 0.3
     assert due(wish, MOVING) is None
 

@@ -69,11 +69,15 @@ def test_as_a_motion_it_has_the_velocity_and_acceleration_of_the_plan_at_its_rat
     held = plan_speed_override(
         plan_start_with_override(motion, 0.6, MODEL, "joint_position"), 150, 0.0, MODEL, "joint_position"
     )
-    paced = plan_speed_override(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
-    run = paced.as_motion()
-    assert np.array_equal(run.q, paced.q)
-    for row in range(1, len(paced.q) - 1, 41):
-        there, rate, drate = motion.at(float(paced.plan_time[row])), paced.rate[row], paced.drate[row]
+    scaled_motion = plan_speed_override(held, len(held.q) + 20, 1.0, MODEL, "joint_position")
+    run = scaled_motion.as_motion()
+    assert np.array_equal(run.q, scaled_motion.q)
+    for row in range(1, len(scaled_motion.q) - 1, 41):
+        there, rate, drate = (
+            motion.at(float(scaled_motion.plan_time[row])),
+            scaled_motion.rate[row],
+            scaled_motion.drate[row],
+        )
         assert run.dq[row] == pytest.approx(there.dq * rate, abs=1e-12)
         assert run.ddq[row] == pytest.approx(there.ddq * rate**2 + there.dq * drate, abs=1e-9)
     assert not run.dq[-1].any()
@@ -118,12 +122,12 @@ def test_what_breaks_a_condition_at_its_pace_is_refused():
 
 def test_nothing_asked_for_leaves_the_motion_itself():
     motion = joint_motion(0.5)
-    paced = as_planned(motion)
-    assert paced.as_motion() is motion
+    scaled_motion = as_planned(motion)
+    assert scaled_motion.as_motion() is motion
     assert plan_start_with_override(motion, 1.0, MODEL, "joint_position").as_motion() is motion
-    assert paced.q is motion.q
-    assert paced.plan_time_at(10) == pytest.approx(10 * CYCLE_TIME)
-    assert not paced.is_held
+    assert scaled_motion.q is motion.q
+    assert scaled_motion.plan_time_at(10) == pytest.approx(10 * CYCLE_TIME)
+    assert not scaled_motion.is_held
 
 
 @pytest.mark.parametrize("speed_override", [0.0, 0.05, 1.01, np.nan, "fast"])

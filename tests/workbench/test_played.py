@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.planning import Plan, make_plan
-from rcilab.app.run.played_motion import moment_played, paced_of, played_at, played_path, streamed_rows
+from rcilab.app.run.played_motion import moment_played, played_at, played_path, scaled_motion_of, streamed_rows
 from rcilab.app.run.replay import replayed
 from rcilab.app.run.run_recorder import as_recording
 from rcilab.app.store import UiState
@@ -31,11 +31,11 @@ def slowed() -> UiState:
     state = initial_state()
     plan = make_plan(state.model, state.model.home, state.model.home + 0.3, 0.3, "jerk_limited")
     assert isinstance(plan, Plan)
-    paced = plan_speed_override(as_planned(plan.motion), CHANGED, 0.5, state.model, "joint_position")
-    motion = paced.as_motion()
+    scaled_motion = plan_speed_override(as_planned(plan.motion), CHANGED, 0.5, state.model, "joint_position")
+    motion = scaled_motion.as_motion()
     cycles = np.zeros(len(motion.q), some_cycles().dtype)
     cycles["t"], cycles["q"], cycles["q_c"], cycles["dq"] = motion.times, motion.q, motion.q, motion.dq
-    return replace(state, plan=plan, recording=as_recording(cycles, 0, paced))
+    return replace(state, plan=plan, recording=as_recording(cycles, 0, scaled_motion))
 
 
 @pytest.mark.parametrize("quantity", ["q", "dq", "ddq", "jerk"])
@@ -61,7 +61,9 @@ def test_the_cursor_stands_where_the_plan_was_when_it_was_run_and_a_click_finds_
     moment = 0.6 * slowed.plan.motion.duration
     t = played_at(slowed, moment)
     assert t > moment + 0.1
-    assert slowed.recording.paced.q[round(t / CYCLE_TIME)] == pytest.approx(slowed.plan.motion.at(moment).q, abs=1e-3)
+    assert slowed.recording.scaled_motion.q[round(t / CYCLE_TIME)] == pytest.approx(
+        slowed.plan.motion.at(moment).q, abs=1e-3
+    )
     assert moment_played(slowed, t) == pytest.approx(moment, abs=2 * CYCLE_TIME)
     bar = status_values(replace(slowed, playhead=0.6), status(), Text("en"), 2.0 * t)
     assert bar["cursor"]["share"] == pytest.approx(0.5, abs=1e-3)
@@ -70,7 +72,7 @@ def test_the_cursor_stands_where_the_plan_was_when_it_was_run_and_a_click_finds_
 def test_the_legend_says_so_in_both_languages(slowed):
     for language, word in (("en", "as executed"), ("zh", "按实际执行的时间")):
         text = Text(language)
-        assert word in legend_html(0, 7, text, "light", has_actual=True, is_paced=True)
+        assert word in legend_html(0, 7, text, "light", has_actual=True, is_scaled=True)
         assert word not in legend_html(0, 7, text, "light", has_actual=True)
 
 
@@ -85,6 +87,6 @@ def test_another_plan_has_its_own_times(slowed):
     other = make_plan(slowed.model, slowed.model.home, slowed.model.home - 0.2, 0.3, "jerk_limited")
     assert isinstance(other, Plan)
     state = replace(slowed, plan=other)
-    assert paced_of(state) is None
+    assert scaled_motion_of(state) is None
     assert played_path(state)[1] is other.motion.q
     assert played_at(state, 0.3) == moment_played(state, 0.3) == 0.3

@@ -75,7 +75,7 @@ class ModeActions:
         self._store, self._connection, self._keeps_rest = store, connection, keeps_rest
         self._was_running = False
         self._sender = ConfigurationSender(connection, self._refuse)
-        self._wish = RequestedSpeed()
+        self._requested = RequestedSpeed()
         self._changing: tuple[float, PendingRequest] | None = None  # A speed override that awaits its answer.
         self._asked_to_send = -math.inf
         self._arm = store.state.model.name
@@ -104,17 +104,17 @@ class ModeActions:
                 self._store.notify("warn", typed.problem, page=request.page)
             speed_override = min(max(request.speed_override, MIN_SPEED_OVERRIDE), 1.0)
             self._store.update(drive=replace(self._store.state.drive, speed_override=speed_override))
-            self._wish.choose(speed_override, status)
+            self._requested.choose(speed_override, status)
 
     def pause(self) -> None:
         """Pauses the motion in progress."""
         if self._require_motion():
-            self._wish.hold()
+            self._requested.hold()
 
     def resume(self) -> None:
         """Resumes a paused motion."""
         if self._require_motion():
-            self._wish.go_on(self._store.state.drive.speed_override)
+            self._requested.go_on(self._store.state.drive.speed_override)
 
     def type_field(self, request: TypeField) -> None:
         """Takes a typed parameter, or shows the problem next to its field."""
@@ -177,7 +177,7 @@ class ModeActions:
 
     def forget(self) -> None:
         """Drops requests without an answer: another robot was chosen."""
-        self._wish.forget()
+        self._requested.forget()
         self._sender.forget()
         self._changing, self._was_running = None, False
         self._store.update(drive=replace(self._store.state.drive, override_refusal=None))
@@ -204,15 +204,15 @@ class ModeActions:
             self._report_override_refusal(request.error, speed_override)
         elif running and not before:
             self._set_override_refusal(None)
-        wish = self._wish.due(status, is_under_way=self._changing is not None)
-        if wish is None:
+        requested = self._requested.due(status, is_pending=self._changing is not None)
+        if requested is None:
             return
         self._set_override_refusal(None)
         supervisor = self._connection.robot()
         try:
-            self._changing = wish, supervisor.set_speed_override(wish) if wish else supervisor.pause()
+            self._changing = requested, supervisor.set_speed_override(requested) if requested else supervisor.pause()
         except RcilabError as error:
-            self._report_override_refusal(error, wish)
+            self._report_override_refusal(error, requested)
 
     def _report_override_refusal(self, error: RcilabError | None, speed_override: float) -> None:
         refusal = None if error is None else describe_override_refusal(error, speed_override, self._connection.status())

@@ -31,7 +31,7 @@ class Recording:
     """Cycles between a command and the state that shows it: the controller's play-out, and its answer."""
     run: Run | None = None
     """The whole run, once the arm stands still."""
-    paced: SpeedScaledMotion | None = None
+    scaled_motion: SpeedScaledMotion | None = None
     """How the plan was run, if its speed override was changed during the motion; None: as planned."""
     tracking: Tracking | None = None
     """The tracking error, once the arm stands still."""

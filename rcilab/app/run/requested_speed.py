@@ -20,40 +20,40 @@ class RequestedSpeed:
     """
 
     def __init__(self) -> None:
-        self._wish: float | None = None
+        self._requested: float | None = None
 
     def choose(self, speed_override: float, status: SupervisorStatus | None) -> None:
         """Requests a speed override for the motion in progress; a paused motion stays paused."""
         if is_running(status) and status is not None and status.code == "moving":
-            self._wish = speed_override
+            self._requested = speed_override
 
     def hold(self) -> None:
         """Requests that the motion is paused."""
-        self._wish = 0.0
+        self._requested = 0.0
 
     def go_on(self, speed_override: float) -> None:
         """Requests that a paused motion continues with a speed override."""
-        self._wish = speed_override
+        self._requested = speed_override
 
-    def due(self, status: SupervisorStatus, *, is_under_way: bool) -> float | None:
+    def due(self, status: SupervisorStatus, *, is_pending: bool) -> float | None:
         """Returns the speed override to send to the robot now, if any; call it several times a second.
 
         Args:
             status: Status of the robot.
-            is_under_way: Whether the last change is not accepted yet; a newer value waits.
+            is_pending: Whether the last change is not accepted yet; a newer value waits.
         """
-        if is_under_way:
+        if is_pending:
             return None
-        wish, self._wish = self._wish, None
+        requested, self._requested = self._requested, None
         return (
             None
-            if wish is None or not is_running(status) or abs(wish - status.speed_override) < _SAME_OVERRIDE
-            else wish
+            if requested is None or not is_running(status) or abs(requested - status.speed_override) < _SAME_OVERRIDE
+            else requested
         )
 
     def forget(self) -> None:
         """Drops the value: another robot is connected."""
-        self._wish = None
+        self._requested = None
 
 
 def is_running(status: SupervisorStatus | None) -> bool:

@@ -103,7 +103,7 @@ class RobotRequests:
             stopped: Why the motion did not reach its end.
         """
         self._pending = []
-        self._recorder.finish(stopped, self._paced())
+        self._recorder.finish(stopped, self._scaled_motion())
 
     def close(self, stopped: str) -> None:
         """Ends the recording with the current cycles; see `forget`."""
@@ -118,7 +118,9 @@ class RobotRequests:
         stopped = None if error is None else describe_end(error)
         finding = error.finding if isinstance(error, ControlError) else ""
         run = self._connection.take_run()
-        self._recorder.finish(stopped, self._paced(), is_operator_absent=is_operator_absent, finding=finding, run=run)
+        self._recorder.finish(
+            stopped, self._scaled_motion(), is_operator_absent=is_operator_absent, finding=finding, run=run
+        )
         last = self._store.state.last_run
         return Outcome(
             what=what, error=error, run=None if last is None else last.run, is_operator_absent=is_operator_absent
@@ -126,11 +128,11 @@ class RobotRequests:
 
     def _record(self) -> None:
         with suppress(RcilabError):  # The robot is disconnected.
-            self._recorder.add(self._connection.robot().drain(), self._paced())
+            self._recorder.add(self._connection.robot().drain(), self._scaled_motion())
 
-    def _paced(self) -> SpeedScaledMotion | None:
+    def _scaled_motion(self) -> SpeedScaledMotion | None:
         """Returns how the motion in progress, or the last one, runs; None: as planned."""
         with suppress(RcilabError):
-            paced = self._connection.robot().scaled_motion
-            return paced if paced is not None and paced.changed else None
+            scaled_motion = self._connection.robot().scaled_motion
+            return scaled_motion if scaled_motion is not None and scaled_motion.changed else None
         return None

@@ -46,8 +46,8 @@ class RunRecorder:
         facts = RunFacts(plan=plan.motion, model=state.model, setup=setup)
         self._live = LiveRecording(facts, self._open(state, plan, setup))
 
-    def add(self, rows: NDArray[np.void], paced: SpeedScaledMotion | None = None) -> None:
-        """Adds cycles and shows them; `paced`: how the plan is run, if its speed override was changed."""
+    def add(self, rows: NDArray[np.void], scaled_motion: SpeedScaledMotion | None = None) -> None:
+        """Adds cycles and shows them; `scaled_motion`: how the plan is run, if its speed override was changed."""
         if self._live is None:
             return
         before = self._live.cycles
@@ -57,12 +57,12 @@ class RunRecorder:
             self._complain(error)
         cycles = self._live.cycles
         if cycles is not None and (before is None or len(cycles) > len(before)):
-            self._store.update(recording=as_recording(cycles, self._live.delay, paced))
+            self._store.update(recording=as_recording(cycles, self._live.delay, scaled_motion))
 
     def finish(
         self,
         stopped: str | None,
-        paced: SpeedScaledMotion | None = None,
+        scaled_motion: SpeedScaledMotion | None = None,
         *,
         is_operator_absent: bool = False,
         finding: str = "",
@@ -72,7 +72,7 @@ class RunRecorder:
 
         Args:
             stopped: Why the motion did not reach its end; None: it did.
-            paced: How the plan was run, if its speed override was changed.
+            scaled_motion: How the plan was run, if its speed override was changed.
             is_operator_absent: Whether the motion was stopped because no page answered.
             finding: Joint, value and bound of the fault that ended it, from its last cycles.
             run: The run as recorded by the robot itself; None: it is built from the added cycles.
@@ -80,14 +80,14 @@ class RunRecorder:
         if self._live is None:
             return
         live, self._live = self._live, None
-        plan = None if paced is None else paced.as_motion()
+        plan = None if scaled_motion is None else scaled_motion.as_motion()
         try:
             run = run or live.finish(stopped, plan)
         except InvalidValueError as error:
             self._complain(error)
             run = live.finish(stopped, plan)  # If its file failed, the run in memory is complete.
         if run is not None:
-            recording = whole_recording(run, self._file, paced, finding)
+            recording = whole_recording(run, self._file, scaled_motion, finding)
             recording = replace(recording, is_operator_absent=is_operator_absent)
             self._store.update(recording=recording, last_run=recording)
 
@@ -119,7 +119,7 @@ class RunRecorder:
         )
 
 
-def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion | None = None) -> Recording:
+def as_recording(cycles: NDArray[np.void], delay: int, scaled_motion: SpeedScaledMotion | None = None) -> Recording:
     """Returns the part of a run in progress that the plots need."""
     return Recording(
         t=cycles["t"],
@@ -128,11 +128,13 @@ def as_recording(cycles: NDArray[np.void], delay: int, paced: SpeedScaledMotion 
         dq=cycles["dq"],
         tau=cycles["tau"],
         delay=delay,
-        paced=paced,
+        scaled_motion=scaled_motion,
     )
 
 
-def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = None, finding: str = "") -> Recording:
+def whole_recording(
+    run: Run, file: str = "", scaled_motion: SpeedScaledMotion | None = None, finding: str = ""
+) -> Recording:
     """Returns a finished run for plots, table and export."""
     faulty = np.flatnonzero(run.cycles["faults"])
     return Recording(
@@ -143,7 +145,7 @@ def whole_recording(run: Run, file: str = "", paced: SpeedScaledMotion | None = 
         tau=run.tau,
         delay=run.delay,
         run=run,
-        paced=paced,
+        scaled_motion=scaled_motion,
         tracking=run.tracking,
         file=file,
         finding=finding,

@@ -93,7 +93,7 @@ def plot_axes(theme: Theme, *, last: bool, ticks: tuple[float, ...] | None = Non
     return x, {**look, "size": _NUMBERS, "gap": 3, "ticks": marks, **chosen}
 
 
-def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_paced: bool = False) -> str:
+def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: bool, is_scaled: bool = False) -> str:
     """Returns the colour and dash of each joint, the meaning of dots, dashes and areas, and the speed of the plan."""
     joints = [joint - 1] if joint else range(n)
     swatches = "".join(
@@ -103,5 +103,5 @@ def legend_html(joint: int, n: int, text: Text, theme: Theme, *, has_actual: boo
     )
     signs = ("actual", "limit", "violation") if has_actual else ("limit", "violation")
     rest = "".join(f'<span class="rl-sign-{sign}">{esc(text("legend." + sign))}</span>' for sign in signs)
-    paced = f"<span>{esc(text('legend.paced'))}</span>" if is_paced else ""
-    return f'<div class="rl-legend">{swatches}{rest}{paced}</div>'
+    note = f"<span>{esc(text('legend.speed_override'))}</span>" if is_scaled else ""
+    return f'<div class="rl-legend">{swatches}{rest}{note}</div>'

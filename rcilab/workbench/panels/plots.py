@@ -120,7 +120,7 @@ class Plots:
                     self._text,
                     state.theme,
                     has_actual=has_actual,
-                    is_paced=streamed is not None,
+                    is_scaled=streamed is not None,
                 )
             )
             self._fit(state, visible)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.check.freshness import outdated
 from rcilab.app.program.program_draft import describe_place
 from rcilab.app.run.plan_readiness import is_moving
-from rcilab.app.run.played_motion import paced_of, played_at
+from rcilab.app.run.played_motion import played_at, scaled_motion_of
 from rcilab.app.run.readiness import time_shown
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, RATES, Play, Seek, SetView, ShowPlot, has_plot
@@ -110,9 +110,9 @@ class TimelinePanel:
         if state.plan.short is not None and state.recording is None:
             kinds = text("timeline.short")
         kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"
-        paced = paced_of(state)
-        if paced is not None:  # On the time axis of the plots: that of the run.
-            t, duration = played_at(state, t), paced.duration
+        scaled_motion = scaled_motion_of(state)
+        if scaled_motion is not None:  # On the time axis of the plots: that of the run.
+            t, duration = played_at(state, t), scaled_motion.duration
         return f'<p class="rl-clock"><b>{t:.3f}</b> /&nbsp;{duration:.3f}&nbsp;s<span>{esc(kinds)}</span></p>'
 
 
