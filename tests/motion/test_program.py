@@ -293,6 +293,17 @@ def test_what_is_wrong_with_a_file_is_told(text, hint):
         Program.from_json(text)
 
 
+@pytest.mark.parametrize(
+    "text", ['{"a\\u001b[31m": 1, "a\\u001b[31m": 1}', '{"a\\u202e": 1}', '{"a": "\x1b[31m"}', "\x1b[2J"]
+)
+def test_control_characters_reach_neither_the_message_nor_its_facts(text):
+    with pytest.raises(InvalidValueError) as caught:
+        Program.from_json(text)
+    assert str(caught.value).isprintable()
+    assert all(str(fact).isprintable() for fact in caught.value.facts.values())
+    assert caught.value.facts
+
+
 def test_another_version_is_told_apart():
     with pytest.raises(VersionMismatchError, match=r"line 2, version: found version 2, need 1"):
         Program.from_json(lines(GOOD, head='"format": "rcilab program", "version": 2'))
