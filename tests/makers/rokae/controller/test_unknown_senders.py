@@ -10,12 +10,14 @@ import struct
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 import numpy as np
 import pytest
 
 from rcilab.control_process.simulate import simulate
+from rcilab.execution.session import RobotSession
 from rcilab.makers.rokae import wire as rci
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
@@ -33,11 +35,18 @@ def absurd(message_id: int) -> bytes:
     return rci.encode_command(rci.CommandPacket(message_id, (1.0,) * 7))
 
 
+@contextmanager
+def stranger(host: str, robot: RobotSession) -> Iterator[Callable[[bytes], object]]:
+    """Sends datagrams from another address or port to the robot's command port."""
+    at, _, port = robot.address.removeprefix("rci://").split("?")[0].partition(":")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind((host, 0))
+        yield lambda datagram: udp.sendto(datagram, (at, int(port)))
+
+
 @pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
 def test_commands_of_an_unknown_sender_do_not_end_a_motion_and_are_counted(host):
-    with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind((host, 0))
-        place = robot.address.removeprefix("rci://").split("?")[0].split(":")
+    with simulate(MODEL) as robot, stranger(host, robot) as send:
         robot.power_on()
         motion = plan_joint(MODEL, MODEL.home, MODEL.home + 0.1)
         sent = []
@@ -45,7 +54,7 @@ def test_commands_of_an_unknown_sender_do_not_end_a_motion_and_are_counted(host)
         def tell(t, duration):
             if t == 0.0:  # The client has not sent anything yet: its port is not learned.
                 return
-            udp.sendto(absurd(robot.state.message_id), (place[0], int(place[1])))
+            send(absurd(robot.state.message_id))
             sent.append(t)
 
         run = robot.execute(motion, progress=tell)
@@ -58,15 +67,13 @@ def test_commands_of_an_unknown_sender_do_not_end_a_motion_and_are_counted(host)
 @pytest.mark.parametrize("host", ["127.0.0.9", "127.0.0.1"], ids=["another address", "another port"])
 def test_a_flood_of_an_unknown_sender_leaves_room_for_commands(host):
     """From the first command on; it comes while the controller does not know yet which port the client sends from."""
-    with simulate(MODEL) as robot, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
-        udp.bind((host, 0))
-        place = robot.address.removeprefix("rci://").split("?")[0].split(":")
+    with simulate(MODEL) as robot, stranger(host, robot) as send:
         robot.power_on()
         send_command = robot._driver.connection._transport.send_command
 
         def flood_and_send(datagram: bytes) -> None:
             for _ in range(2000):  # More than the buffer holds.
-                udp.sendto(bytes(1000), (place[0], int(place[1])))
+                send(bytes(1000))
             send_command(datagram)
 
         robot._driver.connection._transport.send_command = flood_and_send
