@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcilab.model.dynamics.rigid_body import RigidBody, TorqueTerms
     from rcilab.model.kinematics.collision import Clearance, CollisionGeometry
 
-_SET_LIMIT = "limit that was set, not the arm's own"
+_SET_LIMIT = "soft limit, set by a user"
 
 __all__ = ["RobotModel", "load_model", "require_model"]
 

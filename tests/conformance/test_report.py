@@ -60,7 +60,7 @@ def test_rows_name_joint_time_value_bound_and_source():
 
 def test_the_manual_is_the_source_of_the_arm_s_own_limits_only():
     own = MODEL.limits.joint
-    for change, source in ((0.5, "limit that was set, not the arm's own"), (0.0, "RCI manual V1.3.1, 4.1 and 4.4")):
+    for change, source in ((0.5, "soft limit, set by a user"), (0.0, "RCI manual V1.3.1, 4.1 and 4.4")):
         for lower, upper in ((own.lower - change, own.upper + change), (own.lower + change, own.upper - change)):
             rows = {row.id: row for row in check(GOOD, MODEL.with_joint_limits(lower, upper)).rows}
             assert rows["joint.position"].source == source
