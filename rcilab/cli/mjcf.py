@@ -17,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "meshes, which are written too. Exit code: 0 done; 2 the name is unknown, or DIR cannot be written.",
         epilog="example: rcilab mjcf xMatePro7 --output robots && python -m mujoco.viewer --mjcf robots/xMatePro7.xml",
     )
-    parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3, xMate7 or Panda, in any case")
+    parser.add_argument("name", metavar="NAME", help="arm, such as xMatePro7 (any case); an unknown name lists all")
     parser.add_argument("--output", metavar="DIR", type=Path, help="write DIR/NAME.xml and DIR/meshes/NAME/*.stl")
     parser.set_defaults(run=run)
 

@@ -17,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "is printed, without meshes. Exit code: 0 done; 2 the name is unknown, or DIR cannot be written.",
         epilog="example: rcilab urdf xMatePro7 --output robots --mesh-dir package://my_robots/meshes/xMatePro7",
     )
-    parser.add_argument("name", metavar="NAME", help="xMatePro3, xMatePro7, xMate3, xMate7 or Panda, in any case")
+    parser.add_argument("name", metavar="NAME", help="arm, such as xMatePro7 (any case); an unknown name lists all")
     parser.add_argument("--output", metavar="DIR", type=Path, help="write DIR/NAME.urdf and DIR/meshes/NAME/*.stl")
     parser.add_argument("--mesh-dir", metavar="PREFIX", help="prefix of mesh names, such as package://...")
     parser.set_defaults(run=run)
