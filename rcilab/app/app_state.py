@@ -16,7 +16,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.joint import JointLaw
+from rcilab.motion.joint import DEFAULT_JOINT_SPEED, JointLaw
 from rcilab.sim.controller_config import PlantKind
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class AppState:
     """Whether every cycle of a motion is written to a file as well."""
     runs: Path | None = None
     """Folder of these files; None: no file is written."""
-    speed: float = 0.5
+    speed: float = DEFAULT_JOINT_SPEED
     law: JointLaw = "torque_rate_limited"
     path_type: PathType = "joint"
     """How the tool moves to the goal."""

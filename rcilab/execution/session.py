@@ -56,7 +56,7 @@ from rcilab.makers.maker import (
 from rcilab.model.robot_model import load_model, require_model
 from rcilab.motion import Motion, plan_joint, require_motion
 from rcilab.motion.cartesian import arm_angles, follow_path, schedule
-from rcilab.motion.joint import S_PROFILE_VELOCITY, JointLaw
+from rcilab.motion.joint import DEFAULT_SPEED, S_PROFILE_VELOCITY, JointLaw
 from rcilab.motion.path import build_arc, build_line
 from rcilab.motion.speed_scaling import require_speed_override
 from rcilab.recording.run import Run
@@ -521,7 +521,7 @@ class RobotSession(Closeable):
         with self._lock.begin_motion("control"):
             return self._runner.run(callback, mode, filters=filters)
 
-    def move_j(self, goal: ArrayLike, speed: float = 0.2, progress: Progress | None = None) -> Run:
+    def move_j(self, goal: ArrayLike, speed: float = DEFAULT_SPEED, progress: Progress | None = None) -> Run:
         """Moves to joint angles by the manual's S profile and returns at the end: the vendor's MOVEJ.
 
         An arm whose maker has no such profile moves by "jerk_limited", see `plan_joint`. Unlike the vendor's, it starts
@@ -546,7 +546,9 @@ class RobotSession(Closeable):
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)
 
-    def move_l(self, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None) -> Run:
+    def move_l(
+        self, goal: Pose, speed: float = DEFAULT_SPEED, psi: float | None = None, progress: Progress | None = None
+    ) -> Run:
         """Moves the tool on a line to a pose by the manual's S profile and returns at the end: MOVEL.
 
         The session sends poses, and the controller computes the joint angles (Cartesian position mode); an arm without
@@ -573,8 +575,9 @@ class RobotSession(Closeable):
             return self._move_along(path, state, speed, psi is not None, progress)
 
     def move_c(
-        self, via: Pose, goal: Pose, speed: float = 0.2, psi: float | None = None, progress: Progress | None = None
-    ) -> Run:
+        self, via: Pose, goal: Pose, speed: float = DEFAULT_SPEED, psi: float | None = None,
+        progress: Progress | None = None,
+    ) -> Run:  # fmt: skip
         """Moves the tool on the arc through `via` to a pose by the manual's S profile and returns at the end: MOVEC.
 
         As in the vendor's, the orientation changes from start to goal and that of `via` is ignored. Three positions on

@@ -15,7 +15,7 @@ from rcilab.core.errors import InvalidValueError, PlanningError, SingularError
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.bounds import require_inside
-from rcilab.motion.joint import JOINT_LAWS, MIN_SPEED, JointLaw
+from rcilab.motion.joint import DEFAULT_SPEED, JOINT_LAWS, MIN_SPEED, JointLaw
 from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.path import (
     ArcOrientation,
@@ -56,7 +56,7 @@ def plan_line(
     start: ArrayLike,
     goal: Pose,
     *,
-    speed: float = 0.2,
+    speed: float = DEFAULT_SPEED,
     psi: float | None = None,
     law: JointLaw = "jerk_limited",
 ) -> Motion:
@@ -94,7 +94,7 @@ def plan_arc(
     via: Pose,
     goal: Pose,
     *,
-    speed: float = 0.2,
+    speed: float = DEFAULT_SPEED,
     psi: float | None = None,
     law: JointLaw = "jerk_limited",
     orientation: ArcOrientation = "through_via",
@@ -136,7 +136,7 @@ def plan_circle(
     center: ArrayLike | None = None,
     axis: ArrayLike | None = None,
     angle: float = math.tau,
-    speed: float = 0.2,
+    speed: float = DEFAULT_SPEED,
     psi: float | None = None,
     law: JointLaw = "jerk_limited",
     orientation: CircleOrientation = "held",
@@ -185,7 +185,7 @@ def plan_nullspace(
     start: ArrayLike,
     psi: float,
     *,
-    speed: float = 0.2,
+    speed: float = DEFAULT_SPEED,
     law: JointLaw = "jerk_limited",
     way: ElbowDirection = "shorter",
 ) -> Motion:

@@ -22,6 +22,10 @@ from rcilab.motion.torque_rate import plan_within_torque_rate
 JointLaw = Literal["jerk_limited", "torque_rate_limited", "s_profile"]
 JOINT_LAWS: tuple[JointLaw, ...] = get_args(JointLaw)
 
+DEFAULT_JOINT_SPEED = 0.5
+"""Speed of `plan_joint`, and of the plans on page and in notebook at their start."""
+DEFAULT_SPEED = 0.2
+"""Speed of the other planners, of waypoints and of a session's moves."""
 MIN_SPEED = 0.001
 """Lowest speed to plan with: a full turn then takes most of an hour and its rows 200 MB; ruckig cannot represent a
 motion of more than about two hours."""
@@ -51,7 +55,7 @@ def plan_joint(
     start: ArrayLike,
     goal: ArrayLike,
     *,
-    speed: float = 0.5,
+    speed: float = DEFAULT_JOINT_SPEED,
     law: JointLaw = "jerk_limited",
     start_velocity: ArrayLike | None = None,
     start_acceleration: ArrayLike | None = None,

@@ -13,7 +13,7 @@ from rcilab.core.arrays import MAX_ANGLE, Unquoted, as_number, as_vector, descri
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose, as_pose, is_transform
 from rcilab.model.kinematics.solvers.build import build_solver
-from rcilab.motion.joint import MIN_SPEED
+from rcilab.motion.joint import DEFAULT_SPEED, MIN_SPEED
 from rcilab.motion.path import CircleOrientation, ElbowDirection
 from rcilab.robots.description import RobotDescription
 
@@ -92,7 +92,7 @@ class Waypoint:
     way: ElbowDirection | None = None
     """Direction of a nullspace move, "shorter" (default) or "longer"; the longer one to the arm angle of the start is a
     full turn."""
-    speed: float = 0.2
+    speed: float = DEFAULT_SPEED
     """Part of the velocity and acceleration limits to use on the segment to this waypoint, 0.001 to 1; jerk limits
     are used in full."""
     blend: float = 0.0
@@ -140,7 +140,7 @@ class Waypoint:
 
     @classmethod
     def joint(
-        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
         dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
         """Returns a straight move in joint space, to joint angles, shape (n,), [rad], or to a pose of the tool.
@@ -151,7 +151,7 @@ class Waypoint:
 
     @classmethod
     def line(
-        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
+        cls, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED, blend: float = 0.0,
         dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
         """Returns a straight line of the tool to a pose, or to the pose at joint angles, shape (n,), [rad]."""
@@ -159,7 +159,7 @@ class Waypoint:
 
     @classmethod
     def arc(
-        cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = 0.2,
+        cls, via: Pose | ArrayLike, target: Pose | ArrayLike, *, psi: float | None = None, speed: float = DEFAULT_SPEED,
         blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
         """Returns an arc of the tool through `via`: a pose, or only a position, shape (3,), [m]."""
@@ -172,8 +172,8 @@ class Waypoint:
     @classmethod
     def circle(
         cls, center: ArrayLike, axis: ArrayLike, angle: float | None = None, *,
-        orientation: CircleOrientation = "held", psi: float | None = None, speed: float = 0.2, blend: float = 0.0,
-        dwell: float = 0.0,
+        orientation: CircleOrientation = "held", psi: float | None = None, speed: float = DEFAULT_SPEED,
+        blend: float = 0.0, dwell: float = 0.0,
     ) -> Waypoint:  # fmt: skip
         """Returns a circle, or a part of it, around a centre, shape (3,), [m], and an axis, shape (3,).
 
@@ -186,8 +186,9 @@ class Waypoint:
 
     @classmethod
     def nullspace(
-        cls, psi: float, *, way: ElbowDirection = "shorter", speed: float = 0.2, blend: float = 0.0, dwell: float = 0.0
-    ) -> Waypoint:
+        cls, psi: float, *, way: ElbowDirection = "shorter", speed: float = DEFAULT_SPEED, blend: float = 0.0,
+        dwell: float = 0.0,
+    ) -> Waypoint:  # fmt: skip
         """Returns a move of only the elbow to an arm angle, [rad], in the shorter or the longer direction."""
         return cls(type="nullspace", psi=psi, way=way, speed=speed, blend=blend, dwell=dwell)
 
