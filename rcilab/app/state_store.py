@@ -14,7 +14,7 @@ from rcilab.i18n.translator import Message
 ROBOT_TROUBLE = "robot"
 """Name of the troubles while the robot cannot move, for `StateStore.clear_notices`."""
 
-_UNDO_DEPTH = 100
+UNDO_DEPTH = 100
 _NOTICES = 4  # For each page, and for all pages together: more would cover the scene.
 
 S = TypeVar("S", bound=AppState, covariant=True)
@@ -84,7 +84,7 @@ class StateStore(Generic[S]):
 
     def push_undo(self) -> None:
         """Stores the current goal for `undo`."""
-        self._past = [*self._past[-_UNDO_DEPTH:], self._state.goal]
+        self._past = [*self._past[-UNDO_DEPTH:], self._state.goal]
 
     def undo(self) -> Goal | None:
         """Returns the goal that was stored last, or None."""

@@ -14,6 +14,7 @@ from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.motion import Motion
 from rcilab.motion.speed_scaling import (
+    PREVIOUS_ROWS,
     SpeedScaledMotion,
     change_speed_override,
     require_speed_override,
@@ -21,7 +22,6 @@ from rcilab.motion.speed_scaling import (
 )
 
 _ATTEMPTS = 12  # Number of candidates that are fully checked; it bounds the computing time.
-_PREVIOUS_ROWS = 3  # Number of previous rows that enter the differences of a row.
 
 
 def plan_start_with_override(motion: Motion, speed_override: float, model: RobotModel, mode: Mode) -> SpeedScaledMotion:
@@ -90,10 +90,10 @@ def _violations(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> 
     """Returns the violations in the rows from the change on."""
     first = candidate.changed - 1
     rows = candidate.q[first:]
-    if first < _PREVIOUS_ROWS:
+    if first < PREVIOUS_ROWS:
         rows, start = candidate.q, None
     else:
-        start = _state(candidate.q[first - _PREVIOUS_ROWS : first + 1])
+        start = _state(candidate.q[first - PREVIOUS_ROWS : first + 1])
     report = check(Motion.from_cycles(rows), model, start=start, distance=None, mode=mode)
     return list(report.violations)
 

@@ -17,7 +17,7 @@ import numpy as np
 from rcilab.core.arrays import Array
 from rcilab.core.spatial import Pose, wxyz_from_rotation
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.hermite import State, evaluate, quintic
+from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state, evaluate, quintic
 from rcilab.motion.path import Path
 from rcilab.motion.segment import Segment
 
@@ -25,8 +25,6 @@ _SAMPLES = 33
 """Number of points at which half a segment, or a blend, is sampled; tuning value."""
 _MIN_TRAVEL = 1e-6
 """A tool that moves less than this only rotates, [m]."""
-_DIFFERENCE_STEP = 3e-4
-"""Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
 _RADIUS_MARGIN = 0.999
 """Part of the radius within which the samples must be, so that the curve between them is inside, too."""
 
@@ -138,7 +136,7 @@ def _scaled(state: State, rate: float) -> State:
 
 def _tool_state(path: Path, corner: Pose, share: float) -> State:
     """Returns position, rotation vector from the corner and arm angle, (7,), with two derivatives by the share."""
-    T, psi = path.sample(share + _DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
+    T, psi = path.sample(share + DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
     rows = np.zeros((3, 7))
     rows[:, :3] = T[:, :3, 3]
     rows[:, 3:6] = [_rotation_vector(R) for R in corner.rotation.T @ T[:, :3, :3]]
@@ -147,8 +145,7 @@ def _tool_state(path: Path, corner: Pose, share: float) -> State:
     for row in (0, 2):  # Half a turn from the corner the vector is ambiguous; keep the one of the middle row.
         if rows[row, 3:6] @ rows[1, 3:6] < 0.0 and (size := float(np.linalg.norm(rows[row, 3:6]))) > math.pi / 2.0:
             rows[row, 3:6] *= 1.0 - math.tau / size
-    before, here, after = rows
-    return here, (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
+    return central_state(*rows)
 
 
 def _rotation_vector(R: Array) -> Array:

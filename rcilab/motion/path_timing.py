@@ -17,7 +17,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN, limit_touched
-from rcilab.motion.hermite import quintic
+from rcilab.motion.hermite import central_state, quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.motion import Motion, stationary_motion
@@ -307,7 +307,7 @@ def _quintics(
         before, after = (
             inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_DIFFERENCE_STEP, _DIFFERENCE_STEP)
         )
-        first, second = (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
+        _, first, second = central_state(before, here, after, _DIFFERENCE_STEP)
         du, ddu = law.ds[ends, np.newaxis], law.dds[ends, np.newaxis]
         v = first * du
         a = second * du**2 + first * ddu

@@ -15,6 +15,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import require_inside
 from rcilab.motion.cartesian import arm_angles
+from rcilab.motion.hermite import DIFFERENCE_STEP, central_state
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.path import Path, build_arc, build_circle, build_line
 from rcilab.motion.path_infeasibility import solve_path
@@ -29,8 +30,6 @@ _STEP = 0.1
 """A larger step of a joint from knot to knot is checked with finer knots, [rad]. Tuning value."""
 _BRANCH_TOLERANCE = 1e-6
 """Largest difference between the end of a line and its target q, [rad]; beyond it q is on another branch."""
-_DIFFERENCE_STEP = 3e-4
-"""Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -76,9 +75,8 @@ class Segment:
         if self.path is None:
             distance = self.goal - self.start
             return self.start + share * distance, distance, np.zeros_like(distance)
-        T, psi = self.path.sample(share + _DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
-        before, here, after = inverse_path(model, T, psi, self.joints_near(share))[0]
-        return here, (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
+        T, psi = self.path.sample(share + DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0]))
+        return central_state(*inverse_path(model, T, psi, self.joints_near(share))[0])
 
 
 def build_segments(

@@ -19,7 +19,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.errors import PlanningError, RcilabError
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.blend import LENGTH, Blend
-from rcilab.motion.hermite import State, derivative, evaluate, quintic
+from rcilab.motion.hermite import DIFFERENCE_STEP, State, central_state, derivative, evaluate, quintic
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.segment import Segment
 
@@ -31,8 +31,6 @@ _MAX_STEP = 0.03
 """Intended step of a joint from knot to knot, [rad]. Tuning value: the tool is then within a nanometre of its path."""
 _MAX_JUMP = 0.3
 """A larger step of a joint from knot to knot is caused by a singularity, [rad]."""
-_DIFFERENCE_STEP = 3e-4
-"""Step of the finite differences, as a share of a segment or blend. Tuning value: both errors are below 1e-7."""
 
 
 Rows: TypeAlias = NDArray[np.intp]
@@ -250,7 +248,7 @@ def _write_tool_paths(model: RobotModel, pieces: list[_Piece], states: tuple[Arr
     T_parts, psi_parts, rates, changes = [], [], [], []
     for number, piece in enumerate(pieces):
         local = piece.local[1:] if number else piece.local
-        T, psi = piece.poses((local[:, np.newaxis] + _DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0])).ravel())
+        T, psi = piece.poses((local[:, np.newaxis] + DIFFERENCE_STEP * np.array([-1.0, 0.0, 1.0])).ravel())
         T_parts.append(T)
         psi_parts.append(psi)
         rates.append(piece.rate[-len(local) :])
@@ -271,13 +269,12 @@ def _write_tool_paths(model: RobotModel, pieces: list[_Piece], states: tuple[Arr
     rows = slice(row, row + len(row_pieces))
     n = model.n
     table = np.hstack((q, psi[:, np.newaxis], T[:, :3, 3])).reshape(len(row_pieces), 3, n + 4)
-    before, here, after = table[:, 0], table[:, 1], table[:, 2]
-    slope, bend = (after - before) / (2.0 * _DIFFERENCE_STEP), (after - 2.0 * here + before) / _DIFFERENCE_STEP**2
+    here, slope, bend = central_state(table[:, 0], table[:, 1], table[:, 2])
     states[0][rows, : n + 4] = here
     states[1][rows, : n + 4] = slope * rate
     states[2][rows, : n + 4] = slope * change + bend * rate**2
     back, ahead = _turns(T[0::3], T[1::3]), _turns(T[1::3], T[2::3])
-    slope, bend = (ahead + back) / (2.0 * _DIFFERENCE_STEP), (ahead - back) / _DIFFERENCE_STEP**2
+    slope, bend = (ahead + back) / (2.0 * DIFFERENCE_STEP), (ahead - back) / DIFFERENCE_STEP**2
     states[1][rows, n + 4 :] = slope * rate
     states[2][rows, n + 4 :] = slope * change + bend * rate**2
     steps = np.concatenate([np.diff(piece.s) for piece in pieces])[:, np.newaxis]

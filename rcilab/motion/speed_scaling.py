@@ -27,10 +27,11 @@ from rcilab.motion.piecewise import PiecewisePolynomial
 
 MIN_SPEED_OVERRIDE = 0.1
 """Smallest override; for a lower speed, plan the motion again."""
+PREVIOUS_ROWS = 3
+"""Rows before a change that enter the differences of the first new rows."""
 
 _RAMPS = (0.08, 0.12, 0.18, 0.26, 0.38, 0.55, 0.8, 1.2, 1.8, 2.7, 4.0)  # [s]
 _DELAYS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.7, 1.0, 1.5, 2.5, 4.0)  # [s]
-_PREVIOUS_ROWS = 3  # Rows before a change that enter the differences of the first new rows.
 _ROUNDING = 1e-9
 
 
@@ -203,11 +204,11 @@ def _ramp(scaled: SpeedScaledMotion, first: int, override: float, ramp: float) -
 
 
 def _keeps_limits(scaled: SpeedScaledMotion, first: int, law: Array, limits: JointLimits) -> bool:
-    q = np.concatenate((scaled.q[max(first + 1 - _PREVIOUS_ROWS, 0) : first + 1], _rows(scaled.motion, law[0])))
-    if first + 1 < _PREVIOUS_ROWS:  # The arm was at standstill before.
-        q = np.concatenate((np.repeat(q[:1], _PREVIOUS_ROWS, axis=0), q))
+    q = np.concatenate((scaled.q[max(first + 1 - PREVIOUS_ROWS, 0) : first + 1], _rows(scaled.motion, law[0])))
+    if first + 1 < PREVIOUS_ROWS:  # The arm was at standstill before.
+        q = np.concatenate((np.repeat(q[:1], PREVIOUS_ROWS, axis=0), q))
     if law[1, -1] == 0.0:
-        q = np.concatenate((q, np.repeat(q[-1:], _PREVIOUS_ROWS, axis=0)))
+        q = np.concatenate((q, np.repeat(q[-1:], PREVIOUS_ROWS, axis=0)))
     for bound in (limits.velocity, limits.acceleration, limits.jerk):
         q = np.diff(q, axis=0) / CYCLE_TIME
         if not (np.abs(q).max(axis=0) < bound).all():

@@ -36,7 +36,7 @@ STEPS = (0.0, 0.1, 1.0, 5.0, 10.0)
 FASTEST_TOOL = 0.25  # [m/s] Reduced speed of ISO 10218-1; no jog moves the tool tip faster.
 FASTEST_TURN = math.radians(45.0)  # [rad/s] Of the tool.
 FASTEST_JOINT = math.radians(30.0)  # [rad/s]
-SLOWEST = 0.01
+SLOWEST = 0.01  # Share of the fastest jog.
 STILL = 1e-3  # [rad/s] Below this a jogged joint counts as standing still.
 
 _AT_LIMIT = math.radians(0.05)  # [rad] At a smaller distance a jogged joint has arrived at its limit.

@@ -13,6 +13,7 @@ from rcilab.app.goal.goal import Goal, Tone, goal_at
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import TOOL, is_guided
+from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle, pulled_cable
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import PendingRequest, SupervisorStatus
     from rcilab.makers.configuration import RobotConfiguration, SetupPart
 
-_CONFIRM_TIMEOUT = 10.0  # [s] A later second press asks again.
 _POWER_PAUSE = 2.0  # [s] Between two attempts to switch the virtual arm on.
 
 
@@ -132,9 +132,9 @@ class RunActions:
         if unset is not None:
             self._store.notify("warn", unset)
             return None
-        if state.target != "virtual" and now - self._asked_to_guide > _CONFIRM_TIMEOUT:
+        if state.target != "virtual" and now - self._asked_to_guide > CONFIRM_TIMEOUT:
             self._asked_to_guide = now
-            self._store.notify("warn", message("guide.sure", address=state.target, seconds=f"{_CONFIRM_TIMEOUT:.0f}"))
+            self._store.notify("warn", message("guide.sure", address=state.target, seconds=f"{CONFIRM_TIMEOUT:.0f}"))
             return None
         self._asked_to_guide = -math.inf
         space, kind = state.push.guiding_kind.split(".")

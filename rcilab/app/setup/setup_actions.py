@@ -40,6 +40,7 @@ from rcilab.app.setup.setup_fields import (
     with_inertia,
     with_pose,
 )
+from rcilab.app.state_store import UNDO_DEPTH
 from rcilab.app.store import Store, UiState
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
@@ -52,7 +53,6 @@ from rcilab.robots import describe_robot
 if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
-_UNDO_DEPTH = 100
 _HAND_GONE = 1.0  # [s] A drag without an event for this time has ended, whether or not its page is open.
 
 
@@ -343,7 +343,7 @@ class SetupActions:
             return
         if drag is None or drag != self._drag:
             now = self._store.state.setup
-            self._past = [*self._past[-_UNDO_DEPTH:], (now.wanted, now.touched)]
+            self._past = [*self._past[-UNDO_DEPTH:], (now.wanted, now.touched)]
         self._drag = drag
         self._take(replace(changed, touched=changed.touched | {part}), {part})
 
