@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 from rcilab.cli import main
-from rcilab.motion.program_file import SCHEMA
 
 ROOT = Path(__file__).parents[1]
+SCHEMA = ROOT / "rcilab/motion/program.schema.json"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 

@@ -24,9 +24,6 @@ P = TypeVar("P")
 FORMAT = "rcilab program"
 VERSION = 1
 
-SCHEMA = Path(__file__).with_name("program.schema.json")
-"""The JSON schema (draft 2020-12) of a program."""
-
 _EXCERPT_LENGTH = 40  # [characters] Of a value in an error message.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
 _PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")

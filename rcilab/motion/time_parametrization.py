@@ -4,7 +4,7 @@ The path has a parameter s, from 0 on, with knots at any spacing. The bounded ro
 s: joint angles, position and rotation of the tool, the arm angle. With x = s'^2 each row is linear in (x, s''):
 |first s'' + second x| <= acceleration, and first^2 x <= velocity^2.
 
-`fastest_squares` is the reachability analysis of Pham and Pham (TOPP-RA, IEEE T-RO 34(3), 2018): a backward pass for
+`FastestLaw` is the reachability analysis of Pham and Pham (TOPP-RA, IEEE T-RO 34(3), 2018): a backward pass for
 the largest x from which the end can be reached, a forward pass with the largest s''. Its accelerations jump;
 `smooth_law` takes their mean over some cycles, which keeps both ends and the distance and makes every jerk finite.
 """
@@ -38,15 +38,6 @@ class TimeParametrization:
     """[1/s^2]; linear between the cycles."""
 
 
-def fastest_squares(bounds: PathBounds) -> Array:
-    """Returns the largest squares of s' at the knots, from standstill to standstill, shape (K + 1,), [1/s^2].
-
-    Args:
-        bounds: Bounds of the path.
-    """
-    return FastestLaw(bounds).slowed(np.ones(len(bounds.knots)))
-
-
 class FastestLaw:
     """The fastest time law along a path. After a local slowdown only the affected part is computed again.
 
@@ -73,10 +64,10 @@ class FastestLaw:
         self._squares = [0.0] * count
 
     def slowed(self, factor: Array) -> Array:
-        """Returns the squares of s' at the knots with a slowdown of each knot, shape (K + 1,), [1/s^2].
+        """Returns the largest squares of s' at the knots, from standstill to standstill, shape (K + 1,), [1/s^2].
 
         Args:
-            factor: Slowdown, 1 or more, shape (K + 1,).
+            factor: Slowdown of each knot, 1 or more, shape (K + 1,).
         """
         changed = factor != self._slowdown
         self._slowdown = factor.copy()

@@ -17,7 +17,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import path_timing as along
 from rcilab.motion import plan_arc, plan_circle, plan_line, plan_nullspace
 from rcilab.motion.path import build_arc, build_line
-from rcilab.motion.time_parametrization import fastest_squares
+from rcilab.motion.time_parametrization import FastestLaw
 from rcilab.robots import ROBOT_NAMES
 
 MODELS = {name: load_model(name, tool=Pose((0.0, 0.02, 0.1))) for name in ROBOT_NAMES}
@@ -184,7 +184,7 @@ def test_a_bounded_jerk_costs_little(name, seed):
     path = build_line(model.forward(q), goal, angles(model, q), psi)
     bounds = along._bounds(model, 1.0)
     allowed = along._path_bounds(path, along.require_path(model, q, path), bounds)
-    speed = np.sqrt(fastest_squares(allowed))
+    speed = np.sqrt(FastestLaw(allowed).slowed(np.ones(len(allowed.knots))))
     without = float((2.0 * np.diff(allowed.knots) / (speed[:-1] + speed[1:])).sum())
     assume(without > 0.2)
     assert motion.duration <= 1.15 * without

@@ -21,7 +21,6 @@ from rcilab.core.errors import InvalidValueError, ModelError, VersionMismatchErr
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, located_json, plan_program
-from rcilab.motion.program_file import SCHEMA
 from rcilab.motion.waypoint import ALLOWED, CHOICES, COMMON_FIELDS
 
 MODEL = load_model("xMatePro7")
@@ -79,7 +78,7 @@ printable = st.text(st.characters(exclude_categories=("C", "Z")))
 def validator():
     import jsonschema  # Takes 2 s, which other workers need not wait for.
 
-    return jsonschema.Draft202012Validator(json.loads(SCHEMA.read_text()))
+    return jsonschema.Draft202012Validator(json.loads((ROOT / "rcilab/motion/program.schema.json").read_text(encoding="utf-8")))
 
 
 @settings(max_examples=40)

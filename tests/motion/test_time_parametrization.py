@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rcilab.core.arrays import Array
 from rcilab.motion.path_bounds import PathBounds, path_bounds
-from rcilab.motion.time_parametrization import FastestLaw, fastest_squares, smooth_law
+from rcilab.motion.time_parametrization import FastestLaw, smooth_law
 
 KNOTS = 400
 
@@ -57,6 +57,10 @@ def duration_of(knots: np.ndarray, squares: np.ndarray) -> float:
     """Returns how long the law with these squares of s' lasts, s'' constant from knot to knot, [s]."""
     speed = np.sqrt(squares)
     return float((2.0 * np.diff(knots) / (speed[:-1] + speed[1:])).sum())
+
+
+def fastest_squares(bounds: PathBounds) -> np.ndarray:
+    return FastestLaw(bounds).slowed(np.ones(len(bounds.knots)))
 
 
 def lasts(bounds: PathBounds) -> float:
