@@ -78,7 +78,9 @@ printable = st.text(st.characters(exclude_categories=("C", "Z")))
 def validator():
     import jsonschema  # Takes 2 s, which other workers need not wait for.
 
-    return jsonschema.Draft202012Validator(json.loads((ROOT / "rcilab/motion/program.schema.json").read_text(encoding="utf-8")))
+    return jsonschema.Draft202012Validator(
+        json.loads((ROOT / "rcilab/motion/program.schema.json").read_text(encoding="utf-8"))
+    )
 
 
 @settings(max_examples=40)
