@@ -93,6 +93,21 @@ def describe_success(status: SupervisorStatus) -> Message:
     return message(code, share=f"{100.0 * status.success_rate:.1f}")
 
 
+def health_values(status: SupervisorStatus, text: Text) -> dict[str, str]:
+    """Returns mode, power, network and timing, by the ends of the keys of their names."""
+    mode, control, late = status.robot_mode, status.controller_mode, status.lateness
+    return {
+        "mode": "—" if mode is None else text(f"robot_mode.{mode.name}"),
+        "control": "—" if control is None else text(f"controller_mode.{control.name}"),
+        "power": {None: "—", True: text("run.on"), False: text("run.off")}[status.powered],
+        "success": text.render(describe_success(status)),
+        "rate": f"{status.rate_hz:.0f} Hz",
+        "late": text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles),
+        "lateness": f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs",
+        "scheduling": text(f"scheduling.{status.scheduling}"),
+    }
+
+
 def phase_code(status: SupervisorStatus) -> str:
     """Returns the key of the short name of the robot's status."""
     if status.phase in ("idle", "fault") and status.is_pressed:

@@ -6,15 +6,13 @@ import math
 
 import numpy as np
 
-from rcilab.app.fault_lab.demo_view import seen_lower
+from rcilab.app.fault_lab.demo_view import AFTER_FAULT, MARGIN, seen_lower
 from rcilab.app.fault_lab.fault_demo import FaultDemo
 from rcilab.notebook.style import esc
 from rcilab.notebook.svg_plot import BAD, LINE, SOFT, number, ticks
 
 _WIDTH, _HEIGHT = 420.0, 150.0  # Units; the browser scales them.
 _LEFT, _RIGHT, _TOP, _BOTTOM = 46.0, 8.0, 6.0, 20.0
-_AROUND = 0.06  # Part of the recorded time that the plot continues after the fault, so that its mark is complete.
-_MARGIN = 0.12  # Part of the height above and below.
 _NAME = 60.0  # Width of the time axis' name.
 _CURVE = "#0072B2"
 
@@ -33,8 +31,8 @@ def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> st
     known = np.isfinite(values)
     seen = [float(values[known].min()), float(values[known].max()), upper]
     seen += [lower] if math.isfinite(lower) else []
-    margin = _MARGIN * (max(seen) - min(seen) or 1.0)
-    low, high, end = min(seen) - margin, max(seen) + margin, float(t[-1]) * (1.0 + _AROUND)
+    margin = MARGIN * (max(seen) - min(seen) or 1.0)
+    low, high, end = min(seen) - margin, max(seen) + margin, float(t[-1]) * (1.0 + AFTER_FAULT)
     right, bottom = _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
 
     def x(at: float) -> float:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from rcilab.conformance.explain import explain_formula, explain_place, explain_source, explain_violation
+from rcilab.app.check.report_rows import count_unheeded, row_facts, row_tone, row_word
+from rcilab.conformance.explain import explain_formula, explain_source, explain_violation
 from rcilab.conformance.report import ConditionResult, Report
-from rcilab.i18n.condition_values import value_against_bound
 from rcilab.notebook.part import Part
-from rcilab.notebook.style import Tone, block, esc, soft, verdict, write
+from rcilab.notebook.style import block, esc, soft, verdict, write
 
-_TIGHT = 0.95  # Share of a bound from which on a row is amber.
 _LISTED = 8
 
 
@@ -45,7 +44,7 @@ class ReportView(Part):
             )
             write(self._rows, "")
             return
-        unheeded = sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
+        unheeded = count_unheeded(report)
         if report.ok:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             sentence = verdict("good", text("check.passed"), text(code, count=unheeded))
@@ -60,24 +59,15 @@ class ReportView(Part):
         write(self._rows, f'<div class="rl-scroll">{f"<ul>{broken}</ul>" if broken else ""}{cards}</div>')
 
     def _card(self, row: ConditionResult) -> str:
-        text, condition = self.text, row.condition
-        tone: Tone = "good" if row.ok and row.ratio <= _TIGHT else "warn"
-        word = "check.kept" if tone == "good" or row.start_excess else "check.tight" if row.ok else "check.exceeded"
-        if not row.ok and condition.necessity == "necessary":
-            tone, word = "bad", "check.violated"
-        facts = [value_against_bound(*row.displayed, condition.unit, text)]
-        facts += [text("check.joint", joint=row.joint)] if row.joint else []
-        facts += [text("check.led_in")] if row.start_excess else []
-        facts += [explain_place(row, text.language)] if row.links is not None else []
-        facts.append(f"t = {row.time:.3f} s")
+        text, condition, tone = self.text, row.condition, row_tone(row)
         share = f"{100.0 * row.ratio:.1f} %" if row.has_share else ""
         fault = "" if condition.fault is None else " · " + text("check.raises", fault=condition.fault.manual_name)
         formula, source = explain_formula(condition, text.language), explain_source(condition, text.language)
         return (
             f'<div class="rl-card rl-{tone}"><div class="rl-row"><b>{esc(text(f"condition.{condition.id}"))}</b>'
             f'<span class="rl-soft">{esc(text("necessity." + condition.necessity))}</span>'
-            f'<span class="rl-push">{esc(text(word))}</span><span class="rl-num">{share}</span></div>'
+            f'<span class="rl-push">{esc(row_word(row, text))}</span><span class="rl-num">{share}</span></div>'
             f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
-            f'<div class="rl-num">{esc(" · ".join(facts))}</div>'
+            f'<div class="rl-num">{esc(" · ".join(row_facts(row, text)))}</div>'
             f'<div class="rl-soft">{esc(formula)} — {esc(source + fault)}</div></div>'
         )

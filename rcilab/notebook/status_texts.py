@@ -6,7 +6,7 @@ import numpy as np
 
 from rcilab.app.run.robot_requests import Outcome
 from rcilab.app.session_connection import BusyError
-from rcilab.app.status_text import describe_status, describe_success, explain_error, phase_code
+from rcilab.app.status_text import describe_status, explain_error, health_values, phase_code
 from rcilab.control_process import SupervisorStatus
 from rcilab.core.errors import SAFETY_STOP, ControlError, RcilabError
 from rcilab.i18n.error_messages import describe_note
@@ -14,6 +14,8 @@ from rcilab.i18n.translator import Message, Text, message
 from rcilab.notebook.style import head, table, verdict
 from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.recording.run import describe_end
+
+_OF_CYCLES = ("late", "lateness", "scheduling")  # Shown once there are cycles.
 
 
 def name_phase(status: SupervisorStatus | None, text: Text) -> str:
@@ -37,21 +39,11 @@ def describe_refusal(error: RcilabError, status: SupervisorStatus | None = None)
 
 def health_html(status: SupervisorStatus, text: Text) -> str:
     """Returns mode, power, network and timing, as the controller reports them."""
-    mode, control = status.robot_mode, status.controller_mode
-    rows = [
-        ("mode", "—" if mode is None else text(f"robot_mode.{mode.name}")),
-        ("control", "—" if control is None else text(f"controller_mode.{control.name}")),
-        ("power", {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]),
-        ("success", text.render(describe_success(status))),
-        ("rate", f"{status.rate_hz:.0f} Hz"),
+    rows = health_values(status, text).items()
+    shown = [
+        [text(f"health.{name}"), value] for name, value in rows if status.lateness.cycles or name not in _OF_CYCLES
     ]
-    late = status.lateness
-    if late.cycles:
-        late_value = text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)
-        rows.append(("late", late_value))
-        rows.append(("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"))
-        rows.append(("scheduling", text(f"scheduling.{status.scheduling}")))
-    return head(text("run.health")) + table([], [[text(f"health.{name}"), value] for name, value in rows])
+    return head(text("run.health")) + table([], shown)
 
 
 def outcome_html(outcome: Outcome, status: SupervisorStatus | None, text: Text, *, is_page_gone: bool = False) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,6 +18,7 @@ from ipywidgets.widgets import widget
 import rcilab
 import rcilab.notebook
 from rcilab import notebook
+from rcilab.app.check.report_rows import row_tone
 from rcilab.app.goal.goal_actions import SetLaw
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.i18n.catalogue import load_catalogue, load_ui_catalogue
@@ -263,6 +265,14 @@ def test_a_goal_that_was_moved_is_told_beside_the_plan(fresh: Lab) -> None:
     fresh.plan.plan.click()
     fresh.jog.sliders[0].value = 1.0
     assert "has moved" in text_of(fresh.plan._sentence)
+
+
+def test_a_row_of_the_report_has_the_same_tone_as_on_the_page() -> None:
+    checked = rcilab.check(rcilab.plan_joint(PRO7, PRO7.home, GOAL), PRO7)
+    rows = tuple(replace(row, ratio=0.99) for row in checked.rows)
+    with notebook.ReportView(PRO7, replace(checked, rows=rows)) as report:
+        shown = re.findall("rl-card rl-(good|warn|bad)", report._rows.value)
+    assert sorted(shown) == sorted(row_tone(row) for row in rows)
 
 
 def test_what_breaks_a_limit_is_shaded_explained_and_slowed_down_to_fit(fresh: Lab) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from rcilab.app.check.check_actions import CheckActions, PressCheck, plot_of
+from rcilab.app.check.report_rows import row_tone
 from rcilab.app.check.slowdown_job import scaled, slow_to_goal
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.goal.goal_actions import GoalActions
@@ -31,7 +32,7 @@ from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Program, Waypoint
 from rcilab.workbench.panels.check import CheckPanel
-from rcilab.workbench.panels.check_rows import row_tone, rows_html
+from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.panels.target import planned_html
 from tests.waiting import wait_for
 

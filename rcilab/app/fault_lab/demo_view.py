@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from rcilab.app.fault_lab.fault_demo import FaultDemo
     from rcilab.i18n.translator import Text
 
+AFTER_FAULT = 0.06  # Part of the recorded time that the curve continues after the fault, so that its mark is complete.
+MARGIN = 0.12  # Part of the height above and below the curve.
 _NEAR = 0.5  # Share of the lower bound from which on it is shown: a distant bound would flatten the curve.
 
 

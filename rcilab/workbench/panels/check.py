@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import beside_program, outdated
+from rcilab.app.check.report_rows import count_unheeded
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
 from rcilab.i18n.translator import Message, with_space
-from rcilab.workbench.panels.check_rows import count_unheeded, rows_html
+from rcilab.workbench.panels.check_rows import rows_html
 from rcilab.workbench.widgets import Ask, Html, esc, on_press
 
 if TYPE_CHECKING:

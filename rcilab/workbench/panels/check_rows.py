@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rcilab.app.check.report_rows import row_facts, row_tone, row_word
 from rcilab.app.text import Text
-from rcilab.conformance.explain import explain_formula, explain_place, explain_source
-from rcilab.i18n.condition_values import value_against_bound
+from rcilab.conformance.explain import explain_formula, explain_source
 from rcilab.workbench.widgets import esc
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import ConditionResult, Report
     from rcilab.model.robot_model import RobotModel
 
-TIGHT = 0.95  # Share of a bound from which on a row is amber.
 _MANY = 10.0  # From this share on, it is shown as a factor.
 _ORDER = {"bad": 0, "warn": 1, "good": 2}
 _SIGNS = {"good": "✓", "warn": "▲", "bad": "◆"}
-_AMBER = {True: "check.exceeded", False: "check.tight"}
 
 
 def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str:
@@ -26,29 +24,10 @@ def rows_html(report: Report, model: RobotModel, chosen: str, text: Text) -> str
     return f'<div class="rl-cards rl-pick">{"".join(row_html(row, model, chosen, text) for row in rows)}</div>'
 
 
-def count_unheeded(report: Report) -> int:
-    """Returns how many recommended conditions are exceeded."""
-    return sum(not row.ok for row in report.rows if row.condition.necessity == "recommended")
-
-
 def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -> str:
     """Returns one row."""
     condition, tone = row.condition, row_tone(row)
-    word = text(
-        "check.kept"
-        if tone == "good" or (row.ok and row.start_excess)
-        else "check.violated"
-        if tone == "bad"
-        else _AMBER[not row.ok]
-    )
-    facts = [value_against_bound(*row.displayed, condition.unit, text)]
-    if row.links is not None:
-        facts.append(explain_place(row, text.language))
-    elif row.joint:
-        facts.append(text("check.joint", joint=row.joint))
-    elif row.start_excess:
-        facts.append(text("check.led_in"))
-    facts.append(f"t = {row.time:.3f} s")
+    facts = row_facts(row, text)
     if condition.signal == "torque":
         facts.append(load_words(model, text))
     name, fault = text(f"condition.{condition.id}"), ""
@@ -60,7 +39,7 @@ def row_html(row: ConditionResult, model: RobotModel, chosen: str, text: Text) -
         f'<div class="rl-card rl-{tone}" role="button" tabindex="0" data-condition="{esc(condition.id)}"{current} '
         f'title="{esc(text("check.row_hint"))}">'
         f'<div class="rl-line"><i class="rl-sign">{_SIGNS[tone]}</i><b>{esc(name)}</b>'
-        f'<span class="rl-word">{esc(word)}</span><span class="rl-share">{_share(row)}</span></div>'
+        f'<span class="rl-word">{esc(row_word(row, text))}</span><span class="rl-share">{_share(row)}</span></div>'
         f'<div class="rl-meter"><i style="width:{min(100.0, 100.0 * row.ratio):.1f}%"></i></div>'
         f'<div class="rl-facts"><span class="rl-badge">{esc(text("necessity." + condition.necessity))}</span> '
         f"{esc(' · '.join(facts))}</div>"
@@ -72,15 +51,6 @@ def _share(row: ConditionResult) -> str:
     if not row.has_share:
         return ""
     return f"{100.0 * row.ratio:.1f} %" if row.ratio < _MANY else f"{row.ratio:.0f} ×"
-
-
-def row_tone(row: ConditionResult) -> str:
-    """Returns good, warn (near a bound, or a recommendation that is not met) or bad."""
-    if not row.ok:
-        return "bad" if row.condition.necessity == "necessary" else "warn"
-    if row.start_excess:
-        return "warn"
-    return "warn" if row.ratio > TIGHT and row.condition.stage == "throughout" else "good"
 
 
 def load_words(model: RobotModel, text: Text) -> str:

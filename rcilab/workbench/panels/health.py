@@ -6,7 +6,7 @@ import math
 import time
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.status_text import describe_success
+from rcilab.app.status_text import health_values
 from rcilab.app.text import Text
 from rcilab.workbench.widgets import Ask, Html, esc
 
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
     from rcilab.control_process.status import Lateness
 
+_ROWS = (
+    "mode", "control", "power", "success", "in_row", "rate", "late", "lateness", "round_trip", "answer", "scheduling"
+)  # fmt: skip
 _PERIOD = 0.3  # [s] Between two updates: as fast as one can read.
 _LATE = 1000.0  # [us] From here on a cycle counts as late.
 
@@ -44,23 +47,13 @@ class HealthPanel:
 
 def health_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns the timing of the cycles, as a table."""
-    late, world = status.lateness, state.world.status
-    mode = "—" if status.robot_mode is None else text(f"robot_mode.{status.robot_mode.name}")
-    power = {None: "—", True: text("run.on"), False: text("run.off")}[status.powered]
-    rows = [
-        ("mode", mode),
-        ("control", "—" if status.controller_mode is None else text(f"controller_mode.{status.controller_mode.name}")),
-        ("power", power),
-        ("success", text.render(describe_success(status))),
-        ("in_row", "—" if world is None else f"{world.lost_in_row}"),
-        ("rate", f"{status.rate_hz:.0f} Hz"),
-        ("late", text("run.late_value", late=status.late_cycles, lost=status.lost_cycles, cycles=late.cycles)),
-        ("lateness", f"{late.p50:.0f} / {late.p99:.0f} / {late.p999:.0f} / {late.max:.0f} µs"),
-        ("round_trip", "—" if status.round_trip is None else f"{1000.0 * status.round_trip:.0f} ms"),
-        ("answer", "—" if status.answer_time is None else f"{1e6 * status.answer_time:.0f} µs"),
-        ("scheduling", text(f"scheduling.{status.scheduling}")),
-    ]
-    return f'<table class="rl-table rl-facts-table">{"".join(_row(name, value, text) for name, value in rows)}</table>'
+    world = state.world.status
+    values = health_values(status, text) | {
+        "in_row": "—" if world is None else f"{world.lost_in_row}",
+        "round_trip": "—" if status.round_trip is None else f"{1000.0 * status.round_trip:.0f} ms",
+        "answer": "—" if status.answer_time is None else f"{1e6 * status.answer_time:.0f} µs",
+    }
+    return f'<table class="rl-table rl-facts-table">{"".join(_row(name, values[name], text) for name in _ROWS)}</table>'
 
 
 def _row(name: str, value: str, text: Text) -> str:

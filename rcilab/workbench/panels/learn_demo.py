@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rcilab.app.fault_lab.demo_view import body_html, head_html, seen_lower
+from rcilab.app.fault_lab.demo_view import AFTER_FAULT, MARGIN, body_html, head_html, seen_lower
 from rcilab.app.learn.learn_actions import PressLearn
 from rcilab.app.text import Text
 from rcilab.core.arrays import Array
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 _HEIGHT = 150  # [px]
-_AROUND = 0.06  # Part of the recorded time that the plot continues after the fault, so that its mark is complete.
 
 
 class LearnDemoPanel:
@@ -83,12 +82,12 @@ class LearnDemoPanel:
         factor = self._text.units.from_si(signal.condition.unit)[0]
         data, series, _ = _contents(t, factor * signal.values, factor * signal.lower, factor * signal.upper, theme)
         low, high = float(np.nanmin(data[1:])), float(np.nanmax(data[1:]))
-        margin = 0.12 * (high - low or 1.0)
+        margin = MARGIN * (high - low or 1.0)
         self._plot.data = data
         self._plot.series = series
         self._plot.axes = plot_axes(theme, last=True)
         self._plot.scales = {
-            "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + _AROUND))},
+            "x": {"time": False, "range": (0.0, float(t[-1]) * (1.0 + AFTER_FAULT))},
             "y": {"range": (low - margin, high + margin)},
         }
 

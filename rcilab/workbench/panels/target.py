@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcilab.app.check.freshness import beside_program, outdated
+from rcilab.app.check.report_rows import count_unheeded
 from rcilab.app.goal.goal import POSE_FIELDS
 from rcilab.app.goal.goal_actions import QUATERNION
 from rcilab.app.run.readiness import is_plan_current
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import format_fixed
-from rcilab.workbench.panels.check_rows import count_unheeded
 from rcilab.workbench.panels.jog import problems_html, reach_html
 from rcilab.workbench.widgets import Ask, Html, NumberField, esc, shown_pose
 

@@ -1,0 +1,51 @@
+"""A report on page and in notebook: tone, word and facts of a row."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rcilab.conformance.explain import explain_place
+from rcilab.i18n.condition_values import value_against_bound
+
+if TYPE_CHECKING:
+    from rcilab.app.goal.goal import Tone
+    from rcilab.conformance.report import ConditionResult, Report
+    from rcilab.i18n.translator import Text
+
+TIGHT = 0.95  # Share of a bound from which on a row is amber.
+
+
+def count_unheeded(report: Report) -> int:
+    """Returns how many recommended conditions are exceeded."""
+    return sum(not row.ok for row in report.rows if row.necessity == "recommended")
+
+
+def row_tone(row: ConditionResult) -> Tone:
+    """Returns good, warn (near a bound, or a recommendation that is not met) or bad."""
+    if not row.ok:
+        return "bad" if row.necessity == "necessary" else "warn"
+    if row.start_excess:
+        return "warn"
+    return "warn" if row.ratio > TIGHT and row.condition.stage == "throughout" else "good"
+
+
+def row_word(row: ConditionResult, text: Text) -> str:
+    """Returns whether the condition holds, in a word."""
+    tone = row_tone(row)
+    if tone == "bad":
+        return text("check.violated")
+    if not row.ok:
+        return text("check.exceeded")
+    return text("check.kept" if tone == "good" or row.start_excess else "check.tight")
+
+
+def row_facts(row: ConditionResult, text: Text) -> list[str]:
+    """Returns the worst value, where it is, and when."""
+    facts = [value_against_bound(*row.displayed, row.unit, text)]
+    if row.links is not None:
+        facts.append(explain_place(row, text.language))
+    elif row.joint:
+        facts.append(text("check.joint", joint=row.joint))
+    elif row.start_excess:
+        facts.append(text("check.led_in"))
+    return [*facts, f"t = {row.time:.3f} s"]
