@@ -99,6 +99,7 @@ class ControlLoop:
         if mode not in _COMMANDS:
             raise InvalidValueError("mode", mode, f"must be one of {[m.name for m in _COMMANDS]}")
         self._driver = driver
+        self._listener = driver.on_states
         self._model = model
         self._has_psi = bool(model.redundancy)
         self._limits = limits
@@ -285,12 +286,11 @@ class ControlLoop:
             states = self._driver.poll(deadline - time.monotonic())
             if not states and time.monotonic() >= deadline:
                 raise self._lost_error()
-            for state in states[:-CATCH_UP]:
-                if state.message_id > self._answered_id:
-                    self._log.write(state, self._driver.received_ns, self._time(state))
             # A fault anywhere in the burst ends the motion: answers to earlier states have no effect.
-            faulty = [state for state in states if state.faults]
-            self._pending.extend(faulty[:1] or states[-CATCH_UP:])
+            oldest = max(len(states) - CATCH_UP, 0)
+            first = next((i for i, state in enumerate(states) if state.faults), oldest)
+            self._record([state for state in states[:first] if state.message_id > self._answered_id])
+            self._pending.extend(states[first:])
 
     def _answer(self, state: RobotState, command: Command) -> None:
         self._driver.send(state, command)
@@ -339,13 +339,16 @@ class ControlLoop:
             except BaseException as failure:
                 outcome = failure
         first = self._log.recorder.count
-        if outcome is None:
-            outcome = self._end_normally()
-        else:
-            self._end_after_error(outcome)
-        if isinstance(outcome, ControlError):
-            self._record_standstill()
-            outcome.stop = self._log.recorder.rows(first)
+        try:
+            if outcome is None:
+                outcome = self._end_normally()
+            else:
+                self._end_after_error(outcome)
+            if isinstance(outcome, ControlError):
+                self._record_standstill()
+                outcome.stop = self._log.recorder.rows(first)
+        finally:
+            self._driver.on_states, self._log.braking = self._listener, False
         if outcome is not None and outcome is not error:
             raise outcome from error
 
@@ -368,17 +371,14 @@ class ControlLoop:
         states: list[RobotState] = []
 
         def collect(arrived: list[RobotState]) -> None:
-            listener(arrived)
+            self._listener(arrived)
             states.extend(arrived)
 
-        listener, self._driver.on_states = self._driver.on_states, collect
-        try:
-            self._driver.end()
-            deadline = time.monotonic() + STANDSTILL_TIMEOUT
-            while self._is_running(states) and time.monotonic() < deadline:
-                collect(self._driver.poll(min(self._state_timeout, STANDSTILL_TIMEOUT)))
-        finally:
-            self._driver.on_states, self._log.braking = listener, False
+        self._driver.on_states = collect
+        self._driver.end()
+        deadline = time.monotonic() + STANDSTILL_TIMEOUT
+        while self._is_running(states) and time.monotonic() < deadline:
+            collect(self._driver.poll(min(self._state_timeout, STANDSTILL_TIMEOUT)))
         faulty = next((state for state in states if state.faults), None)
         return None if faulty is None else self._fault_error(faulty)
 
@@ -387,15 +387,19 @@ class ControlLoop:
         return not states or (not any(state.faults for state in states) and self._driver.has_begun(states[-1]))
 
     def _end_after_error(self, error: BaseException) -> None:
-        listener = self._driver.on_states
-        if isinstance(error, ControlError) and not self._driver.has_listener:
-            self._driver.on_states = self._record  # Record the controller's own stop.
+        if isinstance(error, ControlError):
+            self._driver.on_states = self._record_stop
         try:
             self._driver.end(STOP_TIMEOUT)
         except (CommandRejectedError, ConnectionLostError, DeadlineError) as refusal:
             error.add_note(f"the end of the motion failed, too: {refusal}")
-        finally:
-            self._driver.on_states, self._log.braking = listener, False
+
+    def _record_stop(self, states: list[RobotState]) -> None:
+        """Records the controller's own stop while a request is answered."""
+        if states:
+            self._record(states)
+        else:
+            self._listener(states)
 
     def _record_standstill(self) -> None:
         """Records the controller's own stop until standstill, so that the next motion starts there."""
@@ -433,6 +437,9 @@ class ControlLoop:
     def _fault_error(self, state: RobotState) -> ControlError:
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._driver.received_ns, t)
+        if self._command is not None:
+            self._record([later for later in self._pending if later.message_id > state.message_id])
+            self._driver.on_states = self._record_stop
         pressed = self._driver.find_safety_stop(state)
         lacks_commands = self._driver.is_lack_of_commands(state.faults)
         if pressed is None and lacks_commands and len(state.faults) == 1 and not self._has_power():

@@ -178,11 +178,6 @@ class Driver(Protocol):
         """Upper bound of its age, [s]."""
         ...
 
-    @property
-    def has_listener(self) -> bool:
-        """Whether `on_states` is set."""
-        ...
-
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> MakerCommands:
         """Returns the maker's own commands for a session."""
         ...

@@ -83,6 +83,7 @@ def test_an_emergency_stop_ends_guiding_and_the_phase_follows(supervisor, world)
 def test_an_emergency_stop_in_mid_motion_is_what_status_and_error_name(supervisor, world):
     q = supervisor.status().q_c
     motion = plan_joint(MODEL, q, q + 0.3, speed=0.2)
+    supervisor.drain()
     ticket = supervisor.execute(motion, check(motion, MODEL).certificate)
     wait_for(lambda: supervisor.status().phase == "moving" and np.abs(supervisor.status().q_c - q).max() > 0.01)
     world.press("estop")
@@ -90,6 +91,9 @@ def test_an_emergency_stop_in_mid_motion_is_what_status_and_error_name(superviso
         ticket.wait(SOON)
     assert (caught.value.code, caught.value.facts["status"]) == ("safety_stop", "estop")
     assert supervisor.status().code == "fault.pressed"
+    rows = supervisor.drain()
+    rows = rows[np.isfinite(rows["t"])]
+    assert (np.diff(rows["message_id"].astype(int)) == 1).all(), "a cycle of the controller's stop has no record"
     with pytest.raises(CommandRejectedError, match="an emergency stop is pressed: release it first"):
         supervisor.power_on().wait(SOON)
     world.press("none")

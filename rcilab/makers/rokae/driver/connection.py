@@ -78,11 +78,6 @@ class RciConnection:
                 return states
         return []
 
-    @property
-    def has_listener(self) -> bool:
-        """Whether `on_states` is set."""
-        return self.on_states is not _ignore
-
     def send(self, packet: CommandPacket) -> None:
         """Sends one command."""
         self._transport.send_command(encode_command(packet))

@@ -119,11 +119,6 @@ class RciDriver:
     def on_states(self, listener: Callable[[list[RobotState]], None]) -> None:
         self.connection.on_states = listener
 
-    @property
-    def has_listener(self) -> bool:
-        """Whether `on_states` is set."""
-        return self.connection.has_listener
-
     def open_commands(self, arm: ConfiguredArm, lock: RequestLock) -> RciSessionCommands:
         """Returns the commands of the RCI for a session."""
         return RciSessionCommands(self.connection, self._description, arm, lock)
