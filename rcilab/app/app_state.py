@@ -33,8 +33,8 @@ class Toast:
     text: Message
     page: int | None = None
     """Client id of the only page that shows it; None: all pages."""
-    trouble: str = ""
-    """Name of the trouble that it reports; the notice is withdrawn when the trouble ends."""
+    cause: str = ""
+    """Key of the cause of a notice; notices with it are withdrawn together."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -21,7 +21,7 @@ def explain_missing_feature(model: RobotModel, feature: Feature) -> Message | No
     if missing is None:
         return None
     sentence = describe_error(missing)
-    assert isinstance(sentence, Message)  # Every lack has a code.
+    assert isinstance(sentence, Message)  # Every missing feature has an error code.
     return sentence
 
 

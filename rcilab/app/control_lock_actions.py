@@ -131,7 +131,7 @@ class ControlLockActions:
             self._find_holder(now)
 
     def _announce(self, holder: int) -> None:
-        """Says on every page which one has the controls now."""
+        """Notifies every page which page has the controls."""
         lock = self._store.state.control_lock
         for page in lock.pages:
             sentence = message("notice.yours") if page == holder else message("notice.taken", page=lock.number(holder))

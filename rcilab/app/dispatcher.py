@@ -196,7 +196,8 @@ class Dispatcher:
         if self._store.state.control_lock.holder != self._refused_for:
             self._store.clear_notices("control_lock")
         event = self.run.watch()
-        if event == "arm_known" and self._store.state.plan is None:  # A plan may be quicker than this status.
+        # The plan may already exist when the status arrives.
+        if event == "arm_known" and self._store.state.plan is None:
             self._goal.plan()
         elif event == "standstill":
             self._goal.catch_up()
@@ -242,7 +243,7 @@ class Dispatcher:
         self._refused_for = lock.holder
         code = "control_lock.free" if lock.holder is None else "notice.watching"
         sentence = message(code, page=lock.number(lock.holder))
-        self._store.notify("warn", sentence, page=request.page, trouble="control_lock")
+        self._store.notify("warn", sentence, page=request.page, cause="control_lock")
 
     def _drive(self, request: RobotCommand) -> None:
         if request.what == "pause":
@@ -272,23 +273,23 @@ class Dispatcher:
             now = time.monotonic()
             if now - last >= _TICK:
                 elapsed, last = now - last, now
-                self._guard(lambda elapsed=elapsed: self.tick(elapsed), trouble="tick")
+                self._guard(lambda elapsed=elapsed: self.tick(elapsed), cause="tick")
                 self._store.changed.set()
 
-    def _guard(self, action: Callable[[], None], trouble: str = "") -> None:
-        """Shows the error of an action; with a `trouble`, once until the action succeeds again."""
+    def _guard(self, action: Callable[[], None], cause: str = "") -> None:
+        """Shows the error of an action; with a `cause`, once until the action succeeds again."""
         try:
             with memory_needed():
                 action()
         except RcilabError as error:
-            if not trouble or all(notice.trouble != trouble for notice in self._store.state.notices):
-                self._store.notify("bad", explain_error(error), trouble=trouble)
+            if not cause or all(notice.cause != cause for notice in self._store.state.notices):
+                self._store.notify("bad", explain_error(error), cause=cause)
         except Exception as error:  # A bug of ours must neither end the thread nor stay unnoticed.
             if self.errors.report(error):
                 self._store.notify("bad", message("notice.bug", error=f"{type(error).__name__}: {error}"))
         else:
-            if trouble:
-                self._store.clear_notices(trouble)
+            if cause:
+                self._store.clear_notices(cause)
 
 
 def _is_stop(request: Request) -> bool:

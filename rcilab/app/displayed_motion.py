@@ -23,11 +23,12 @@ class DisplayedMotion:
     """A motion drawn instead of the plan. It cannot be executed."""
 
     plan: Plan
-    """The commanded motion; of a fault with the violating command and the controller's stop."""
+    """Drawn in timeline and curves: what was commanded; of a fault with the violating command and the stop after it."""
     scene: Plan
-    """The motion of the drawn arm."""
+    """Drawn in the scene: of a run the same as `plan`; of a fault where the arm moved, measured unless
+    a position command was wrong."""
     run: Run
-    """The recorded motion of the arm."""
+    """The recorded cycles, measured and commanded, for the curves of measured values."""
     moment: float | None = None
     """Time of the fault report on the clock of `plan`, [s]; None without a fault."""
 

@@ -35,7 +35,7 @@ class RobotConnection:
         self._worker: threading.Thread | None = None
         self.name = ""
         """The target: "virtual", or an address."""
-        self._is_disconnected = False  # No connection is wanted.
+        self._wants_connection = True
 
     def open(
         self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
@@ -55,7 +55,7 @@ class RobotConnection:
             self._generation += 1
             generation, previous = self._generation, self._worker
             self._ready = self._shown = None
-            self._is_disconnected, self.name = False, target
+            self._wants_connection, self.name = True, target
             self._work(self._replace, generation, previous, model, target, plant, setup)
 
     def disconnect(self) -> None:
@@ -64,7 +64,7 @@ class RobotConnection:
             self._generation += 1
             previous = self._worker
             self._ready = self._shown = None
-            self._is_disconnected = True
+            self._wants_connection = False
             self._work(self._close_current, previous)
 
     def close(self) -> None:
@@ -84,8 +84,8 @@ class RobotConnection:
         shown = self._shown
         if shown is not None:
             return shown.status()
-        if self._worker is None or self._is_disconnected:
-            return SupervisorStatus()  # No connection is wanted.
+        if self._worker is None or not self._wants_connection:
+            return SupervisorStatus()
         return SupervisorStatus(phase="starting", code="starting", target=self.name)
 
     @property
@@ -137,7 +137,7 @@ class RobotConnection:
             with memory_needed():
                 worker.start()
         except UsageError:
-            self._is_disconnected = True  # Nothing is being started.
+            self._wants_connection = False
             raise
         self._worker = worker
 

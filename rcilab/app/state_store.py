@@ -11,8 +11,8 @@ from rcilab.app.app_state import AppState, Toast
 from rcilab.app.goal.goal import Goal, Tone
 from rcilab.i18n.translator import Message
 
-ROBOT_TROUBLE = "robot"
-"""Name of the troubles while the robot cannot move, for `StateStore.clear_notices`."""
+ROBOT_NOT_READY = "robot"
+"""Cause of the notices that the robot cannot move."""
 
 UNDO_DEPTH = 100
 _NOTICES = 4  # For each page, and for all pages together: more would cover the scene.
@@ -42,18 +42,18 @@ class StateStore(Generic[S]):
             self._state = replace(self._state, **changes)
             return self._state
 
-    def notify(self, tone: Tone, text: Message, *, page: int | None = None, trouble: str = "") -> None:
+    def notify(self, tone: Tone, text: Message, *, page: int | None = None, cause: str = "") -> None:
         """Shows a notice, on one page or on every page.
 
         Args:
             tone: Its style.
             text: Its message.
             page: Client id of the only page that shows it; None: all pages.
-            trouble: Name of the trouble that it reports, for `clear_notices`.
+            cause: Key of the cause; `clear_notices` withdraws all notices with it.
         """
         with self._lock:
             self._notices += 1
-            new = Toast(self._notices, tone, text, page, trouble)
+            new = Toast(self._notices, tone, text, page, cause)
             same = [notice for notice in self._state.notices if notice.page == page]
             gone = same[: -(_NOTICES - 1)]
             kept = (notice for notice in self._state.notices if notice not in gone)
@@ -64,12 +64,12 @@ class StateStore(Generic[S]):
         with self._lock:
             self._state = replace(self._state, notices=tuple(n for n in self._state.notices if n.page != page))
 
-    def clear_notices(self, trouble: str) -> None:
-        """Withdraws the notices of a trouble that is over."""
+    def clear_notices(self, cause: str) -> None:
+        """Withdraws the notices of a cause that is over."""
         with self._lock:
             notices = self._state.notices
-            if any(notice.trouble == trouble for notice in notices):
-                self._state = replace(self._state, notices=tuple(n for n in notices if n.trouble != trouble))
+            if any(notice.cause == cause for notice in notices):
+                self._state = replace(self._state, notices=tuple(n for n in notices if n.cause != cause))
 
     def set_problem(self, field: str, problem: Message) -> None:
         """Shows a problem of a typed value next to its field."""

@@ -11,7 +11,7 @@ from rcilab.core.condition import Condition, Signal
 from rcilab.motion.joint import JOINT_LAWS
 from rcilab.motion.motion import Motion
 
-_STANDSTILL = 1e-6  # [rad/s] The curve through samples of a motion that starts at standstill is slower.
+_STANDSTILL = 1e-6  # [rad/s] A motion whose fitted curve starts more slowly starts at standstill.
 
 
 def share(ratio: float) -> str:

@@ -49,7 +49,7 @@ def plan_start_with_override(motion: Motion, speed_override: float, model: Robot
             f"({violations[0].condition.id} at "
             f"t = {violations[0].time:.3f} s) that it satisfies as planned; use another speed override"
         ).coded(
-            "pace_breaks",
+            "override_violates",
             speed_override=f"{100 * speed_override:.0f}",
             id=violations[0].condition.id,
             time=f"{violations[0].time:.3f}",
@@ -83,7 +83,7 @@ def plan_speed_override(
         f"at t = {scaled.plan_time_at(cycle):.2f} s of {scaled.motion.duration:.2f} s of the plan no change to "
         f"{100 * speed_override:.0f} % of its speed is possible within the limits; the motion continues "
         "unchanged, and stop() always works"
-    ).coded("no_way_to_pace", speed_override=f"{100 * speed_override:.0f}")
+    ).coded("override_impossible", speed_override=f"{100 * speed_override:.0f}")
 
 
 def _violations(candidate: SpeedScaledMotion, model: RobotModel, mode: Mode) -> list[Violation]:

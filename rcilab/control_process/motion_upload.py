@@ -175,7 +175,9 @@ class SharedRows:
         with suppress(RcilabError):
             pending.wait(_REPLY_TIMEOUT)
         if not pending.done:
-            raise UsageError("the last change of the speed override is still being sent; try again").coded("pace_again")
+            raise UsageError("the last change of the speed override is still being sent; try again").coded(
+                "override_busy"
+            )
         self._last = None
         if pending.error is None:
             return False
@@ -187,7 +189,7 @@ def _too_long_error(motion: SpeedScaledMotion) -> PlanningError:
     return PlanningError(
         f"at this speed override the motion would take {motion.duration:.0f} s, and at most {MOTION_TIME:g} s, less "
         "the part in progress, can be sent; choose a higher one"
-    ).coded("pace_long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:g}")
+    ).coded("override_too_long", duration=f"{motion.duration:.0f}", most=f"{MOTION_TIME:g}")
 
 
 def _find_room(used: list[_Region], count: int) -> int | None:

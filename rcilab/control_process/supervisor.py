@@ -354,7 +354,7 @@ class Supervisor(Closeable):
     def _require_cycle(self) -> int:
         cycle = self._motion_cycle()
         if cycle is None:
-            raise UsageError("no motion is running whose speed override could change").coded("no_pace")
+            raise UsageError("no motion is running whose speed override could change").coded("override_idle")
         return cycle
 
     def jog(

@@ -228,7 +228,7 @@ class ControlProcess:
                 self._record(driver.poll(_POLL_PERIOD))
                 self._motions.jog(driver, self._model)
             case SwitchRows():
-                raise UsageError("no motion is running whose speed override could change").coded("no_pace")
+                raise UsageError("no motion is running whose speed override could change").coded("override_idle")
             case End():
                 self._is_ending = True
 

@@ -150,7 +150,7 @@ def require_radians(q: Array, name: str) -> Array:
         name: Their name in an error.
 
     Raises:
-        InvalidValueError: One is; the values are probably degrees.
+        InvalidValueError: An angle exceeds two turns; the values are probably degrees.
     """
     turned = np.abs(q)
     if float(turned.max()) <= MAX_ANGLE:

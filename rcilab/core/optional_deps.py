@@ -32,7 +32,7 @@ def require_installed(library: str, purpose: str) -> None:
     """Checks that a library of the extra `lab` is installed, without importing it.
 
     Raises:
-        MissingExtraError: It is not.
+        MissingExtraError: The library is not installed.
     """
     if find_spec(library) is None:
         raise MissingExtraError(library, purpose, "lab")

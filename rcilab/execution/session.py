@@ -475,7 +475,9 @@ class RobotSession(Closeable):
 
     def _change_speed_override(self, speed_override: float) -> None:
         if (streamed := self._streamed) is None:
-            raise UsageError("no motion of execute() is in progress whose speed override could change").coded("no_pace")
+            raise UsageError("no motion of execute() is in progress whose speed override could change").coded(
+                "override_idle"
+            )
         streamed[1].change(speed_override)
 
     def control(

@@ -98,7 +98,7 @@ class SpeedOverride(Generic[_Result]):
                     self.motion = self._previous
                 cycle = self._rows.cycle()
                 if self.motion is None or self._model is None:
-                    raise UsageError("no motion is running whose speed override could change").coded("no_pace")
+                    raise UsageError("no motion is running whose speed override could change").coded("override_idle")
                 changed = plan_speed_override(self.motion, cycle + lead, factor, self._model, self.mode)
                 # Rows of an earlier change that has not begun are replaced, too.
                 first = min(self._rows.cycle() + HANDOVER, changed.changed)

@@ -151,8 +151,8 @@ def _stop_on_interrupts(shell: Any, act: Callable[[], None]) -> None:
     """Makes every interrupt of the kernel stop all motions, whatever its main thread does at that moment.
 
     ipykernel ignores an interrupt while it is idle, drops one that comes while it handles a widget's message, and does
-    not wake its event loop for one that is to cancel a cell which awaits. The interpreter reports each to a thread
-    (`signal.set_wakeup_fd`), also while the main thread is inside a library.
+    not wake its event loop for an interrupt that should cancel an awaiting cell. Therefore Python reports every
+    interrupt to a thread (`signal.set_wakeup_fd`), also while the main thread is inside a library.
     """
     kernel = getattr(shell, "kernel", None)
     if kernel is None or not hasattr(kernel, "io_loop"):

@@ -66,7 +66,7 @@ class JogPanel(Part):
         rows: list[Any] = []
         for slider, field in zip(self.sliders, self.fields, strict=True):
             slider.observe(self._on_slider, names="value")
-            rows += [_row(slider, field), field.sentence]
+            rows += [_row(slider, field), field.message_box]
         buttons = [self._button(name) for name in _BUTTONS]
         self._pose, self._reach = block(), block()
         self.build([*rows, shared_style_widget(ipywidgets.HBox, buttons), self._pose, self._reach], min_width="360px")

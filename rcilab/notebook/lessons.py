@@ -97,7 +97,7 @@ def _choose_name(folder: Path, name: str, text: str, recorded: dict[str, str]) -
             return None
         if found == recorded.get(candidate):
             return candidate
-    raise AssertionError("unreachable: the names are endless")
+    raise AssertionError("unreachable: there is always an unused name")
 
 
 def _read_copy(file: Path) -> str:

@@ -59,7 +59,7 @@ class LimitFields:
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
         self._inside: Any = shared_style_widget(ipywidgets.VBox, [])
-        self.sentence, self._missing = block(), block()
+        self.message_box, self._missing = block(), block()
         self._answers = shared_style_widget(
             ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
         )
@@ -68,7 +68,7 @@ class LimitFields:
             self._missing,
             self._inside,
             shared_style_widget(ipywidgets.HBox, [self.send, self.whole]),
-            self.sentence,
+            self.message_box,
             self._answers,
             self.auto,
             block(soft(text("softlimits.note"))),
@@ -108,19 +108,19 @@ class LimitFields:
         asked, self._pending = self._pending, None
         if error is None and asked is not None:
             self._state.limit_joints(asked.lower, asked.upper)
-            write(self.sentence, soft(self._text("softlimits.taken")))
+            write(self.message_box, soft(self._text("softlimits.taken")))
 
     def _propose(self, lower: list[float], upper: list[float]) -> None:
         joints = joint_limits_between(lower, upper)
         if isinstance(joints, Message):
-            write(self.sentence, problem(self._text.render(joints)))
+            write(self.message_box, problem(self._text.render(joints)))
             return
         self._pending = joints
         now = self._state.now
         if now.is_virtual:
             self._send_limits()
             return
-        write(self.sentence, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
+        write(self.message_box, verdict("warn", "▲", self._text("softlimits.ask", address=now.target)))
         self._answers.layout.display = None
 
     def _propose_whole(self) -> None:
@@ -129,7 +129,7 @@ class LimitFields:
 
     def _send_limits(self) -> None:
         self._answers.layout.display = "none"
-        write(self.sentence, "")
+        write(self.message_box, "")
         asked = self._pending
         if asked is not None:
             self._send("limits", lambda robot: robot.configure(RobotConfiguration(joints=asked)))
@@ -138,7 +138,7 @@ class LimitFields:
         if self._answers.layout.display is None:
             self._pending = None
             self._answers.layout.display = "none"
-            write(self.sentence, "")
+            write(self.message_box, "")
 
     def _on_auto(self, change: Any) -> None:
         if not self._writing:
@@ -154,7 +154,7 @@ class LimitFields:
         for joint, (least, largest) in enumerate(zip(np.degrees(own.lower), np.degrees(own.upper), strict=True)):
             low, high = self._field("lower", joint, least, largest), self._field("upper", joint, least, largest)
             self.fields.append((low, high))
-            rows += [shared_style_widget(ipywidgets.HBox, [*low.cells, *high.cells]), low.sentence, high.sentence]
+            rows += [shared_style_widget(ipywidgets.HBox, [*low.cells, *high.cells]), low.message_box, high.message_box]
         self._fill(self._state.model.limits.joint)
         self._inside.children = tuple(rows)
         self.show(self._state.status)

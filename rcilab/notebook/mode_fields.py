@@ -129,7 +129,7 @@ class ModeFields:
                 self._fill(group)
                 inside.children = tuple(
                     shared_style_widget(
-                        ipywidgets.VBox, [shared_style_widget(ipywidgets.HBox, field.cells), field.sentence]
+                        ipywidgets.VBox, [shared_style_widget(ipywidgets.HBox, field.cells), field.message_box]
                     )
                     for field in fields
                 )

@@ -56,7 +56,7 @@ class NumberField:
             continuous_update=False, layout={"width": box}, style={"description_width": before},
         )  # fmt: skip
         self.unit: Any = shared_style_widget(ipywidgets.Label, unit, layout={"width": behind})
-        self.sentence: Any = block()
+        self.message_box: Any = block()
         self.box.observe(self._on_typed, names="value")
 
     @property
@@ -67,12 +67,12 @@ class NumberField:
     @property
     def problem(self) -> bool:
         """Whether the text of the field was refused."""
-        return bool(self.sentence.value)
+        return bool(self.message_box.value)
 
     def show(self, value: float) -> None:
         """Shows a number in place of the text."""
         self._shown = self._write(value)
-        write(self.sentence, "")
+        write(self.message_box, "")
         if self.box.value != self._shown:
             self.box.value = self._shown
 
@@ -87,8 +87,8 @@ class NumberField:
         parsed = parse_number(change["new"], self._low, self._high, self._unit)
         if parsed.value is None:
             assert parsed.problem is not None
-            write(self.sentence, problem(self._text.render(parsed.problem)))
+            write(self.message_box, problem(self._text.render(parsed.problem)))
             return
-        write(self.sentence, "")
+        write(self.message_box, "")
         self._shown = change["new"]  # The field shows the typed text until `show` replaces it by the rounded number.
         self._take(parsed.value)

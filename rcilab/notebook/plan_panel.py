@@ -78,7 +78,7 @@ class PlanPanel(Part):
             shared_style_widget(
                 ipywidgets.HBox, [self.speed, *self._speed_field.cells], layout={"align_items": "center"}
             ),
-            self._speed_field.sentence,
+            self._speed_field.message_box,
             self.law,
             block(soft(text("target.law_hint"))),
             shared_style_widget(

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 HEIGHT = 420  # [px]
 _RATE = 30  # [1/s] Keyframes; the viewer interpolates between them.
 _HOLD = 1.0  # [s] Pause at the goal before the motion starts again.
-_REPETITIONS = 1000  # Practically endless.
+_REPETITIONS = 1000  # More repetitions than anyone watches.
 _MIDDLE = (0.2, 0.0, 0.5)  # [m] Point that the camera turns about.
 _CAMERA_POSITION = (0.7, -1.0, 0.35)  # [m] From that point.
 

@@ -37,16 +37,17 @@ class SpeedFields:
         self.pause = self._button("run.pause", partial(self._ask, modes.pause), icon="pause", style="warning")
         self.resume = self._button("run.resume", partial(self._ask, modes.resume), icon="play", style="info")
         percent, slowest = 100.0 * state.now.drive.speed_override, 100.0 * MIN_SPEED_OVERRIDE
+        name = text("run.speed_override")
         self.slider: Any = shared_style_widget(
-            ipywidgets.FloatSlider, value=percent, description=text("run.pace"), min=slowest, max=100.0, step=_STEP,
-            readout=False, continuous_update=False, tooltip=text("run.pace_hint"), layout={"width": "19em"},
+            ipywidgets.FloatSlider, value=percent, description=name, min=slowest, max=100.0, step=_STEP, readout=False,
+            continuous_update=False, tooltip=text("run.speed_override_hint"), layout={"width": "19em"},
         )  # fmt: skip
-        self.field = NumberField(text, "", "%", slowest, 100.0, self._choose, of=text("run.pace"), value=percent)
+        self.field = NumberField(text, "", "%", slowest, 100.0, self._choose, of=name, value=percent)
         self._progress = block()
         self.buttons = [self.pause, self.resume]
         self.fields: list[Any] = [
             shared_style_widget(ipywidgets.HBox, [self.slider, *self.field.cells], layout={"align_items": "center"}),
-            self.field.sentence,
+            self.field.message_box,
             self._progress,
         ]
         handle_during_cells(*self.buttons, self.slider, self.field.box)

@@ -51,7 +51,11 @@ class TargetPanel(Part):
         pairs = [
             shared_style_widget(
                 ipywidgets.VBox,
-                [shared_style_widget(ipywidgets.HBox, [*first.cells, *second.cells]), first.sentence, second.sentence],
+                [
+                    shared_style_widget(ipywidgets.HBox, [*first.cells, *second.cells]),
+                    first.message_box,
+                    second.message_box,
+                ],
             )
             for first, second in zip(self.fields[:3], self.fields[3:], strict=True)
         ]
@@ -77,7 +81,7 @@ class TargetPanel(Part):
         side = shared_style_widget(ipywidgets.VBox, [
             self.psi,
             shared_style_widget(ipywidgets.HBox, self._psi_field.cells, layout={"align_items": "center"}),
-            self._psi_field.sentence,
+            self._psi_field.message_box,
             block(soft(text("target.psi_hint"))),
         ], layout={"flex": "1 1 170px", "min_width": "170px"})  # fmt: skip
         row = shared_style_widget(

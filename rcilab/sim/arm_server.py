@@ -316,7 +316,7 @@ class ArmServer:
         )
         for _ in range(extra):
             if self.controller.wants_commands:
-                self._advance(is_seen=False)
+                self._advance(is_sent=False)
 
     def _log_refusal(self, line: str) -> None:
         self._log_limiter.write("refused request", line, "requests were refused", _MOST_LINES)
@@ -331,11 +331,11 @@ class ArmServer:
             self._log_limiter.write("slip", line, "motions took longer", _MOST_LINES)
         self._missed_before = self.missed
 
-    def _advance(self, *, is_seen: bool = True) -> None:
+    def _advance(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle."""
         if self.config.realtime and not self.config.lockstep:
             self._cpu_latency_lock.switch(self.controller.is_moving)
-        self._server.step(is_seen=is_seen)
+        self._server.step(is_sent=is_sent)
         self._environment.step()
         faults = self.controller.faults
         if faults is not self._logged_faults and faults != self._logged_faults:

@@ -159,7 +159,7 @@ class Environment:
             button=controller.button,
             q=tuple(controller.arm.signals.measured.q.tolist()),
             lost=controller.arm.playout.lost,
-            lost_in_row=controller.arm.playout.most_in_row,
+            lost_in_row=controller.arm.playout.max_consecutive_lost,
             success_rate=controller.arm.playout.success_rate,
             missed=counters.missed,
             bad_datagrams=counters.bad_datagrams,

@@ -19,7 +19,8 @@
 * If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
   cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
-* A long gap, or ids that start again far behind, mean another numbering: the command is treated as the next one.
+* A long gap, or ids that start again far behind, mean that the client has restarted its numbering: the command is
+  treated as the next one.
 """
 
 from __future__ import annotations
@@ -60,11 +61,11 @@ class JitterBuffer:
 
     Attributes:
         lost: Lost cycles of this motion.
-        lost_in_row: Lost cycles since the last command.
-        most_in_row: Largest number of consecutive lost cycles of this motion.
+        consecutive_lost: Lost cycles since the last command.
+        max_consecutive_lost: Largest number of consecutive lost cycles of this motion.
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
-        copies: Datagrams dropped as duplicates.
+        duplicates: Datagrams dropped as duplicates.
 
     Args:
         prefill: Cycles between the first command's arrival and its play-out.
@@ -75,15 +76,15 @@ class JitterBuffer:
         self._queue: deque[ArmCommand] = deque()
         self.begin()
 
-    def begin(self, *, most: int | None = None) -> None:
+    def begin(self, *, max_queued: int | None = None) -> None:
         """Resets everything for the first command of a motion.
 
         Args:
-            most: Largest number of queued commands next to the one that is played: it replaces the prefill, and older
-                commands are skipped. None: as many as fit.
+            max_queued: Largest number of queued commands next to the one that is played: it replaces the prefill, and
+                older commands are skipped. None: as many as fit.
         """
         self._queue.clear()
-        self._max_queued = most
+        self._max_queued = max_queued
         self._countdown = self._prefill if self._max_queued is None else self._max_queued
         self._newest: ArmCommand | None = None
         self._is_repeating = False
@@ -97,7 +98,8 @@ class JitterBuffer:
         self._cycles_waited = 0
         self.is_playing = False
         self.is_finished = False
-        self.lost = self.lost_in_row = self.most_in_row = self.late = self.dropped = self.copies = 0
+        self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
+        self.late = self.dropped = self.duplicates = 0
 
     def clear(self) -> None:
         """Clears the queue; the counters are kept."""
@@ -120,7 +122,7 @@ class JitterBuffer:
         """Queues a command from the network."""
         queue, newest = self._queue, self._newest
         if command == newest:
-            self.copies += 1
+            self.duplicates += 1
             self._is_repeating = True
             return
         is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
@@ -129,7 +131,7 @@ class JitterBuffer:
         if self._is_late(command):
             self.late += 1
         elif is_reordered and command in queue:
-            self.copies += 1
+            self.duplicates += 1
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
@@ -224,14 +226,14 @@ class JitterBuffer:
     def _bridge_repeat(self) -> Playback:
         """Bridges a cycle without a new command: the client repeated its last one unchanged."""
         self._surplus += 1
-        self.lost_in_row = 0
+        self.consecutive_lost = 0
         self._count(True)
         return _EMPTY
 
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
         self._queue.remove(command)  # The first one, except for a reordered command.
         self._advance_to(command.number)
-        self.lost_in_row = 0
+        self.consecutive_lost = 0
         self.is_finished = command.finished
         self._count(True)
         return Playback(command, 1, False, skipped)
@@ -253,8 +255,8 @@ class JitterBuffer:
     def _lose(self, playback: Playback) -> Playback:
         self._last_id, self._is_last_lost = self._last_id + 1, True
         self.lost += 1
-        self.lost_in_row += 1
-        self.most_in_row = max(self.most_in_row, self.lost_in_row)
+        self.consecutive_lost += 1
+        self.max_consecutive_lost = max(self.max_consecutive_lost, self.consecutive_lost)
         self._count(False)
         return playback
 

@@ -154,11 +154,11 @@ class MakerServer(Protocol):
         """Handles a datagram of the client; returns whether it is well formed."""
         ...
 
-    def step(self, *, is_seen: bool = True) -> None:
+    def step(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle.
 
         Args:
-            is_seen: Whether its state is sent; only such a cycle gets a number.
+            is_sent: Whether its state is sent; only such a cycle gets a message id.
         """
         ...
 

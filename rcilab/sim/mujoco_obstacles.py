@@ -23,7 +23,7 @@ _WALLS = tuple(f"wall{number}" for number in range(6))
 _BOXES = tuple(f"box{number}" for number in range(MOST_BOXES))
 _NEAR = 0.1  # [m] Largest distance of a box from a link that is measured.
 _GAP = 1e-3  # [m] Remaining gap between a box that was moved and the arm.
-_MAX_ESCAPE = 5.0  # [m] Larger than any arm.
+_MAX_CLEARING = 5.0  # [m] Larger than any arm.
 _DIRECTIONS = {
     "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1),
 }  # fmt: skip
@@ -95,7 +95,7 @@ class Obstacles:
             return
         position = self._model.geom_pos[index].copy()
         distances = {
-            axis: self._escape_distance(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()
+            axis: self._clearing_distance(index, data, np.array(direction)) for axis, direction in _DIRECTIONS.items()
         }
         self._model.geom_pos[index] = position
         axis = min(distances, key=lambda axis: distances[axis])
@@ -118,10 +118,10 @@ class Obstacles:
         nearest = int(np.argmin(distances))
         return -distances[nearest], str(model.body(int(model.geom_bodyid[links[nearest]])).name)
 
-    def _escape_distance(self, box: int, data: Any, direction: Array) -> float:
+    def _clearing_distance(self, box: int, data: Any, direction: Array) -> float:
         """Returns how far a box has to move along a direction to be free of the arm, [m]."""
         position, distance = self._model.geom_pos[box].copy(), 0.0
-        while distance < _MAX_ESCAPE:
+        while distance < _MAX_CLEARING:
             depth, _ = self._deepest(box, data)
             if depth <= 0.0:
                 break

@@ -48,7 +48,7 @@ class StreamedMotion:
     def prepare(self, mode: MotionMode) -> None:
         """Resets everything for a motion in this mode."""
         self.mode = mode
-        self.playout.begin(most=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
+        self.playout.begin(max_queued=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
 
     def begin(self, generator: MotionGenerator) -> None:
         """Plays commands from now on."""
@@ -78,7 +78,7 @@ class StreamedMotion:
         if playback.command is None and not playback.is_lost:
             return None
         output = generator.step(playback)
-        if playback.is_lost and self._lost_limit is not None and playout.lost_in_row >= self._lost_limit:
+        if playback.is_lost and self._lost_limit is not None and playout.consecutive_lost >= self._lost_limit:
             return GeneratorOutput(violations=(ArmViolation(ArmCondition.COMMANDS_ARRIVE, self._describe_loss()),))
         return output
 
@@ -86,5 +86,5 @@ class StreamedMotion:
         if not self.playout.is_playing:
             seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
             return Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
-        lost = self.playout.lost_in_row
+        lost = self.playout.consecutive_lost
         return Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost)

@@ -112,7 +112,7 @@ class Renderer:
         self._marks = ProgramMarks(server)
         self._text = Text(store.state.language, store.state.units)
         self._panels: list[Panel] = []
-        self._tab_numbers: list[int] = []  # Of each panel, that of its tab.
+        self._tab_numbers: list[int] = []  # Index of the tab of each panel.
         self._open: dict[int, int] = {}  # Number of the open tab, by page. Owned by the event loop.
         self._closed_shown = -math.inf  # [s] When the panels of closed tabs were last shown.
         self._tabs: list[PersistentTab] = []  # Those of the main panel, then that of the timeline's window.

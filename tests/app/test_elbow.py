@@ -21,10 +21,10 @@ EN = Text("en")
 
 
 def free_in_words(elbow) -> list[tuple[int, int]]:
-    """The ranges behind "Free:", in whole degrees as they are written; none for any other sentence."""
+    """The ranges behind "Feasible:", in whole degrees as they are written; none for any other sentence."""
     said = re.search(r'aria-label="([^"]*)"', ring_html(elbow, EN))[1]
     numbers = [int(number.replace("−", "-")) for number in re.findall(r"[−-]?\d+(?=°)", said)]
-    ranges = list(zip(numbers[::2], numbers[1::2], strict=True)) if said.startswith("Free: ") else []
+    ranges = list(zip(numbers[::2], numbers[1::2], strict=True)) if said.startswith("Feasible: ") else []
     assert all(low <= high for low, high in ranges)  # A reader takes 122 ... 100 for a mistake.
     return ranges
 
@@ -76,7 +76,7 @@ def test_without_a_free_arm_angle_none_is_called_free():
     for place in (None, box):
         psi, why = nearest_free(model, target, 2.5, box=place)
         goal = goal_toward(model, target, model.home, psi)
-        is_said = "free range" in EN.render(why)
+        is_said = "feasible range" in EN.render(why)
         assert is_said == bool(free_in_words(compute_elbow(model, goal.q, place))) == (place is None)
 
 

@@ -58,7 +58,7 @@ def test_a_refusal_says_what_cannot_be_and_nothing_once_the_motion_is_over() -> 
         told = describe_override_refusal(error, speed_override, status)
         return None if told is None else told.code
 
-    assert code(PlanningError("no"), 0.0, MOVING) == "pace.no_pause"
-    assert code(PlanningError("no"), 0.5, MOVING) == "pace.no_change"
-    assert code(ConnectionLostError("late"), 0.5, HELD) == "pace.late"
+    assert code(PlanningError("no"), 0.0, MOVING) == "speed_override.no_pause"
+    assert code(PlanningError("no"), 0.5, MOVING) == "speed_override.no_change"
+    assert code(ConnectionLostError("late"), 0.5, HELD) == "speed_override.late"
     assert code(ConnectionLostError("late"), 0.5, IDLE) is None

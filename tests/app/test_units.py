@@ -32,7 +32,7 @@ def test_sentences_are_said_in_the_units_of_the_page():
     assert Text("en").render(said) == "42 mm and 12.5°"
     assert Text("en", SI).render(said) == "0.042 m and 0.218 rad"
     assert Text("zh", Units(angle="rad")).render(said) == "42 mm、0.218 rad"
-    assert Text("en", SI)("jog.pace", tool=0.25, joint=math.radians(30.0)) == "0.250 m/s, 0.52 rad/s"
+    assert Text("en", SI)("jog.speed_value", tool=0.25, joint=math.radians(30.0)) == "0.250 m/s, 0.52 rad/s"
     assert Text("en", SI)("setup.pose", place=(0.01, -0.0205, 0.0), turns=(math.radians(90.0), 0.0, -0.0)) == (
         "0.010, -0.0205, 0.000 m, 1.57, 0.00, 0.00 rad"
     )

@@ -172,7 +172,7 @@ def test_a_typed_number_counts_and_a_bad_one_is_answered_below_the_field(fresh: 
         ("nan", "finite"),
     ):
         field.box.value = typed
-        assert sentence in text_of(field.sentence), typed
+        assert sentence in text_of(field.message_box), typed
         assert fresh.jog.q[0] == PRO7.home[0]
     field.box.value = "-0,25"
     assert np.degrees(fresh.jog.q[0]) == pytest.approx(-0.25)

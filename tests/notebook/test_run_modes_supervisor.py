@@ -62,7 +62,7 @@ def test_a_parameter_is_typed_acknowledged_and_the_arm_follows_in_its_mode() -> 
         field = panel.modes.fields["joint_stiffness"][2]  # The folder of the mode is open.
         assert field.box.value == "3000"
         field.box.value = "30000"
-        assert "outside 0" in text_of(field.sentence)
+        assert "outside 0" in text_of(field.message_box)
         field.box.value = "1234 N·m/rad"
         wait_for(lambda: (told := held(panel)) is not None and told["joint_stiffness"][2] == 1234.0, 30.0, "the answer")
         run = run_in(panel, "joint_impedance", 0.5, 0.05)

@@ -182,7 +182,7 @@ def test_a_pace_that_is_none_is_refused_below_its_field() -> None:
     with notebook.RunPanel(PRO7) as panel:
         for typed in ("5", "120", "fast", "nan"):
             panel.speed_override.field.box.value = typed
-            assert "rl-problem" in panel.speed_override.field.sentence.value
+            assert "rl-problem" in panel.speed_override.field.message_box.value
             assert panel.state.now.drive.speed_override == 1.0
 
 
@@ -316,4 +316,4 @@ def test_soft_limits_and_auto_limit_are_set_and_count_in_plan_and_check(is_own: 
         wait_for(lambda: panel.model.limits.joint.upper[0] == PRO7.limits.joint.upper[0], what="the whole range")
         limits.fields[0][0].box.value, limits.fields[0][1].box.value = "20", "10"
         limits.send.click()
-        assert "20.0° to 10.0° is not a range" in limits.sentence.value
+        assert "20.0° to 10.0° is not a range" in limits.message_box.value

@@ -90,7 +90,7 @@ def test_commands_for_cycles_that_were_lost_are_dropped_when_they_come_late() ->
     for k in range(11, 16):
         playout.push(command(k))
     assert take_ids(playout, 2) == [14, 15]
-    assert (playout.late, playout.lost, playout.lost_in_row) == (3, 3, 0)
+    assert (playout.late, playout.lost, playout.consecutive_lost) == (3, 3, 0)
     assert playout.success_rate == 3 / 6
 
 
@@ -194,7 +194,7 @@ def test_a_copy_made_by_the_network_is_dropped(order: tuple[int, ...]) -> None:
     for k in order:
         playout.push(commands[k])
     assert take_ids(playout, 3) == [5, 6, 7]
-    assert (len(playout), playout.copies, playout.lost) == (0, 3, 0)
+    assert (len(playout), playout.duplicates, playout.lost) == (0, 3, 0)
 
 
 def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
@@ -205,7 +205,7 @@ def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
     for _ in range(3):
         playout.push(first)
         assert playout.take(by_whole_gap).command is None
-    assert (playout.lost, playout.lost_in_row, playout.success_rate) == (0, 0, 1.0)
+    assert (playout.lost, playout.consecutive_lost, playout.success_rate) == (0, 0, 1.0)
     playout.push(command(9))  # The states 6 to 8 never came; their cycles were spent on what it said again.
     assert take_ids(playout, 1) == [9]
 
@@ -235,7 +235,7 @@ def test_more_commands_than_cycles_are_worked_off_but_jitter_is_not() -> None:
 
 def test_commands_that_close_a_loop_are_fresh() -> None:
     playout = JitterBuffer(prefill=10)
-    playout.begin(most=2)
+    playout.begin(max_queued=2)
     ids, played = itertools.count(), []
     for k in range(20):
         for _ in range(3 if k < 8 else 1):  # For a while three a cycle.

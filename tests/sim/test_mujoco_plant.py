@@ -237,7 +237,7 @@ def test_what_mujoco_warns_of_is_logged_and_no_file_is_written(tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_box_that_overlaps_the_arm_is_refused_with_the_depth_and_the_escape_distance() -> None:
+def test_a_box_that_overlaps_the_arm_is_refused_with_the_depth_and_the_clearing_distance() -> None:
     plant = MuJoCoPlant(load_model("xMatePro7"))
     size, inside = [0.1, 1.0, 1.0], [0.6, 0.0, 0.5]
     with pytest.raises(

@@ -218,7 +218,7 @@ def test_the_arm_angle_turns_the_elbow_and_keeps_the_tool(bench, ask):
 
 def is_refused(bench) -> bool:
     """Whether a page is still told that it has not got the controls."""
-    return any(notice.trouble == "control_lock" for notice in bench.store.state.notices)
+    return any(notice.cause == "control_lock" for notice in bench.store.state.notices)
 
 
 def test_a_watching_page_may_look_but_not_touch(bench, ask):

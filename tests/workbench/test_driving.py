@@ -185,7 +185,7 @@ def test_paused_gone_on_with_slower_and_recorded_as_it_was(idle):
 
 def test_the_speed_of_the_slider_counts_from_the_start_and_a_pause_needs_a_motion(idle):
     idle.dispatcher.ask(RobotCommand(what="pause"))
-    wait(lambda: told(idle) == "pace.nothing", "the answer")
+    wait(lambda: told(idle) == "speed_override.nothing", "the answer")
     idle.dispatcher.ask(SetDrive(speed_override=5.0))
     wait(lambda: told(idle) == "parse.range", "the bounds")
     idle.dispatcher.ask(SetDrive(speed_override=0.2))

@@ -105,9 +105,9 @@ def test_a_thread_for_the_world_port_is_started_once_there_is_memory(monkeypatch
             wait(refused.is_set, "a thread to be refused")
             wait(lambda: told(bench) == "notice.error", "to be told")
             assert bench.store.state.notice.text.values["text"].code == "error.starved"
-            assert sum(notice.trouble == "tick" for notice in bench.store.state.notices) == 1
+            assert sum(notice.cause == "tick" for notice in bench.store.state.notices) == 1
             patch.undo()
             wait(lambda: any(thread.name == name for thread in threading.enumerate()), "the thread")
-            wait(lambda: all(notice.trouble != "tick" for notice in bench.store.state.notices), "the notice to go")
+            wait(lambda: all(notice.cause != "tick" for notice in bench.store.state.notices), "the notice to go")
             assert bench.dispatcher.errors == []
     assert "Traceback" not in capfd.readouterr().err

@@ -127,7 +127,7 @@ def test_a_stretched_arm_has_no_free_range_from_0_to_0(bench):
     bench.aim(0.0, 0.2, 0.8)
     bench.scene.tick()
     said = ring_html(bench.state.scene.elbow, Text("en"))
-    assert "Free:" not in said
+    assert "Feasible:" not in said
     assert Text("en")("elbow.stretched") in said
 
 

@@ -28,7 +28,7 @@ class TargetStatus:
     """Result of the inverse kinematics for a target."""
 
     tone: Tone
-    """good: reachable; warn: reachable, near a limit or a singularity; bad: not reachable."""
+    """good: reachable; warn: at, beyond or near a limit, or near a singularity; bad: not reachable."""
     reason: Message
     """The reason."""
     q: JointVector
@@ -91,7 +91,7 @@ def goal_toward(
 
 
 def reevaluated(model: RobotModel, goal: Goal) -> Goal:
-    """Returns a goal with its status within other limits; one that missed its target is sought again."""
+    """Returns a goal with its status within other limits; an unreachable target is solved again."""
     if goal.reach.short is not None:
         return goal_toward(model, goal.target, goal.q, goal.psi)
     return replace(goal, reach=evaluate_joints(model, goal.q))
@@ -102,13 +102,13 @@ class JointLimitMargin:
     """Distance of joint angles to the nearest joint limit."""
 
     angle: float
-    """[rad]."""
+    """Smallest distance to a limit, [rad]; negative outside."""
     joint: int
     """Joint, from 1."""
 
 
 def margin(model: RobotModel, q: JointVector) -> JointLimitMargin:
-    """Returns the smallest distance to a joint limit and the joint it belongs to."""
+    """Returns the smallest distance of joint angles, shape (n,), [rad], to a limit, and its joint."""
     distances = np.minimum(q - model.limits.joint.lower, model.limits.joint.upper - q)
     worst = int(np.argmin(distances))
     return JointLimitMargin(float(distances[worst]), worst + 1)
@@ -130,7 +130,7 @@ def distinguishing_joints(solutions: np.ndarray) -> tuple[int, ...]:
 
 
 def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float | None = None) -> TargetStatus:
-    """Returns the branch nearest to `near` at a target, or at the reachable pose nearest to it.
+    """Returns the status of a target pose in base: the branch nearest to `near` at the reachable pose nearest to it.
 
     Args:
         model: The arm.
@@ -152,7 +152,7 @@ def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float
 
 
 def evaluate_joints(model: RobotModel, q: JointVector) -> TargetStatus:
-    """Returns the message on joint angles that were set joint by joint."""
+    """Returns the status of joint angles, shape (n,), [rad], set directly."""
     try:
         solutions = model.inverse(model.forward(q), near=q)
     except KinematicsError:

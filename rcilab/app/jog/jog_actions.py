@@ -48,7 +48,7 @@ class SetJog(Request):
     agreed: bool = False
     """Whether this is the second confirmation for a foreign robot."""
     step: float | None = None
-    """JogStepResult, [mm, deg]; 0: as long as a button is held."""
+    """Step per press, [mm] or [deg]; 0: moves while the button is held."""
     frame: str | None = None
     speed: float | None = None
     """Share of the fastest jog, 0 to 1."""

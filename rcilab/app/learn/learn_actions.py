@@ -11,7 +11,7 @@ import numpy as np
 from rcilab.app.displayed_motion import display_fault
 from rcilab.app.fault_lab import FaultDemo, FaultTable
 from rcilab.app.fault_lab.private_arm import PrivateArm
-from rcilab.app.learn.learn_state import LearnState, LessonState, Show
+from rcilab.app.learn.learn_state import FaultDisplay, LearnState, LessonState
 from rcilab.app.learn.lessons import LESSONS, Watcher, lessons_of
 from rcilab.app.request import Handlers, Request
 from rcilab.app.robot_connection import RobotConnection
@@ -158,10 +158,10 @@ class LearnActions:
             self._store.notify("good", message("lesson.ticked", next=last))
 
 
-def build_display(demo: FaultDemo, plan_motion: object) -> Show:
+def build_display(demo: FaultDemo, plan_motion: object) -> FaultDisplay:
     """Returns a fault as the page shows it."""
     rows = demo.whole
-    return Show(
+    return FaultDisplay(
         demo=demo,
         displayed=display_fault(demo),
         recording=Recording(

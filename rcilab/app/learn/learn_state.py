@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Show:
+class FaultDisplay:
     """A displayed fault, for timeline and scene."""
 
     demo: FaultDemo
@@ -51,7 +51,7 @@ class LearnState:
     provoking: FaultCode | None = None
     progress: float = 0.0
     """Progress of the provocation, 0 to 1."""
-    show: Show | None = None
+    show: FaultDisplay | None = None
     is_script_shown: bool = False
     problem: Message | None = None
     """Why the last provocation failed."""

@@ -59,7 +59,8 @@ class ProgramActions:
     def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
         self._store, self._connection = store, connection
         self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
-        self._basis: tuple[RobotModel, SafetyBox | None] | None = None  # What the failure that is shown is about.
+        # Model and safety box with which planning failed.
+        self._basis: tuple[RobotModel, SafetyBox | None] | None = None
         self._history = ProgramHistory(store, self._drop_planning)
         self.editing = EditActions(store, connection, goal, self._history)
 
@@ -174,7 +175,7 @@ class ProgramActions:
         self._planner.cancel()
 
     def _find_rejected(self) -> Message | None:
-        """Returns which typed number the program does not have, and why; None if it has all."""
+        """Returns the first rejected number, and why it was rejected; None if all were accepted."""
         for field, why in self._store.state.problems.items():
             _, key, name = (*field.split("."), "", "")[:3]
             number = self._history.draft.index(int(key)) if key.isdecimal() else None
@@ -231,7 +232,7 @@ class ProgramActions:
             answer.append(message("program.worst", where=where))
             tone = "bad"
         self._history.set(
-            planned=job.draft, failed=failed, tone=tone, answer=_together(answer), notes=notes_of(result, steps)
+            planned=job.draft, failed=failed, tone=tone, answer=_join(answer), notes=notes_of(result, steps)
         )
 
 
@@ -243,10 +244,10 @@ def _describe_approach(job: Job, plan: Plan) -> Message:
     return message("program.approach", joint=joint + 1, angle=float(travel[joint]), duration=f"{duration:.2f}")
 
 
-def _together(sentence: list[Message]) -> Message | None:
+def _join(messages: list[Message]) -> Message | None:
     """Returns the messages about a plan as one message."""
     return (
-        reduce(lambda first, second: message("program.both", first=first, second=second), sentence)
-        if sentence
+        reduce(lambda first, second: message("program.both", first=first, second=second), messages)
+        if messages
         else None
     )

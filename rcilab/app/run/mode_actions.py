@@ -40,7 +40,7 @@ class SetDrive(Request):
 
     @property
     def replaces(self) -> str | None:  # noqa: D102
-        return None if self.speed_override is None else f"pace.{self.page}"
+        return None if self.speed_override is None else f"speed_override.{self.page}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,7 +193,7 @@ class ModeActions:
     def _require_motion(self) -> bool:
         if is_running(self._connection.status()):
             return True
-        self._store.notify("warn", message("pace.nothing"))
+        self._store.notify("warn", message("speed_override.nothing"))
         return False
 
     def _change_speed_override(self, status: SupervisorStatus) -> None:

@@ -72,5 +72,5 @@ def describe_override_refusal(
         status: Status of the robot.
     """
     if isinstance(error, PlanningError):
-        return message("pace.no_pause" if speed_override == 0.0 else "pace.no_change")
-    return message("pace.late") if is_running(status) else None
+        return message("speed_override.no_pause" if speed_override == 0.0 else "speed_override.no_change")
+    return message("speed_override.late") if is_running(status) else None

@@ -18,7 +18,7 @@ from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle, pulled_cable
 from rcilab.app.run.robot_requests import Outcome, RobotRequests
 from rcilab.app.setup.configuration_state import SetupState, drawn_parts, name_parts, setup_obstacle
-from rcilab.app.state_store import ROBOT_TROUBLE
+from rcilab.app.state_store import ROBOT_NOT_READY
 from rcilab.app.status_text import StartingError, describe_incident, explain_error
 from rcilab.app.store import Store, UiState
 from rcilab.core.clock import CYCLE_TIME
@@ -78,7 +78,7 @@ class RunActions:
         self._untouched: Goal | None = store.state.goal  # The goal, until the operator changes it.
         self._setups: dict[str, SetupState] = {}  # Configurations of the arms chosen before, by name.
         self._incident = 0
-        self._trouble = ""  # Code of the incident that has not ended yet.
+        self._open_incident = ""  # Code of the incident that has not ended yet.
         self._phase = ""
         self._reached: float | None = None  # [s] Time of the plan that the moving arm has reached.
         self._guided = False
@@ -203,7 +203,7 @@ class RunActions:
 
     def _forget_robot(self) -> None:
         self.requests.forget()
-        self._incident, self._phase, self._trouble = 0, "", ""
+        self._incident, self._phase, self._open_incident = 0, "", ""
         self._powered, self._power_asked = False, float("-inf")
 
     def remember_setup(self, name: str, setup: RobotConfiguration) -> None:
@@ -229,16 +229,17 @@ class RunActions:
         """
         for outcome in self.requests.collect():
             self._report(outcome)
-        status = self._connection.status()  # After the requests: it contains the end of a motion, too.
+        # Read after the requests are collected, so that it is at least as new as their results.
+        status = self._connection.status()
         if status.incident is not None and status.incident.number > self._incident:
             self._incident = status.incident.number
             if status.incident.code == "crashed.controller":
                 self._powered = False  # The next virtual controller starts without motor power.
-            self._trouble = status.incident.code
+            self._open_incident = status.incident.code
             if status.incident.code != "fault.pressed" or not self._is_stop_said:
                 sentence = describe_incident(status.incident.code, status.incident.message, status)
                 sentence = pulled_cable(self._store.state, status) or sentence
-                self._store.notify("bad", sentence, trouble=ROBOT_TROUBLE)
+                self._store.notify("bad", sentence, cause=ROBOT_NOT_READY)
         if self._guided and status.code == "idle.operator":
             self._store.notify("warn", message("notice.operator"))
         self._guided = is_guided(status) or (self._guided and status.phase == "stopping")
@@ -257,12 +258,12 @@ class RunActions:
         return "standstill" if before in ("moving", "stopping") and not is_moving(status) else None
 
     def _settle(self) -> None:
-        """Withdraws the notices of a trouble that is over; the end of one that cut the connection is reported."""
-        self._store.clear_notices(ROBOT_TROUBLE)
-        if self._trouble.startswith(("crashed", "lost")):
-            code = "lost" if self._trouble.startswith("lost") else self._trouble
+        """Withdraws the notices of an incident that is over; the end of a lost process or connection is reported."""
+        self._store.clear_notices(ROBOT_NOT_READY)
+        if self._open_incident.startswith(("crashed", "lost")):
+            code = "lost" if self._open_incident.startswith("lost") else self._open_incident
             self._store.notify("good", message(f"incident.over.{code}"))
-        self._trouble = ""
+        self._open_incident = ""
 
     def _follow(self, status: SupervisorStatus) -> None:
         """Leaves the preview where the arm has left the plan, however seldom its status was read."""
@@ -314,8 +315,8 @@ class RunActions:
             if outcome.what == "execute" and isinstance(outcome.error, ControlError) and self._reached is None:
                 self._reached = 0.0  # It had begun, but no status showed it.
             self._is_stop_said = outcome.error.code == SAFETY_STOP
-            trouble = ROBOT_TROUBLE if _is_trouble(outcome.error) else ""
-            self._store.notify(*self._report_failure(outcome, outcome.error), trouble=trouble)
+            cause = ROBOT_NOT_READY if _lasts_until_ready(outcome.error) else ""
+            self._store.notify(*self._report_failure(outcome, outcome.error), cause=cause)
         elif outcome.what == "power_on":
             self._powered = True
         elif outcome.what == "reboot":
@@ -331,7 +332,7 @@ class RunActions:
             self._store.notify("good", message("notice.arrived"))
 
     def _report_failure(self, outcome: Outcome, error: RcilabError) -> tuple[Tone, Message]:
-        if _is_trouble(error):
+        if _lasts_until_ready(error):
             status = self._connection.status()
             return "bad", pulled_cable(self._store.state, status) or explain_error(error, status)
         if isinstance(error, ControlError) and outcome.what == "execute":
@@ -343,7 +344,7 @@ class RunActions:
         self.requests.close("the workbench was closed")
 
 
-def _is_trouble(error: RcilabError) -> bool:
+def _lasts_until_ready(error: RcilabError) -> bool:
     """Returns whether an error is a fault or a lost connection: it lasts until the robot is ready again."""
     return isinstance(error, ConnectionLostError) or (isinstance(error, ControlError) and bool(error.faults))
 

@@ -18,7 +18,7 @@ from rcilab.makers.driver import parse_address
 from rcilab.sim.controller_config import PlantKind
 
 _ADDRESS = "address"
-"""Name of the trouble of an invalid address."""
+"""Cause of the notices of an invalid address."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,12 +72,12 @@ class TargetRobotActions:
             self._robot.open(self._store.state.model.name, asked)
             return
         if not address:
-            self._store.notify("warn", message("run.address_needed"), trouble=_ADDRESS)
+            self._store.notify("warn", message("run.address_needed"), cause=_ADDRESS)
             return
         try:
             parse_address(address, self._store.state.model)
         except RcilabError as error:
-            self._store.notify("bad", explain_error(error), trouble=_ADDRESS)
+            self._store.notify("bad", explain_error(error), cause=_ADDRESS)
             return
         self._ask(address)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 
-_SAFETY = "safety"  # Name of the notices of a pressed button.
+_SAFETY = "safety"  # Cause of the notices of a pressed button.
 _WIRING = {"loop_back": LoopBack, "auto_limit": AutoLimit}
 
 
@@ -109,7 +109,7 @@ class WorldActions:
             if request.button == "none" and status is not None and status.button != "none":
                 self._store.notify("good", message(f"safety.{status.button}_over"))
             elif request.button != "none" and not is_moving(self._connection.status()):  # Else the stop is reported.
-                self._store.notify("warn", message(f"safety.{request.button}_done"), trouble=_SAFETY)
+                self._store.notify("warn", message(f"safety.{request.button}_done"), cause=_SAFETY)
 
     def set_wiring(self, request: SetWiring) -> None:
         """Wires outputs to inputs, or stops commands at the soft limits; or ends that."""
@@ -136,15 +136,15 @@ class WorldActions:
         error = self._watch.pop_error()
         if error is not None:
             self._store.notify("bad", explain_error(error))
-        is_settled, world, sentence = self._watch.is_settled, self._store.state.world, self._watch.status
+        is_settled, world, reported = self._watch.is_settled, self._store.state.world, self._watch.status
         if self._is_rewired and is_settled and status.phase in ("idle", "fault"):
             self._is_rewired = False
             with suppress(RcilabError):  # Then they are read with the next output.
                 self._connection.robot().read_inputs()
-        if sentence is not world.status:
-            world = replace(world, status=sentence)
-        if is_settled and sentence is not None and sentence.auto_limit not in (None, world.auto_limit):
-            world = replace(world, auto_limit=sentence.auto_limit)  # Another client or a restart may have changed it.
+        if reported is not world.status:
+            world = replace(world, status=reported)
+        if is_settled and reported is not None and reported.auto_limit not in (None, world.auto_limit):
+            world = replace(world, auto_limit=reported.auto_limit)  # Another client or a restart may have changed it.
         if world is not self._store.state.world:
             self._store.update(world=world)
 

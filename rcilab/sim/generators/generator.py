@@ -18,7 +18,7 @@ from rcilab.sim.reference_trajectory import JOIN_SHARE
 from rcilab.sim.soft_limit_governor import SoftLimitGovernor
 from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
-_REACH = 2  # [cycles] Range of a second difference after a gap.
+_REACH = 2  # Cycles after a gap whose second difference includes the gap.
 
 
 class GeneratorOutput(NamedTuple):

@@ -12,7 +12,7 @@
     document.querySelectorAll(HEAD).forEach((head) => {
       const name = head.textContent.trim(), open = head.querySelector("svg").classList.contains("tabler-icon-chevron-up");
       if (!seen.has(head)) {
-        if (head.getClientRects().length === 0) return;  // Of a tab that is not open: viser would unfold it to no height.
+        if (head.getClientRects().length === 0) return;  // Of a tab that is not open: viser would open it with height 0.
         const wanted = name in folds ? folds[name] : open;
         seen.set(head, wanted);
         if (wanted !== open) head.click();

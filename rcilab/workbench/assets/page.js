@@ -18,7 +18,7 @@
   const PAUSE = 50;  // [ms] A choice: between two looks at tabs and plots, whatever changes meanwhile.
   const TOGETHER = 1000;  // [ms] A choice: notices that come closer than this are shown together, at most three.
   const WARNED = 3500;  // [ms] A warning stays beside later notices for so long: time to read it once.
-  const TONES = ["good", "warn", "bad"];  // From the mildest.
+  const TONES = ["good", "warn", "bad"];  // In order of severity.
   const SHOWN = 7000;  // [ms] A choice: long enough to read a notice twice.
   let live = null, said = {}, bar, chips, stop, home, take, question, toast, me = null, notice = recall("notice"), greeted = false, hideTimer = 0, lines = [];
 
@@ -187,7 +187,7 @@
     const serials = notices.map((said) => said.serial), newest = Math.max(0, ...serials);
     if (notice === null && !greeted) notice = newest;  // What was said before this page came is no news to it.
     if (notice > newest && !greeted) notice = 0;  // A workbench that has begun anew.
-    const left = lines.filter((line) => !line.serial || serials.includes(line.serial));  // Of troubles that are not over.
+    const left = lines.filter((line) => !line.serial || serials.includes(line.serial));  // Notices whose cause persists.
     if (toast.className && left.length < lines.length) {
       lines = left;
       if (lines.length) drawToast(); else hide();

@@ -55,7 +55,7 @@ class JogPanel:
         self._step = BoundControl(step, ask, lambda v, p: SetJog(page=p, step=steps.get(v)))
         speed = gui.add_slider(text("jog.speed"), 1, 100, 1, round(100.0 * jog.speed), hint=text("jog.speed_hint"))
         self._speed = BoundControl(speed, ask, lambda v, p: SetJog(page=p, speed=v / 100.0))
-        self._speed_override, self._note = Html(gui), Html(gui)
+        self._speed_value, self._note = Html(gui), Html(gui)
         self._agree = gui.add_button(text("jog.confirm"), color="red", icon="hand-move", visible=False)
         on_press(self._agree, ask, lambda page: SetJog(page=page, robot=True, agreed=True))
         self._cancel = gui.add_button(text("run.cancel"), color="gray", visible=False)
@@ -94,7 +94,7 @@ class JogPanel:
         self._agree.visible = self._cancel.visible = jog.asked
         self._step.show(self._steps[jog.step])
         self._speed.show(round(100.0 * jog.speed))
-        self._speed_override.show(pace_html(jog.speed, self._text))
+        self._speed_value.show(speed_value_html(jog.speed, self._text))
         factor, digits = self._text.units.from_si("rad")[0], 3 if self._text.units.angle == "deg" else 5
         for joint, angle in enumerate(state.goal.q):
             self._sliders[joint].show(round(float(factor * angle), digits))
@@ -156,10 +156,10 @@ def note_html(state: UiState, text: Text) -> str:
     return f'<p class="rl-note">{esc(text("jog.note"))}</p>'
 
 
-def pace_html(speed: float, text: Text) -> str:
+def speed_value_html(speed: float, text: Text) -> str:
     """Returns the speed."""
-    sentence = text("jog.pace", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
-    return f'<p class="rl-pace">{esc(sentence)}</p>'
+    sentence = text("jog.speed_value", tool=speed * FASTEST_TOOL, joint=speed * FASTEST_JOINT)
+    return f'<p class="rl-jog-speed">{esc(sentence)}</p>'
 
 
 def margin_html(angle: float, low: float, high: float, text: Text) -> str:
@@ -178,7 +178,7 @@ def margin_html(angle: float, low: float, high: float, text: Text) -> str:
 def said_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     """Returns why a jog cannot begin, what ended the last one, or else the message on the goal.
 
-    The goal is not what a rejected number asks for: beside one it has no verdict.
+    While a rejected number is shown, the status of the goal is hidden: it is about other joint angles.
     """
     reason = no_jog(state, status) if state.jog.robot else None
     sentence = reason or state.jog.sentence

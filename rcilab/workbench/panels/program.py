@@ -108,7 +108,7 @@ class ProgramPanel:
         if program.progress is not None:
             self._bar.value = round(100.0 * program.progress, 1)
         sentence = problems_html(state, text, self._typed(program))
-        if sentence:  # A verdict beside it would seem to be about the number that was not taken.
+        if sentence:  # While a rejected number is shown, the verdict is hidden: it is about another program.
             sentence += f'<p class="rl-note">{esc(text("program.rejected"))}</p>'
         elif plan is not None:
             where = describe_place(plan, t)

@@ -53,12 +53,12 @@ class RunPanel:
         text, ask = self._text, self._ask
         self._planned = Html(gui)
         speed_override = gui.add_slider(
-            text("run.pace"),
+            text("run.speed_override"),
             100.0 * MIN_SPEED_OVERRIDE,
             100.0,
             5.0,
             100.0 * state.drive.speed_override,
-            hint=text("run.pace_hint"),
+            hint=text("run.speed_override_hint"),
         )
         self._speed_override = BoundControl(
             speed_override, ask, lambda v, p: SetDrive(page=p, speed_override=float(v) / 100.0)

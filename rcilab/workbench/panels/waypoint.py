@@ -61,7 +61,7 @@ class WaypointPanel:
                 ("aim", "target", "eye"),
             ):  # fmt: skip
                 self._button(gui, what, source, icon)
-        self._source = Html(gui)  # Last: it comes and goes.
+        self._source = Html(gui)  # It is not always visible, so it is last.
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the selected waypoint."""

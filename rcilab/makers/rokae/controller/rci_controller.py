@@ -167,7 +167,7 @@ class RciController:
 
     @property
     def is_settled(self) -> bool:
-        """Whether the arm is at standstill in a phase without its own end: deferred replies are due."""
+        """Whether the arm is at standstill in a phase that does not end by itself: deferred replies are due."""
         return self.arm.is_standstill and self.phase not in (Phase.STOPPING, Phase.RECOVERING)
 
     @property
@@ -286,14 +286,14 @@ class RciController:
             event = Event.SAFETY_RELEASE if kind is rci.SafetyStop.NONE else Event.SAFETY_STOP
             self.on_event(event, Fault.INSTABILITY_DETECTION)
 
-    def step(self, *, is_seen: bool = True) -> RobotState:
+    def step(self, *, is_sent: bool = True) -> RobotState:
         """Advances by one cycle and returns the state at its end.
 
         Args:
-            is_seen: Whether that state is sent. A state that is not sent has no number of its own, so that the
-                client, which uses numbers as cycles, does not miss one.
+            is_sent: Whether that state is sent. A state that is not sent has no message id, because the client
+                counts cycles by message ids.
         """
-        self._message_id += is_seen
+        self._message_id += is_sent
         if not self._is_still:
             self._advance()
         elif self.arm.hold():
@@ -389,7 +389,7 @@ class RciController:
                 self.arm.configure(self.settings)
                 self._reporter.configure(self.model, self.settings)
             case Action.APPLY:
-                pass  # Done earlier, because it may fail.
+                pass  # Already applied by `_apply` before the transition, because a value may be invalid.
 
     def _apply(self, request: rci.Request) -> bool:
         try:

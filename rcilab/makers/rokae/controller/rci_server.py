@@ -103,9 +103,9 @@ class RciServer:
         self.controller.receive(decode_command(datagram, self._n))
         return True
 
-    def step(self, *, is_seen: bool = True) -> None:
+    def step(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle."""
-        self.controller.step(is_seen=is_seen)
+        self.controller.step(is_sent=is_sent)
 
     def send_states(self) -> None:
         """Sends the last state."""

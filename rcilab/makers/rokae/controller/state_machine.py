@@ -91,7 +91,7 @@ class When(Enum):
     NOW = "now"
     SHOWN = "after the next state"
     AT_REST = "at standstill"
-    """And, in RECOVERING and STOPPING, after the end of that phase."""
+    """In RECOVERING and STOPPING also only after the phase has ended."""
 
 
 Trigger: TypeAlias = CommandCode | Event
@@ -239,7 +239,7 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
         rows[E.AT_REST] = Transition(P.IDLE, (A.DISCARD,))
     if phase is P.RECOVERING:
         rows[E.RECOVERED] = Transition(P.IDLE, (A.HIDE_MODES, A.CLEAR_FAULTS))
-    if phase is P.USER_STOPPED:  # If a stop is pressed and released between two states, only its bit shows it.
+    if phase is P.USER_STOPPED:  # Of a stop that is released before the next state, only the error bit shows the stop.
         rows[E.SAFETY_RELEASE] = Transition(P.OFF)
         rows[E.FAULT] = rows[E.JOINT_LIMIT] = Transition(phase, (A.SET_FAULTS,))
     elif phase is not P.OFF:

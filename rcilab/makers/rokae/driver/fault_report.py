@@ -123,7 +123,10 @@ def _describe_followed(faults: tuple[Fault, ...], record: NDArray[np.void], mode
 
 
 def _follow_poses(rows: NDArray[np.void], model: RobotModel) -> Array:
-    """Returns the joint angles of poses that follow each other, [rad], shape (N, n); up to the first without any."""
+    """Returns the joint angles of consecutive poses in base, [rad], shape (N, n).
+
+    Ends before the first pose without a solution.
+    """
     T_tool_flange = model.T_flange_tool.inverse()
     near: list[float] = rows["q_c"][0].tolist()
     psi = model.arm_angle(near) if model.redundancy else 0.0

@@ -123,7 +123,7 @@ def test_a_bad_network_does_not_stop_a_good_motion(make_hand, lost, copied, over
     play_badly(hand, [{"q_c": tuple(row)} for row in rows], lost, copied, overtaken)
     assert np.abs(hand.state.q_c - goal).max() < 1e-6
     assert (hand.cycle.playout.lost > 0) == (lost > 0.0)
-    assert (hand.cycle.playout.copies > 0) == (copied > 0.0)
+    assert (hand.cycle.playout.duplicates > 0) == (copied > 0.0)
 
 
 @pytest.mark.parametrize("plant", ["ideal", "mujoco"])
@@ -152,7 +152,7 @@ def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
     for row in rows[8:]:
         hand.cycle.receive(rci.CommandPacket(hand.state.message_id, tuple(row)))
         if hand.cycle.playout.pop_extra_cycle():
-            hand.cycle.step(is_seen=False)
+            hand.cycle.step(is_sent=False)
             extra += 1
         assert hand.step().faults == ()
     assert extra == 8  # The countdown of the prefill came on top of them.

@@ -117,17 +117,17 @@ def test_whatever_happens_the_datagrams_are_those_of_a_controller_that_computes_
         for cycle in (quick, thorough):
             act(cycle, Random(fate))
         for count in range(rest):
-            is_seen = random.random() < 0.98
+            is_sent = random.random() < 0.98
             for cycle in (quick, thorough):
                 lead(cycle, count, Random(fate + count))
             thorough._is_still = False
             before = quick._is_still
-            state, computed = quick.step(is_seen=is_seen), thorough.step(is_seen=is_seen)
+            state, computed = quick.step(is_sent=is_sent), thorough.step(is_sent=is_sent)
             still += before and quick._is_still
             expected = rci.encode_state(computed)
             said = f"seed {seed}, act {number} {act}, {count} cycles later"
             assert rci.encode_state(state) == expected, said
-            if is_seen:  # Nobody may look for a while: then there is nothing to renumber.
+            if is_sent:  # Nobody may look for a while: then there is nothing to renumber.
                 assert quick.datagram == expected, said
     assert 3000 < still < 0.9 * quick.state.message_id, "the arm should have stood still, and not only that"
 
