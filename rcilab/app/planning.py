@@ -47,7 +47,7 @@ class Plan:
     """Positions of the tool, shape (N, 3), [m]."""
     effort: Array = field(repr=False)
     """Utilisation of the velocity limit by the busiest joint at each of these positions, 0 to 1, shape (N,)."""
-    short: Message | None = None
+    missed_by: Message | None = None
     """How far from the target it ends, as a message; None if it reaches the target."""
     program: Program | None = None
     """The program of the motion; None if it leads to the goal."""

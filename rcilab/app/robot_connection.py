@@ -35,7 +35,7 @@ class RobotConnection:
         self._worker: threading.Thread | None = None
         self.name = ""
         """The target: "virtual", or an address."""
-        self._wants_connection = True
+        self._wants_connection = False
 
     def open(
         self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
@@ -169,7 +169,9 @@ class RobotConnection:
         except RcilabError as error:
             with self._lock:
                 if generation == self._generation:
-                    self._is_disconnected = True  # Else a supervisor whose creation failed would be starting for ever.
+                    self._wants_connection = (
+                        False  # Else a supervisor whose creation failed would be starting for ever.
+                    )
             self._on_failure(error)
             return
         with self._lock:

@@ -147,7 +147,7 @@ class PlanPanel(Part):
                 self._slowed = about, found
                 return
             seen = build_plan_view(self.model, found.motion, found.report, about.box)
-            slower = replace(seen, mode=about.mode, complete=True, short=about.short)
+            slower = replace(seen, mode=about.mode, complete=True, missed_by=about.missed_by)
             self._slowed = slower, found
             self.state.show(slower)
 
@@ -167,10 +167,10 @@ class PlanPanel(Part):
             sentence += " " + text(
                 "check.failed_long", conditions=report.violated_conditions, count=len(report.violations)
             )
-        elif plan.short is not None:
+        elif plan.missed_by is not None:
             tone, word = "warn", "target.not_there"
-            sentence += " " + text("target.leads_short", short=text.render(plan.short))
-        if not state.is_goal_of_plan and plan.short is None:
+            sentence += " " + text("target.leads_short", short=text.render(plan.missed_by))
+        if not state.is_goal_of_plan and plan.missed_by is None:
             sentence += " " + text("plan.moved")
         write(self._sentence, verdict(tone, text(word), sentence) + self._describe_slowing(plan))
 

@@ -122,8 +122,8 @@ class TargetPanel(Part):
                 field.show(float(value))
             tone = goal.reach.tone
             sentence = verdict(tone, text(f"reach.tone.{tone}"), text.render(goal.reach.reason))
-            if goal.reach.short is not None:
-                sentence += soft(text("target.leads_short", short=text.render(goal.reach.short)))
+            if goal.reach.missed_by is not None:
+                sentence += soft(text("target.leads_short", short=text.render(goal.reach.missed_by)))
             write(self._reach, sentence)
             if self.psi is not None:
                 self._show_arm_angle()

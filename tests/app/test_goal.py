@@ -33,8 +33,8 @@ def test_a_target_out_of_reach_says_by_how_much_and_the_arm_stretches_towards_it
     assert reach.tone == "bad"
     assert reach.reason.code == "reach.far"
     assert reach.reason.values["distance"] > 1.0
-    assert reach.short is not None
-    assert reach.short.values["distance"] == reach.reason.values["distance"], "one miss has one number"
+    assert reach.missed_by is not None
+    assert reach.missed_by.values["distance"] == reach.reason.values["distance"], "one miss has one number"
     assert np.linalg.norm(model.forward(reach.q).position - target.position) < 3.0
     assert (reach.q >= model.limits.joint.lower).all()
     assert (reach.q <= model.limits.joint.upper).all()

@@ -134,10 +134,10 @@ def test_a_target_out_of_reach_has_no_ways_and_its_plan_says_how_far_short_it_en
     state = bench.store.state
     assert state.goal.reach.tone == "bad"
     assert state.goal.reach.solutions is None
-    assert state.plan.short.code == "reach.short_mm"
+    assert state.plan.missed_by.code == "reach.short_mm"
     reached = state.model.forward(state.goal.q).position
     short = np.linalg.norm(np.array((2.0, 0.3, 0.6)) - reached)
-    assert state.plan.short.values["distance"] == pytest.approx(short, abs=1e-3)
+    assert state.plan.missed_by.values["distance"] == pytest.approx(short, abs=1e-3)
     for language in ("en", "zh"):
         shown = planned_html(state, bench.session.status(), Text(language))
         assert Text(language)("check.passed") not in shown

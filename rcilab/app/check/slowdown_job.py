@@ -44,7 +44,7 @@ def slow_to_goal(plan: Plan, speed: float, law: JointLaw, progress: ProgressCall
 
     def make(scale: float) -> Plan | None:
         made = make_plan(plan.model, plan.motion.start, plan.motion.goal, scale * speed, law, plan.box)
-        return replace(made, short=plan.short).completed() if isinstance(made, Plan) else None
+        return replace(made, missed_by=plan.missed_by).completed() if isinstance(made, Plan) else None
 
     return _slower(plan, make, SLOWEST / speed, progress)
 
@@ -91,5 +91,5 @@ def _slower(plan: Plan, make: Callable[[float], Plan | None], least: float, prog
     assert found.motion is not None
     assert found.report is not None
     whole = build_plan_view(plan.model, found.motion, found.report, plan.box)
-    whole = replace(whole, short=plan.short, program=plan.program, complete=True)
+    whole = replace(whole, missed_by=plan.missed_by, program=plan.program, complete=True)
     return SlowdownJob(found=found, plan=whole, scale=1.0 / found.factor, is_stretched=True)

@@ -20,7 +20,7 @@ Tone = Literal["good", "warn", "bad"]
 POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
 """Names of the fields of a pose."""
 NEAR_LIMIT = math.radians(5.0)  # [rad] A smaller distance to a limit is reported.
-NEAR_SINGULAR = 0.03  # Smallest singular value of the Jacobian below which the arm counts as singular.
+NEAR_SINGULAR = 0.03  # [m, rad] per rad. With a smaller singular value of the Jacobian the arm counts as singular.
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,7 +35,7 @@ class TargetStatus:
     """The joint angles at the nearest reachable pose, shape (n,), [rad]."""
     solutions: Solutions | None
     """All branches at that pose; None if it cannot be reached."""
-    short: Message | None = None
+    missed_by: Message | None = None
     """Distance of that pose from the target, as a message; None if the target is reached."""
 
 
@@ -92,7 +92,7 @@ def goal_toward(
 
 def reevaluated(model: RobotModel, goal: Goal) -> Goal:
     """Returns a goal with its status within other limits; an unreachable target is solved again."""
-    if goal.reach.short is not None:
+    if goal.reach.missed_by is not None:
         return goal_toward(model, goal.target, goal.q, goal.psi)
     return replace(goal, reach=evaluate_joints(model, goal.q))
 
@@ -146,7 +146,7 @@ def evaluate_pose(model: RobotModel, target: Pose, near: JointVector, psi: float
             reason=why_not(found.refusal, missed),
             q=found.q,
             solutions=None,
-            short=_how_short(missed, turned),
+            missed_by=_how_short(missed, turned),
         )
     return _evaluate_configuration(model, found.q, found.solutions)
 

@@ -361,11 +361,11 @@ class GoalActions:
     def prepare_plan(self, start: JointVector) -> Callable[[], Plan | Message]:
         """Returns a function that plans from joint angles, [rad], to the current goal; any thread may call it."""
         state = self._store.state
-        box, short = state.box, state.goal.reach.short
+        box, missed_by = state.box, state.goal.reach.missed_by
 
         def make() -> Plan | Message:
             made = make_plan(state.model, start, state.goal.q, state.speed, state.law, box, state.path_type, state.via)
-            return replace(made, short=short) if isinstance(made, Plan) else made
+            return replace(made, missed_by=missed_by) if isinstance(made, Plan) else made
 
         return make
 

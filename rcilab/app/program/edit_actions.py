@@ -119,8 +119,8 @@ class EditActions:
         """Returns the joint angles of the arm or of the goal; reports why they are unknown."""
         state, here = self._store.state, self._connection.status().q_c
         if source == "target":
-            if state.goal.reach.short is not None:
-                self._store.notify("warn", message("program.short", short=state.goal.reach.short))
+            if state.goal.reach.missed_by is not None:
+                self._store.notify("warn", message("program.short", short=state.goal.reach.missed_by))
             return state.goal.q
         if here is None:
             self._store.notify("warn", message("plan.no_arm"))

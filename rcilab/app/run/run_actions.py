@@ -307,7 +307,7 @@ class RunActions:
         except (CertificateError, PlanningError, UsageError) as error:
             self._store.notify("warn", explain_error(error))
             return
-        self._arrival = state.plan.short
+        self._arrival = state.plan.missed_by
         self._is_stop_said = False
 
     def _report(self, outcome: Outcome) -> None:

@@ -383,7 +383,7 @@ class SetupActions:
                     reach = replace(evaluate_pose(model, target, state.goal.q, state.goal.psi), q=state.goal.q)
                 changes["goal"] = Goal(q=state.goal.q, target=target, reach=reach, psi=state.goal.psi)
                 if isinstance(state.plan, Plan):
-                    changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), short=None)
+                    changes["plan"] = replace(state.plan, path=tool_path(model, state.plan.motion), missed_by=None)
             elif "joints" in parts:
                 changes["goal"] = reevaluated(model, state.goal)
         changes["setup"] = replace(setup, asked=None, refusal=None, can_undo=bool(self._past))

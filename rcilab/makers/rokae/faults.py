@@ -106,8 +106,8 @@ _SMOOTHNESS = (
 
 _GAINS = (
     "let torques grow gradually and keep them inside the limits of section 4.4; if your own control law oscillates, "
-    "lower its damping first: a joint is unstable with a damping above its inertia, with the other joints free, "
-    "divided by the delay of the loop, and the wrist has little inertia"
+    "lower its damping first: the loop is unstable if a joint's damping exceeds its effective inertia (other joints "
+    "free) divided by the loop delay, and the wrist has little inertia"
 )
 
 _YIELDED = (

@@ -82,8 +82,8 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
     code = code if plan.program is None else "program.planned"
     sentence = text(code, duration=f"{plan.motion.duration:.3f}")
-    if plan.short is not None:
-        sentence += ". " + text("target.leads_short", short=text.render(plan.short))
+    if plan.missed_by is not None:
+        sentence += ". " + text("target.leads_short", short=text.render(plan.missed_by))
         tone, word = (tone, word) if not report.ok else ("warn", "target.not_there")
     if not report.ok:
         worst, more = report.violations[0].condition.id, report.violated_conditions - 1

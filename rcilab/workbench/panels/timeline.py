@@ -107,7 +107,7 @@ class TimelinePanel:
                 kinds = text(f"timeline.replayed{wanted}")
         where = describe_place(state.plan, t)
         kinds = kinds if where is None else text.render(where)
-        if state.plan.short is not None and state.recording is None:
+        if state.plan.missed_by is not None and state.recording is None:
             kinds = text("timeline.short")
         kinds = kinds if state.learn.show is not None or outdated(state) is None else f"▲ {text('check.outdated')}"
         scaled_motion = scaled_motion_of(state)
