@@ -24,7 +24,7 @@ from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.fonts import select_font
 from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.recording.run import Run
-from rcilab.views.plots import QUANTITIES, recorded_curves
+from rcilab.views.plots import QUANTITIES, planned_differences, recorded_curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,26 +137,12 @@ def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel
     return [
         _Panel(
             condition,
-            _backward_differences(motion.q, condition.order),
+            planned_differences(motion.q, condition.order),
             *condition.bounds(limits),
             None if run is None else recorded_curves(run.t, run.q, run.q_c, run.dq, QUANTITIES[condition.order]).values,
         )
         for condition in JOINT_CONDITIONS
     ]
-
-
-def _backward_differences(q: Array, order: int) -> Array:
-    """Returns backward differences at 1 ms of commanded angles, with the cycles in which the controller holds the goal.
-
-    Args:
-        q: Joint angles, one row per cycle, shape (N, n), [rad]; the arm stands still in the first row.
-        order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
-
-    Returns:
-        Shape (N + HOLD_SAMPLES, n).
-    """
-    path = np.concatenate((np.repeat(q[:1], order, axis=0), q, np.repeat(q[-1:], HOLD_SAMPLES, axis=0)))
-    return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
 
 
 def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int], text: Text) -> None:

@@ -122,17 +122,25 @@ def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = N
     """
     if quantity == "q":
         return Curves(t=motion.times, values=motion.q)
-    hold = np.repeat(motion.q[-1:], HOLD_SAMPLES, axis=0)
-    t, path = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES)), np.concatenate((motion.q, hold))
+    t = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES))
     if quantity == "tau":
         assert model is not None
-        return Curves(t=t, values=model.torque(path, _differences(path, 1), _differences(path, 2)).full)
-    return Curves(t=t, values=_differences(path, ORDERS[quantity]))
+        return Curves(t=t, values=model.torque(*(planned_differences(motion.q, order) for order in range(3))).full)
+    return Curves(t=t, values=planned_differences(motion.q, ORDERS[quantity]))
 
 
-def _differences(path: JointPath, order: int) -> JointPath:
-    """Returns the backward differences of rows, one per cycle, that start at standstill."""
-    return np.diff(np.concatenate((np.repeat(path[:1], order, axis=0), path)), n=order, axis=0) / CYCLE_TIME**order
+def planned_differences(q: JointPath, order: int) -> JointPath:
+    """Returns backward differences at 1 ms of commanded angles, with the cycles in which the controller holds the goal.
+
+    Args:
+        q: Joint angles, one row per cycle, shape (N, n), [rad]; the arm stands still in the first row.
+        order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
+
+    Returns:
+        Shape (N + HOLD_SAMPLES, n).
+    """
+    path = np.concatenate((np.repeat(q[:1], order, axis=0), q, np.repeat(q[-1:], HOLD_SAMPLES, axis=0)))
+    return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
 
 
 def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
