@@ -22,8 +22,8 @@ from rcilab.makers.driver import (
 )
 from rcilab.makers.rokae.driver.address import RciAddress, parse_address
 from rcilab.makers.rokae.driver.commands import RciCommands
+from rcilab.makers.rokae.driver.configuration import send_configuration
 from rcilab.makers.rokae.driver.connection import RciConnection, SocketTransport
-from rcilab.makers.rokae.driver.controller_parameters import send_configuration
 from rcilab.makers.rokae.driver.fault_report import describe_faults
 from rcilab.makers.rokae.driver.handshake import await_first_state, require_arm_there, with_tool_of
 from rcilab.makers.rokae.driver.identify import identify_robot

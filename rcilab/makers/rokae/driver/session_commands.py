@@ -12,8 +12,8 @@ from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ConfiguredArm, RequestLock
 from rcilab.makers.rokae.driver.commands import RciCommands
+from rcilab.makers.rokae.driver.configuration import send_configuration
 from rcilab.makers.rokae.driver.connection import RciConnection
-from rcilab.makers.rokae.driver.controller_parameters import send_configuration
 from rcilab.makers.rokae.driver.settings import load_center
 from rcilab.makers.rokae.wire import Request, SetMotorPower
 from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
