@@ -11,10 +11,11 @@
       ProtocolError
         DecodeError              .offset: these bytes are not a valid message
         VersionMismatchError     .found, .expected
-      ConnectionLostError
       CommandRejectedError       .command, .status: the controller refused a command
         ManualRecoveryError      the arm is too far outside its range or its safety box
-      ControlError               .faults, .run: the controller stopped the motion
+      RecordedError              .run: the motion that it ended
+        ConnectionLostError
+        ControlError             .faults, .stop: the controller stopped the motion
       DeadlineError              also a TimeoutError
       UsageError                 also a RuntimeError: wrong call order
         InvalidValueError        also a ValueError: .name, .value
@@ -26,9 +27,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rcilab.core.error_base import InvalidValueError, RcilabError, UsageError, plain_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 __all__ = [
     "CertificateError",
@@ -159,10 +164,10 @@ class RecordedError(RcilabError):
         advice: The end of the message: what to do next, with the calls of Python. A user interface sets its own.
     """
 
-    run: Any = None
+    run: Any = None  # `rcilab.recording` is above this layer.
     advice: str = ""
 
-    def __init__(self, message: str, record: Any = None) -> None:
+    def __init__(self, message: str, record: NDArray[np.void] | None = None) -> None:
         super().__init__(message)
         self.record = record
 
@@ -217,13 +222,13 @@ class ControlError(RecordedError):
     Attributes:
         faults: The faults that were set, in wire order.
         finding: Joint, value and bound that the cycles show, an `i18n.translator.Remark`; "" if not known.
-        stop: The cycles after `record`, in which the controller stopped the arm; None if they were not received.
+        stop: The cycles after `record` in which the controller stopped the arm; None if they were not received.
     """
 
     finding: str = ""
-    stop: Any = None
+    stop: NDArray[np.void] | None = None
 
-    def __init__(self, message: str, faults: Sequence[object] = (), record: Any = None) -> None:
+    def __init__(self, message: str, faults: Sequence[object] = (), record: NDArray[np.void] | None = None) -> None:
         super().__init__(message, record)
         self.faults = tuple(faults)
 

@@ -117,6 +117,7 @@ class FaultLab(Closeable):
             error = RcilabError(f"{self.model.name}: {scenario.fault.manual_name} did not come")
             raise error.coded("no_fault", fault=scenario.fault.manual_name)
         assert fault.record is not None
+        assert fault.stop is not None
         rows = log.recorder.rows()
         rows = np.concatenate((rows, fault.record[fault.record["message_id"] > rows["message_id"][-1]]))
         after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are already arriving.
