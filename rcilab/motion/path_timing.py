@@ -307,7 +307,7 @@ def _quintics(
         before, after = (
             inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_DIFFERENCE_STEP, _DIFFERENCE_STEP)
         )
-        _, first, second = central_state(before, here, after, _DIFFERENCE_STEP)
+        _, first, second = central_state(before, here, after, step=_DIFFERENCE_STEP)
         du, ddu = law.ds[ends, np.newaxis], law.dds[ends, np.newaxis]
         v = first * du
         a = second * du**2 + first * ddu
