@@ -9,7 +9,7 @@ from typing import Any
 import ipywidgets
 
 from rcilab.app.goal.goal_actions import SLOWEST, SetLaw, SetPathType, SetSpeed
-from rcilab.app.planning import Plan, build_plan_view
+from rcilab.app.planning import PathType, Plan, build_plan_view
 from rcilab.conformance.time_scaling import SlowDown
 from rcilab.core.background_job import ProgressCallback
 from rcilab.core.errors import RcilabError
@@ -20,10 +20,10 @@ from rcilab.notebook.long_task import LongTask
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.part import Part
 from rcilab.notebook.slider_echo import SliderEcho
-from rcilab.notebook.state import PATH_TYPES
 from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import shared_style_widget
 
+_PATH_TYPES: tuple[PathType, ...] = ("joint", "line")  # Without "arc": the notebook has no via point.
 _PROGRESS_DELAY = 0.3  # [s] Plans that take less, as most do, show no progress bar.
 
 
@@ -41,7 +41,7 @@ class PlanPanel(Part):
         wide = {"width": "24em"}
         self.path_type = shared_style_widget(
             ipywidgets.Dropdown, description=text("plan.way"),
-            options=[(text(f"way.{path_type}"), path_type) for path_type in PATH_TYPES],
+            options=[(text(f"way.{path_type}"), path_type) for path_type in _PATH_TYPES],
             value=state.now.path_type,
             layout=wide,
         )  # fmt: skip

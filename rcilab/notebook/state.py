@@ -47,8 +47,6 @@ if TYPE_CHECKING:
 Topic = Literal["goal", "plan", "moment", "robot", "run"]
 """goal: joint angles or pose; plan: a motion and its report; moment: the displayed time of the plan; robot: its
 status; run: the result of an execution."""
-PathType = Literal["joint", "line"]
-PATH_TYPES: tuple[PathType, ...] = ("joint", "line")
 _PLANNED = 0.5  # Progress at the end of planning, before the check; as measured.
 
 

@@ -20,7 +20,7 @@ _REPLY = struct.Struct("=4x48x12xII")  # struct inet_diag_msg up to user and ino
 _ANY_STATE = 0xFFFFFFFF
 
 
-def is_ours(connection: socket.socket) -> bool:
+def is_allowed_peer(connection: socket.socket) -> bool:
     """Returns whether the peer of a TCP connection runs as this process's user, as root, or as the caller of sudo.
 
     A closed peer is refused: the kernel reports user 0, root, for a closed socket. If the kernel does not support the

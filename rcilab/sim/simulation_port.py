@@ -16,7 +16,7 @@ from contextlib import suppress
 
 from rcilab.core.errors import DecodeError, UsageError
 from rcilab.sim.api import LineReader, Refused, WorldAnswer, WorldRequest, decode_world_request, encode_world_answer
-from rcilab.sim.peer_user import is_ours
+from rcilab.sim.peer_user import is_allowed_peer
 
 MAX_CLIENTS = 8  # At once. A tuning value: one script and one page need two.
 IDLE_TIMEOUT = 60.0  # [s] A connection that has been idle for longer is closed when another one needs its slot.
@@ -79,7 +79,7 @@ class SimulationPort:
             return
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        if not is_ours(client):  # Before anything else: a user without access takes no slot.
+        if not is_allowed_peer(client):  # Before anything else: a user without access takes no slot.
             _refuse(client, Refused("this simulation port is for the user who started the controller"))
             return
         if len(self._clients) >= MAX_CLIENTS:

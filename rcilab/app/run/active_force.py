@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -14,12 +15,20 @@ from rcilab.i18n.translator import Message, message
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
+    from rcilab.makers.driver import GuideKind, GuideSpace
     from rcilab.model.robot_model import RobotModel
 
 STRONGEST = 60.0  # [N] About what one hand exerts without effort.
 SPRING = 200.0  # [N/m] between the grabbed point and the mouse: a pull of 0.3 m gives the largest force.
 TOOL = 0  # The tool, in the place of a link's number.
-GUIDING_KINDS = ("joint.free", "cartesian.free", "cartesian.translation", "cartesian.rotation")
+GUIDING_KINDS: Mapping[str, tuple[GuideSpace, GuideKind]] = MappingProxyType(
+    {
+        "joint.free": ("joint", "free"),
+        "cartesian.free": ("cartesian", "free"),
+        "cartesian.translation": ("cartesian", "translation"),
+        "cartesian.rotation": ("cartesian", "rotation"),
+    }
+)
 DIRECTIONS = MappingProxyType(
     {
         "+x": (1.0, 0.0, 0.0),
@@ -54,8 +63,8 @@ class PushState:
     newtons: float = 20.0
     grab: bool = True
     """Whether the mouse can grab the arm in the scene."""
-    guiding_kind: str = GUIDING_KINDS[0]
-    """Space and kind of hand guiding, as "space.kind"."""
+    guiding_kind: str = "joint.free"
+    """Key of `GUIDING_KINDS`."""
     acting: ActiveForce | None = None
 
     @property

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 from rcilab.app.goal.goal import Goal, Tone, goal_at
 from rcilab.app.request import Handlers, Moving, Request
 from rcilab.app.robot_connection import RobotConnection
-from rcilab.app.run.active_force import TOOL, is_guided
+from rcilab.app.run.active_force import GUIDING_KINDS, TOOL, is_guided
 from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.readiness import obstacle, pulled_cable
@@ -137,8 +137,7 @@ class RunActions:
             self._store.notify("warn", message("guide.sure", address=state.target, seconds=f"{CONFIRM_TIMEOUT:.0f}"))
             return None
         self._asked_to_guide = -math.inf
-        space, kind = state.push.guiding_kind.split(".")
-        return self._connection.robot().start_guiding(space, kind, stops=stops)  # type: ignore[arg-type]  # One of GUIDING_KINDS.
+        return self._connection.robot().start_guiding(*GUIDING_KINDS[state.push.guiding_kind], stops=stops)
 
     def choose_robot(self, request: ChooseRobot) -> None:
         """Changes arm, destination or plant; refused while the arm moves."""

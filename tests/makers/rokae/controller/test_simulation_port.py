@@ -18,7 +18,7 @@ from rcilab.core.state import RobotMode
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae import wire as rci
 from rcilab.sim.api import LONGEST_LINE, NetworkFaults, Stall
-from rcilab.sim.peer_user import is_ours
+from rcilab.sim.peer_user import is_allowed_peer
 from rcilab.sim.simulation_port import MAX_CLIENTS
 from tests.makers.rokae.controller.test_server import MODEL, MOTION, PATIENCE, Peer, Running, bind_udp, closes, running
 
@@ -236,7 +236,7 @@ def test_an_account_is_not_taken_for_root_because_it_has_hung_up(user: int, stay
         with guest:
             if not stays:
                 assert guest.recv(1) == b"", "it has hung up"
-            assert is_ours(guest) is allowed
+            assert is_allowed_peer(guest) is allowed
         os.write(done[1], b"!")
         os.waitpid(child, 0)
         for end in (*ready, *done):
