@@ -17,7 +17,8 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN, limit_touched
-from rcilab.motion.hermite import central_state, quintic
+from rcilab.motion.cycle_quintics import cycle_quintics, peak_derivatives
+from rcilab.motion.hermite import central_state
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.motion import Motion, stationary_motion
@@ -26,7 +27,7 @@ from rcilab.motion.path import Path
 from rcilab.motion.path_bounds import MIN_SLOPE, POLYGON_FACTOR, PathBounds, half_planes, path_bounds
 from rcilab.motion.path_infeasibility import path_error, solve_path
 from rcilab.motion.piecewise import PiecewisePolynomial
-from rcilab.motion.rows import blocks, spread
+from rcilab.motion.rows import OVERCORRECTION, blocks, spread
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
 
 _KNOTS = 500
@@ -40,11 +41,6 @@ _ROUNDS = 8
 """Largest number of local slowdowns of a time law that exceeds a limit, and then of global ones. Measured: 1 to 5."""
 _MAX_SLOWDOWN = 4.0
 """A larger slowdown is required by a jump, not by the interpolation between the knots. Tuning value."""
-_CHECKED_FRACTIONS = (0.25, 0.5, 0.75)
-"""Instants of a cycle at which the curve is checked besides its start, in cycles."""
-_OVERCORRECTION = 1.002
-"""Factor on the square of the required slowdown, applied also slightly below a limit, so that few rounds are needed: 1
-or 2 on nine of ten paths. Tuning value; motions become 0.06 % longer."""
 _DIFFERENCE_STEP = 1e-4
 """Step of the finite differences, as a share of the path. Tuning value: the errors of both orders are below 1e-7."""
 
@@ -105,10 +101,10 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
         # If local slowdowns only move the excess, slow down the whole path.
         if attempt < _ROUNDS:
             factor = np.ones(len(law.s))
-            factor[: len(excess)] = np.maximum(excess * excess * _OVERCORRECTION, 1.0)
+            factor[: len(excess)] = np.maximum(excess * excess * OVERCORRECTION, 1.0)
             slowdown *= spread(factor, law.s, allowed.knots, cycles + 3)
         else:
-            slowdown *= float(excess.max()) * _OVERCORRECTION
+            slowdown *= float(excess.max()) * OVERCORRECTION
         if slowdown.max() > _MAX_SLOWDOWN:
             break
     reason = "the joints would have to jump, because a singularity is close; move the tool around it"
@@ -278,15 +274,8 @@ def _accumulate(excess: Array, ratio: Array, order: int) -> None:
 def _excess_between(bounds: _Bounds, powers: list[Array]) -> Array:
     """Returns the slowdown that each cycle needs to be inside the joints' bounds, shape (N - 1,)."""
     excess = np.zeros(len(powers[0]))
-    for order, limit in enumerate((bounds.velocity, bounds.acceleration, bounds.jerk), start=1):
-        powers = [float(p) * powers[p] for p in range(1, len(powers))]
-        largest = np.abs(powers[0])
-        for part in _CHECKED_FRACTIONS:
-            value = powers[-1].copy("K")
-            for coefficient in reversed(powers[:-1]):
-                value *= part * CYCLE_TIME
-                value += coefficient
-            np.maximum(largest, np.abs(value), out=largest)
+    limits = bounds.velocity, bounds.acceleration, bounds.jerk
+    for order, (limit, largest) in enumerate(zip(limits, peak_derivatives(powers), strict=True), start=1):
         np.maximum(excess, (largest / limit[: largest.shape[1]]).max(axis=1) ** (1.0 / order), out=excess)
     return excess
 
@@ -299,24 +288,13 @@ def _quintics(
     Yields:
         A block of its N - 1 cycles, and their coefficients by ascending power, each of shape (cycles, n).
     """
-    last = len(rows) - 1
-    h = CYCLE_TIME
-    for block in blocks(last):
+    for block in blocks(len(rows) - 1):
         ends = slice(block.start, block.stop + 1)
         here, u = rows[ends], law.s[ends]
         before, after = (
             inverse_path(model, *path.sample(u + side), here[0])[0] for side in (-_DIFFERENCE_STEP, _DIFFERENCE_STEP)
         )
-        _, first, second = central_state(before, here, after, step=_DIFFERENCE_STEP)
-        du, ddu = law.ds[ends, np.newaxis], law.dds[ends, np.newaxis]
-        v = first * du
-        a = second * du**2 + first * ddu
-        if block.start == 0:
-            v[0] = a[0] = 0.0
-        if block.stop == last:
-            v[-1] = a[-1] = 0.0
-        parts = quintic((here[:-1], v[:-1], a[:-1]), (here[1:], v[1:], a[1:]), h)
-        yield block, [part / h**power for power, part in enumerate(parts)]
+        yield block, cycle_quintics(central_state(before, here, after, step=_DIFFERENCE_STEP), law, ends)
 
 
 def _joined(coefficients: Array) -> PiecewisePolynomial:

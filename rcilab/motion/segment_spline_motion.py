@@ -12,8 +12,8 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.motion.bounds import limit_touched
-from rcilab.motion.hermite import quintic
-from rcilab.motion.rows import blocks, spread
+from rcilab.motion.cycle_quintics import cycle_quintics, peak_derivatives
+from rcilab.motion.rows import OVERCORRECTION, blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
 from rcilab.motion.segment_spline_bounds import ColumnLimits, column_limits, spline_bounds
 from rcilab.motion.time_parametrization import FastestLaw, TimeParametrization, smooth_law
@@ -24,13 +24,8 @@ _USUAL_ROUNDS = 4.0
 """Number of rounds that is reported as half of the progress. Tuning value."""
 _MAX_SLOWDOWN = 50.0
 """A larger slowdown is required by a jump. Tuning value."""
-_CHECKED_FRACTIONS = (0.25, 0.5, 0.75)
-"""Instants of a cycle at which the curve is checked besides its start, in cycles."""
 _MIN_CHANGE = 1e-9
 """A larger relative change of a square of s' is not rounding."""
-_OVERCORRECTION = 1.002
-"""Factor on the square of the required slowdown, applied also slightly below a limit, so that few rounds are needed and
-rows inside the limits stay inside when the cycles shift. Tuning value."""
 
 
 def plan_segment_spline(
@@ -76,10 +71,10 @@ def plan_segment_spline(
             return coefficients, corners
         worst = float(law.s[excess.argmax()])
         if attempt < _ROUNDS:
-            factor = np.maximum(excess * excess * _OVERCORRECTION, 1.0)
+            factor = np.maximum(excess * excess * OVERCORRECTION, 1.0)
             slowdown *= spread(factor, law.s, spline.knots, cycles + 3)
         else:
-            slowdown *= float(excess.max()) * _OVERCORRECTION
+            slowdown *= float(excess.max()) * OVERCORRECTION
         if slowdown.max() > _MAX_SLOWDOWN:
             break
     segment = spline.segment_at(worst)
@@ -130,33 +125,16 @@ def _excess(
 
 def _quintics(spline: SegmentSpline, law: TimeParametrization, rows: slice) -> tuple[Array, list[Array]]:
     """Returns the joint angles at N cycles, shape (N, n), and the coefficients by power, shape (N - 1, n) each."""
-    h = CYCLE_TIME
-    q, first, second = spline.sample(law.s[rows], slice(spline.n))
-    ds, dds = law.ds[rows, np.newaxis], law.dds[rows, np.newaxis]
-    v = first * ds
-    a = second * ds**2 + first * dds
-    if rows.start == 0:
-        v[0] = a[0] = 0.0
-    if rows.stop == len(law.s):
-        v[-1] = a[-1] = 0.0
-    parts = quintic((q[:-1], v[:-1], a[:-1]), (q[1:], v[1:], a[1:]), h)
-    return q, [part / h**power for power, part in enumerate(parts)]
+    path = spline.sample(law.s[rows], slice(spline.n))
+    return path[0], cycle_quintics(path, law, rows)
 
 
 def _joint_excess(spline: SegmentSpline, limits: ColumnLimits, powers: list[Array], interval: Rows) -> Array:
     """Returns the slowdown that each cycle needs to be inside the joints' bounds, shape (N - 1,)."""
-    n = spline.n
     speed = np.maximum(spline.speed[interval[:-1]], spline.speed[interval[1:]])
-    scales = speed, speed, np.ones_like(speed)
+    tables = zip(_tables(limits, slice(spline.n)), (speed, speed, 1.0), peak_derivatives(powers), strict=True)
     excess = np.zeros(len(powers[0]))
-    for order, (limit, scale) in enumerate(zip(_tables(limits, slice(n)), scales, strict=True), start=1):
-        powers = [float(p) * powers[p] for p in range(1, len(powers))]
-        largest = np.abs(powers[0])
-        for part in _CHECKED_FRACTIONS:
-            value = powers[-1]
-            for coefficient in reversed(powers[:-1]):
-                value = value * (part * CYCLE_TIME) + coefficient
-            np.maximum(largest, np.abs(value), out=largest)
+    for order, (limit, scale, largest) in enumerate(tables, start=1):
         ratio = ((largest / limit).max(axis=1) / scale) ** (1.0 / order)
         np.maximum(excess, ratio, out=excess)
     return excess
