@@ -121,6 +121,7 @@ class ControlLoop:
         self._has_moved = False  # A command differs from the first one, or is a torque.
         self._is_executed = False  # The controller's commanded values have changed since the start.
         self._pending: deque[RobotState] = deque()
+        self._stop_row: int | None = None  # Number of the first row after the fault, or after the last command.
         self._interrupts = DeferredInterrupts()
         self._stop_planner = _build_stop_planner(self._kind, limits, model)
 
@@ -338,7 +339,7 @@ class ControlLoop:
                 self._stop_commands()
             except BaseException as failure:
                 outcome = failure
-        first = self._log.recorder.count
+        self._stop_row = self._log.recorder.count if self._stop_row is None else self._stop_row
         try:
             if outcome is None:
                 outcome = self._end_normally()
@@ -346,7 +347,7 @@ class ControlLoop:
                 self._end_after_error(outcome)
             if isinstance(outcome, ControlError):
                 self._record_standstill()
-                outcome.stop = self._log.recorder.rows(first)
+                outcome.stop = self._log.recorder.rows(self._stop_row)
         finally:
             self._driver.on_states, self._log.braking = self._listener, False
         if outcome is not None and outcome is not error:
@@ -437,6 +438,8 @@ class ControlLoop:
     def _fault_error(self, state: RobotState) -> ControlError:
         t = self._time(state) if self._command is not None else math.nan
         self._log.write(state, self._driver.received_ns, t)
+        record = self._log.recorder.last(RECORD_CYCLES)  # Up to the fault.
+        self._stop_row = self._log.recorder.count
         if self._command is not None:
             self._record([later for later in self._pending if later.message_id > state.message_id])
             self._driver.on_states = self._record_stop
@@ -444,7 +447,6 @@ class ControlLoop:
         lacks_commands = self._driver.is_lack_of_commands(state.faults)
         if pressed is None and lacks_commands and len(state.faults) == 1 and not self._has_power():
             return self._power_off_error()
-        record = self._log.recorder.last(RECORD_CYCLES)
         report = self._driver.describe_faults(
             state.faults,
             record,
