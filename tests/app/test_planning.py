@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,7 +48,7 @@ def test_only_a_completed_plan_has_a_certificate_to_run_with():
 
 def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_is_not(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=time.sleep))
     store = Store(UiState(model=MODEL, goal=goal_at(MODEL, ON_THE_FLOOR)))
     actions = GoalActions(store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME)))
     actions.plan()
@@ -66,7 +67,7 @@ def test_a_goal_that_rests_is_looked_at_for_collisions_and_one_that_is_dragged_i
 
 def test_a_target_in_a_hand_has_come_to_rest_when_it_is_let_go_or_after_a_longer_pause(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(goal_actions, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=time.sleep))
     store = Store(UiState(model=MODEL, goal=goal_at(MODEL, HOME)))
     actions = GoalActions(store, SimpleNamespace(status=lambda: SimpleNamespace(phase="idle", q_c=HOME)))
     position, wxyz = tuple(store.state.goal.target.position - (0.0, 0.05, 0.05)), tuple(store.state.goal.target.wxyz)

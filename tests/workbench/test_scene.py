@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -227,7 +228,7 @@ def test_a_line_is_planned_once_the_goal_stands_still_and_keeps_the_tool_on_it(b
     from rcilab.app.goal import goal_actions as actions
 
     now = [100.0]
-    monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr(actions, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=time.sleep))
     bench.goal.set_path_type(SetPathType(kind="line"))
     bench.aim(-0.05, 0.1, 0.05)
     assert bench.state.plan is None

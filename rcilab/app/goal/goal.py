@@ -121,9 +121,10 @@ def distinguishing_joints(solutions: np.ndarray) -> tuple[int, ...]:
         solutions: Joint angles, shape (N, n), [rad].
     """
     angles = np.degrees(solutions).round()
-    named: list[int] = []
+    rows, named = angles.tolist(), list[int]()
+    different = len(set(map(tuple, rows)))
     for joint in np.argsort(-np.ptp(angles, axis=0), kind="stable").tolist():
-        if len(np.unique(angles[:, named], axis=0)) == len(np.unique(angles, axis=0)):
+        if len({tuple(row[i] for i in named) for row in rows}) == different:
             break
         named.append(joint)
     return tuple(sorted(named))

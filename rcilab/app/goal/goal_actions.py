@@ -33,6 +33,7 @@ _FIELDS = ("joint.", "pose.", "psi")  # Beginnings of the names of the fields th
 _ANGLES = ("pose.roll", "pose.pitch", "pose.yaw")
 _REPLACED = {f"pose.{QUATERNION}": _ANGLES, **dict.fromkeys(_ANGLES, (f"pose.{QUATERNION}",))}
 """Fields of the same orientation: a rejected text in them is about the previous one."""
+_DRAW_FIRST = 5e-4  # [s] For the threads of the view to start; a tuning value.
 _ONE_DRAG = 1.0  # [s] Changes within this time belong to one drag, or one use of a slider's keys.
 RESTED = 0.6  # [s] The same for a gizmo that is still held: the operator may only pause.
 
@@ -412,7 +413,7 @@ class GoalActions:
     def set_joints(self, q: JointVector) -> None:
         """Sets the goal to joint angles; rejected texts were about the previous one."""
         self._store.clear_problems(*_FIELDS)
-        self._store.update(goal=goal_at(self._store.state.model, q))
+        self._show_goal(goal_at(self._store.state.model, q))
         self.plan()
 
     def set_target(
@@ -429,8 +430,15 @@ class GoalActions:
         self._store.clear_problems(*_FIELDS)
         state = self._store.state
         around = state.goal.q if near is None else near
-        self._store.update(goal=goal_toward(state.model, target, around, psi, snapped))
+        self._show_goal(goal_toward(state.model, target, around, psi, snapped))
         self.plan()
+
+    def _show_goal(self, goal: Goal) -> None:
+        """Sets the goal; the view draws the arm before planning, which keeps the interpreter busy for milliseconds."""
+        self._store.update(goal=goal)
+        if self._plans_at_once:
+            self._store.changed.set()
+            time.sleep(_DRAW_FIRST)
 
 
 def _beginning(plan: Plan) -> JointVector:
