@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import fields
+from itertools import zip_longest
 from typing import Any
 
 import ipywidgets
 
+from rcilab.app.app_state import AppState
 from rcilab.app.arm_features import explain_missing_feature, is_only_planned
 from rcilab.app.connection import Robot
 from rcilab.app.robot_connection import RobotConnection
@@ -39,6 +42,7 @@ from rcilab.notebook.widget_sharing import shared_style_widget
 from rcilab.recording.run import Run
 
 _POLL_INTERVAL = 0.1  # [s] Between two reads of the robot's status.
+_SHOWN = tuple(field.name for field in fields(AppState) if field.name != "goal")
 _TARGETS = ("ideal", "mujoco", "address")
 
 
@@ -155,8 +159,9 @@ class RunPanel(Part):
         self.target.observe(lambda _: self._show(), names="value")
         if self.state.session is not None:
             self._take(SessionConnection(self.state.session))
+        self._shown: tuple[object, ...] = ()  # The values of `_SHOWN`, and the outcome, at the last change of the goal.
         self._cleanups.append(self.state.subscribe("plan", self._on_plan))
-        self._cleanups.append(self.state.subscribe("goal", self._show))
+        self._cleanups.append(self.state.subscribe("goal", self._follow_goal))
         self.subscribe("robot", self._show)
 
     def halt(self) -> None:
@@ -308,6 +313,14 @@ class RunPanel(Part):
     def _forget_question(self) -> None:
         write(self._question, "")
         self._answers.layout.display = "none"
+
+    def _follow_goal(self) -> None:
+        """Shows what a change of the goal has changed here: often nothing, as with every step of a slider."""
+        now, outcome = self.state.now, self.state.outcome
+        shown = (outcome, *(getattr(now, name) for name in _SHOWN))
+        if any(new is not old for new, old in zip_longest(shown, self._shown)):
+            self._shown = shown
+            self._show()
 
     def _show(self) -> None:
         state, text = self.state, self.text
