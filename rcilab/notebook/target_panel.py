@@ -155,15 +155,15 @@ class TargetPanel(Part):
             code = "target.out_of_reach" if goal.reach.tone == "bad" else "target.no_branches"
             write(self._table, soft(text(code)))
             return
-        here, rows, chosen = state.here, [], None
-        joints = distinguishing_joints(np.asarray(list(solutions)))
-        for number, q in enumerate(solutions):
-            least = margin(self.model, q)
-            distance = float(np.abs(q - here).max())
+        model, rows, angles = self.model, [], np.asarray(list(solutions))
+        joints = distinguishing_joints(angles)
+        distances = np.abs(angles - state.here).max(axis=1).tolist()
+        turned = np.abs(np.remainder(angles - goal.q + math.pi, math.tau) - math.pi).max(axis=1)
+        chosen = int(turned.argmin()) if turned.min() < 1e-6 else None
+        for number, (distance, degrees) in enumerate(zip(distances, np.degrees(angles).tolist(), strict=True)):
+            least = margin(model, angles[number])
             label = text("target.way", number=number + 1, margin=least.angle, joint=least.joint, away=distance)
-            rows.append(" · ".join([label, *(f"J{j + 1} {math.degrees(q[j]):.0f}°" for j in joints)]))
-            if float(np.abs(np.angle(np.exp(1j * (q - goal.q)))).max()) < 1e-6:
-                chosen = number
+            rows.append(" · ".join([label, *(f"J{j + 1} {degrees[j]:.0f}°" for j in joints)]))
         options = [(row, number) for number, row in enumerate(rows)]
         if tuple(options) != self.branches.options:
             self.branches.options = options
