@@ -257,7 +257,7 @@ class ControlLoop:
             self._first_command = command
         if not self._has_moved:
             self._has_moved = _is_different(command, self._first_command)
-        if not self._is_executed:
+        if self._has_moved and not self._is_executed:
             now, first = (
                 (state.tau_c, self._first_tau_c) if isinstance(command, JointTorque) else (state.q_c, self._first_q_c)
             )

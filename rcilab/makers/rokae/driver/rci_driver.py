@@ -206,8 +206,7 @@ class RciDriver:
 
     def send(self, state: RobotState, command: Command) -> None:
         """Sends the command that answers a state."""
-        # StopMove alone announces the end: the vendor's client has never been seen to set the `finished` byte.
-        self.connection.send(build_command(state.message_id, command, state)._replace(finished=False))
+        self.connection.send(build_command(state.message_id, command, state))
 
     def end(self, timeout: float | None = None) -> None:
         """Ends the motion (StopMove)."""

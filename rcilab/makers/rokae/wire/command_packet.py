@@ -54,6 +54,8 @@ class CommandPacket(NamedTuple):
 def build_command(message_id: int, command: Command, state: RobotState) -> CommandPacket:
     """Returns the packet of a callback's command; unused fields have the values of the vendor's client.
 
+    `finished` is one of them: the vendor's client announces the end of a motion over TCP alone.
+
     Args:
         message_id: Number of the answered state.
         command: The command.
@@ -61,13 +63,13 @@ def build_command(message_id: int, command: Command, state: RobotState) -> Comma
     """
     if isinstance(command, JointPosition):
         pose = state.T_base_tool.as_row_major()
-        return CommandPacket(message_id, _seven(command.q), pose, finished=command.finished)
+        return CommandPacket(message_id, _seven(command.q), pose)
     if isinstance(command, CartesianPosition):
         pose = tuple(command.T_base_tool.ravel().tolist())
         has_psi = command.psi is not None
         psi = command.psi if command.psi is not None else 0.0
-        return CommandPacket(message_id, _seven(state.q), pose, has_psi, psi, command.finished)
-    return CommandPacket(message_id, tau_c=_seven(command.tau), finished=command.finished)
+        return CommandPacket(message_id, _seven(state.q), pose, has_psi, psi)
+    return CommandPacket(message_id, tau_c=_seven(command.tau))
 
 
 def encode_command(packet: CommandPacket) -> bytes:

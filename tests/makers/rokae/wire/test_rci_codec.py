@@ -202,7 +202,7 @@ def test_a_torque_command_leaves_the_rest_zero(state) -> None:
     packet = rci.build_command(5, JointTorque(np.arange(7.0), finished=True), state)
     assert packet.q_c == (0.0,) * 7
     assert packet.T_base_tool_c == (0.0,) * 16
-    assert packet.finished
+    assert not packet.finished  # As with the vendor's client, which announces the end over TCP alone.
     assert rci.decode_command(rci.encode_command(packet), 7) == packet
 
 
