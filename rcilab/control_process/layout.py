@@ -24,17 +24,18 @@ import mmap
 import os
 import pickle
 import struct
-import tempfile
 from enum import IntEnum
-from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rcilab.control_process.jitter_histogram import SIZE as HISTOGRAM_WORDS
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.cycle_ring import RingReader
 from rcilab.core.errors import UsageError, VersionMismatchError
+from rcilab.core.shared_memory import PAGE, open_shared_memory, whole_pages
 
 MAGIC = b"RCILABCP"
 VERSION = 10  # Increment with every change of this file, of the snapshot or of `cycle_dtype`.
@@ -47,10 +48,8 @@ MESSAGE_SLOTS = 16
 MESSAGE_SIZE = 4096  # [bytes] The largest request, a configuration, needs 1300.
 
 _HEADER = struct.Struct("<8sIIIIQ")  # magic, version, n, size of a cycle, ring capacity, total size
-_PAGE = 4096
-_SETTINGS_SIZE = 4 * _PAGE
-_SNAPSHOT_SIZE = _PAGE
-_MEMORY = Path("/dev/shm")  # Linux: files here are in memory. Elsewhere, or if it is full: the temp directory.
+_SETTINGS_SIZE = 4 * PAGE
+_SNAPSHOT_SIZE = PAGE
 
 
 class Counter(IntEnum):
@@ -123,16 +122,21 @@ class ControlBlock:
                 f"the settings of the control process need {len(data)} bytes, at most {_SETTINGS_SIZE - 4} fit"
             )
         size = _total_size(n)
-        descriptor = _open_memory(size)
+        descriptor = open_shared_memory(size, "the control process")
         os.pwrite(descriptor, _HEADER.pack(MAGIC, VERSION, n, cycle_dtype(n).itemsize, RING_CYCLES, size), 0)
-        os.pwrite(descriptor, struct.pack("<I", len(data)) + data, 2 * _PAGE)
+        os.pwrite(descriptor, struct.pack("<I", len(data)) + data, 2 * PAGE)
         return cls(descriptor)
 
     @property
     def settings(self) -> object:
         """The settings that the block was created with."""
-        (length,) = struct.unpack_from("<I", self._memory, 2 * _PAGE)
-        return pickle.loads(self._memory[2 * _PAGE + 4 : 2 * _PAGE + 4 + min(length, _SETTINGS_SIZE - 4)])
+        (length,) = struct.unpack_from("<I", self._memory, 2 * PAGE)
+        return pickle.loads(self._memory[2 * PAGE + 4 : 2 * PAGE + 4 + min(length, _SETTINGS_SIZE - 4)])
+
+    def open_reader(self) -> RingReader:
+        """Returns a reader of the recorded cycles."""
+        rows: NDArray[np.void] = np.frombuffer(self.cycles, cycle_dtype(self.n), RING_CYCLES)
+        return RingReader(rows, self.counters, Counter.CYCLES)
 
     def close(self) -> None:
         """Closes the descriptor; the memory is freed with its last view. May be called twice."""
@@ -154,7 +158,7 @@ class ControlBlock:
         return n
 
     def _place_regions(self) -> None:
-        start = _PAGE
+        start = PAGE
         regions: list[memoryview] = []
         for size in _region_sizes(self.n):
             regions.append(self._memory[start : start + size])
@@ -173,39 +177,18 @@ def _region_sizes(n: int) -> tuple[int, ...]:
     """Returns the sizes of all regions after the header, in the order of the module's docstring, [bytes]."""
     messages = MESSAGE_SLOTS * MESSAGE_SIZE
     return (
-        _PAGE,
+        PAGE,
         _SETTINGS_SIZE,
         _SNAPSHOT_SIZE,
-        _whole_pages(8 * HISTOGRAM_WORDS),
+        whole_pages(8 * HISTOGRAM_WORDS),
         messages,
         messages,
-        _PAGE,
-        _PAGE,
-        _whole_pages(RING_CYCLES * cycle_dtype(n).itemsize),
-        _whole_pages(MOTION_ROWS * n * 8),
+        PAGE,
+        PAGE,
+        whole_pages(RING_CYCLES * cycle_dtype(n).itemsize),
+        whole_pages(MOTION_ROWS * n * 8),
     )
 
 
 def _total_size(n: int) -> int:
-    return _PAGE + sum(_region_sizes(n))
-
-
-def _whole_pages(size: int) -> int:
-    return -(-size // _PAGE) * _PAGE
-
-
-def _open_memory(size: int) -> int:
-    """Returns the descriptor of an unnamed file whose bytes are all allocated, so that no later write fails."""
-    for directory in (_MEMORY, Path(tempfile.gettempdir())):
-        if not directory.is_dir():
-            continue
-        try:
-            with tempfile.TemporaryFile(dir=directory) as file:
-                os.posix_fallocate(file.fileno(), 0, size)
-                return os.dup(file.fileno())
-        except OSError:  # Full or not writable: containers often limit /dev/shm to 64 MB.
-            continue
-    raise UsageError(
-        f"the control process needs {size / 1e6:.0f} MB of shared memory, and neither {_MEMORY} nor "
-        f"{tempfile.gettempdir()} has enough space; free some"
-    ).coded("no_memory", size=f"{size / 1e6:.0f}")
+    return PAGE + sum(_region_sizes(n))

@@ -10,7 +10,6 @@ import numpy as np
 
 from rcilab.control_process.jitter_histogram import late_cycles, summarise
 from rcilab.control_process.layout import ControlBlock, Counter
-from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
@@ -39,7 +38,7 @@ class StatusReader:
         self._inputs = range(len(maker.capabilities.inputs))
         self._outputs = range(len(maker.capabilities.outputs))
         self._block = block
-        self._ring = RingReader(block)
+        self._ring = block.open_reader()
         self._tool: tuple[bytes, Pose | None] = b"", None
 
     def read_snapshot(self) -> Snapshot:
@@ -121,7 +120,7 @@ class RoundTrip:
     """
 
     def __init__(self, block: ControlBlock) -> None:
-        self._ring = RingReader(block)
+        self._ring = block.open_reader()
         self._sampled_at = 0.0
         self._fields: dict[str, Any] = {}
 

@@ -13,8 +13,9 @@ from rcilab.control_process.snapshot import Snapshot, write_snapshot
 from rcilab.control_process.status import MESSAGES, Phase
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_recorder import Recorder
 from rcilab.core.spatial import Pose
-from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.execution.recorder import CycleLog
 
 _SNAPSHOT_CYCLES = 20  # Rows between two snapshots: 50 per second.
 _WRENCH = struct.Struct("=6d")

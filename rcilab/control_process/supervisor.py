@@ -35,12 +35,12 @@ from rcilab.control_process.messages import (
 from rcilab.control_process.motion_upload import SharedRows, require_admissible, require_ready
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
 from rcilab.control_process.requests import PendingRequest, RequestClient
-from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot
 from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
 from rcilab.control_process.status_reader import RoundTrip, StatusReader
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
+from rcilab.core.cycle_ring import RingReader
 from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
 from rcilab.core.memory import memory_needed
 from rcilab.core.state import Mode
@@ -244,7 +244,7 @@ class Supervisor(Closeable):
     def open_reader(self) -> RingReader:
         """Returns a reader of the recorded cycles, independent of `drain`; valid until `close`."""
         with self._lock:
-            return RingReader(self._require_block())
+            return self._require_block().open_reader()
 
     def power_on(self) -> PendingRequest:
         """Requests motor power on."""
@@ -530,7 +530,7 @@ class Supervisor(Closeable):
                 block, self._lock, self._require_cycle, lambda request: self._send("change of speed", request)
             )
             self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
-            self._reader, self._ring = StatusReader(block, maker), RingReader(block)
+            self._reader, self._ring = StatusReader(block, maker), block.open_reader()
         except BaseException:
             block.close()
             raise

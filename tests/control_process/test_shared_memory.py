@@ -21,12 +21,12 @@ from rcilab.control_process.jitter_histogram import JitterHistogram, summarise
 from rcilab.control_process.layout import MESSAGE_SIZE, MESSAGE_SLOTS, RING_CYCLES, VERSION, ControlBlock, Counter
 from rcilab.control_process.messages import Reply, WorkerSettings, as_sendable
 from rcilab.control_process.requests import MessageRing
-from rcilab.control_process.ring import RingReader
 from rcilab.control_process.snapshot import Snapshot, read_snapshot, write_snapshot
 from rcilab.control_process.supervisor import build_settings
 from rcilab.core import errors
 from rcilab.core.command import JointPosition
 from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.cycle_recorder import Recorder
 from rcilab.core.errors import (
     CommandRejectedError,
     ConnectionLostError,
@@ -39,7 +39,7 @@ from rcilab.core.errors import (
 )
 from rcilab.core.spatial import Pose
 from rcilab.core.state import unknown_state
-from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.execution.recorder import CycleLog
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -115,7 +115,7 @@ def test_messages_come_out_in_order_and_a_full_ring_is_an_error(block):
 
 
 def test_the_ring_is_drained_once_and_in_order(block):
-    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), RingReader(block)
+    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), block.open_reader()
     assert reader.newest() is None
     assert len(reader.drain()) == 0
     write_rows(recorder, block, 100)
@@ -128,7 +128,7 @@ def test_the_ring_is_drained_once_and_in_order(block):
 
 
 def test_an_overrun_is_counted_and_what_is_left_is_whole(block):
-    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), RingReader(block)
+    recorder, reader = Recorder(7, RING_CYCLES, block.cycles), block.open_reader()
     write_rows(recorder, block, RING_CYCLES + 500)
     rows = reader.drain()
     first = int(rows["message_id"][0])

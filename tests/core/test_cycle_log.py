@@ -9,8 +9,9 @@ import pytest
 
 from rcilab.core.command import CartesianPosition, JointTorque
 from rcilab.core.cycle_log import save_cycles
+from rcilab.core.cycle_recorder import Recorder
 from rcilab.core.errors import ControlError, InvalidValueError, UsageError
-from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.execution.recorder import CycleLog
 from tests.execution.peer import Peer
 
 

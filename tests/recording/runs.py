@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from rcilab.core.cycle_recorder import Recorder
 from rcilab.core.spatial import Pose
-from rcilab.execution.recorder import Recorder
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint, plan_stop

@@ -16,6 +16,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.command import Command
+from rcilab.core.cycle_recorder import Recorder
 from rcilab.core.errors import ControlError, ManualRecoveryError, RcilabError, UsageError
 from rcilab.core.fault import FaultCode, find_fault
 from rcilab.core.safety_box import SafetyBox
@@ -23,7 +24,7 @@ from rcilab.core.spatial import IDENTITY
 from rcilab.core.state import RobotState
 from rcilab.execution.control_loop import Callback
 from rcilab.execution.motion_executor import MotionStream
-from rcilab.execution.recorder import CycleLog, Recorder
+from rcilab.execution.recorder import CycleLog
 from rcilab.execution.session import RobotSession
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, require_simulator, timing_of
