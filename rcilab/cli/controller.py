@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import ipaddress
 import os
 import signal
-import sys
 from typing import TYPE_CHECKING
 
 from rcilab.cli.output import print_interruptibly
@@ -78,6 +76,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"
     )
+    parser.add_argument(
+        "--log-format",
+        default="text",
+        metavar="FORMAT",
+        help="lines of the log on stderr: text, or json for one object each (%(default)s)",
+    )
     _add_world_options(parser)
     _add_network_options(parser)
     parser.add_argument("--exit-with-parent", nargs="?", type=int, const=0, metavar="PID", help=argparse.SUPPRESS)
@@ -134,12 +138,6 @@ def run(args: argparse.Namespace) -> int:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())
     else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if not ipaddress.ip_address(server.host).is_loopback:
-        print_interruptibly(
-            f"rcilab controller: warning: {server.host} is reachable from outside this machine; anyone there can move "
-            "this virtual arm",
-            sys.stderr,
-        )
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
@@ -171,6 +169,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         network=network,
         states_network=states_network,
         stalls=tuple(map(parse_stall, args.stall)),
+        log_format=args.log_format,
         world_port=None if args.no_world else args.world_port,
         # Without a number: the parent process, while it still exists.
         parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,

@@ -8,20 +8,21 @@ from rcilab.makers.maker import maker_of, require_simulator
 from rcilab.model.robot_model import load_model
 from rcilab.sim.arm_server import ArmServer
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.log_entry import LogEntry
 from rcilab.sim.plant import Plant
 from rcilab.sim.plants import build_plant
 from rcilab.sim.virtual_arm import VirtualArm
 
 
 def build_virtual_controller(
-    config: ControllerConfig, *, plant: Plant | None = None, log: Callable[[str], None] | None = None
+    config: ControllerConfig, *, plant: Plant | None = None, log: Callable[[LogEntry], None] | None = None
 ) -> ArmServer:
     """Returns a virtual controller with its sockets open; `run` makes it serve.
 
     Args:
         config: Its configuration.
         plant: The plant; None: that of the configuration.
-        log: Takes one line about everything unusual, and must not wait; None: a thread writes them to stderr.
+        log: Takes the entries of its log, and must not wait; None: a thread writes them to stderr.
 
     Raises:
         ModelError: The configuration names no known arm, or one without a virtual controller.

@@ -13,6 +13,7 @@ client answers the state after the last one.
 
 from __future__ import annotations
 
+import ipaddress
 import logging
 import os
 from collections.abc import Callable
@@ -36,10 +37,12 @@ from rcilab.sim.channels import Peer
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.cycle_timer import CycleTimer
-from rcilab.sim.endpoint import Endpoint
+from rcilab.sim.endpoint import CLOSED, Endpoint
 from rcilab.sim.environment import Environment, ServerCounters
 from rcilab.sim.faulty_network import FaultyNetwork
-from rcilab.sim.log_lines import LineHandler, LogLines, RateLimitedLog
+from rcilab.sim.local_delivery import is_local_address, is_received_locally
+from rcilab.sim.log_entry import LogEntry
+from rcilab.sim.log_lines import ControllerLog, LogHandler, LogLines
 from rcilab.sim.maker_server import MakerServer
 from rcilab.sim.simulation_port import SimulationPort
 
@@ -54,7 +57,6 @@ SLIP = 20  # [cycles] A motion that took this much longer than planned is logged
 GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
-_MOST_LINES = 20  # Of a kind that a client causes, before they are only counted. A tuning value.
 _CHECK_PERIOD = 0.1  # [s] Between checks for the end of the parent process, or for a requested end during a stall.
 
 
@@ -68,14 +70,14 @@ class ArmServer:
     Args:
         server: The maker's part: channels, codec, behaviour.
         config: The configuration.
-        log: Receives one line per unusual event, and must not block; None: a thread writes them to stderr.
+        log: Receives the entries of the log, and must not block; None: a thread writes them to stderr.
 
     Raises:
         UsageError: An address or port cannot be used.
     """
 
     def __init__(
-        self, server: MakerServer, config: ControllerConfig, *, log: Callable[[str], None] | None = None
+        self, server: MakerServer, config: ControllerConfig, *, log: Callable[[LogEntry], None] | None = None
     ) -> None:
         self.config = config
         self.controller = server.controller
@@ -84,21 +86,20 @@ class ArmServer:
         self._has_timed_out = False
         self._lines: LogLines | None = None
         if log is None:
-            self._lines = LogLines(_STDERR)
+            self._lines = LogLines(_STDERR, config.log_format)
             log = self._lines.write
-        self._log = log
         self._clock = SystemClock()
+        self._log = ControllerLog(log, self._clock.now, lambda: self.controller.cycle_number)
         self._timer = CycleTimer(self._clock.now())
         self._is_ending = False
         self._next_check = 0.0
         self._cpu_latency_lock = CpuLatencyLock()
         self._missed_before = 0
         self._logged_faults: tuple[FaultCode, ...] = ()
-        self._log_limiter = RateLimitedLog(log, self._clock.now)
         client = None if config.client_host is None else (config.client_host, config.client_port)
         self._endpoint = Endpoint(config.host, server.channels, client)
         states_network = config.network if config.states_network is None else config.states_network
-        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network, self._log_refusal)
+        self._network = FaultyNetwork(self._endpoint, self._clock, config.network, states_network, self._log_event)
         server.attach(self._network)
         self._stalls = StallSchedule()
         self._environment = Environment(
@@ -142,12 +143,17 @@ class ArmServer:
         Args:
             on_ready: Called once, after the first state was sent.
         """
+        if not ipaddress.ip_address(self.host).is_loopback:
+            text = (
+                f"warning: {self.host} is reachable from outside this machine; anyone there can move this virtual arm"
+            )
+            self._log.write("warning", text, host=self.host)
         use_realtime = self.config.realtime and not self.config.lockstep
         if use_realtime:
             warning = enter_realtime(PRIORITY).warning
             if warning is not None:
-                self._log(warning)
-        parts = LineHandler(self._log)
+                self._log.write("warning", warning)
+        parts = LogHandler(self._log)
         _parts_log.addHandler(parts)
         try:
             self._loop(on_ready)
@@ -302,7 +308,7 @@ class ArmServer:
     def _check_periodically(self) -> None:
         if self._clock.now() >= self._next_check:
             self._next_check = self._clock.now() + _CHECK_PERIOD
-            self._log_limiter.write_counts()
+            self._log.write_counts()
             if self.config.parent_pid is not None and os.getppid() != self.config.parent_pid:
                 self.request_stop()
 
@@ -318,17 +324,19 @@ class ArmServer:
             if self.controller.wants_commands:
                 self._advance(is_sent=False)
 
-    def _log_refusal(self, line: str) -> None:
-        self._log_limiter.write("refused request", line, "requests were refused", _MOST_LINES)
+    def _log_event(self, kind: str, text: str, **facts: object) -> None:
+        """Logs an event of the maker's controller, after the fault that caused it."""
+        self._log_new_faults()
+        self._log.write(kind, text, **facts)
 
     def _log_slip(self) -> None:
         """Logs by how much a motion took longer than planned, after its end."""
         if not self.controller.is_moving and self.missed - self._missed_before >= SLIP:
             slipped = 1e3 * CYCLE_TIME * (self.missed - self._missed_before)
-            line = (
+            text = (
                 f"that motion took {slipped:.0f} ms longer than planned: the machine was busy or a stall was simulated"
             )
-            self._log_limiter.write("slip", line, "motions took longer", _MOST_LINES)
+            self._log.write("slip", text, milliseconds=round(slipped))
         self._missed_before = self.missed
 
     def _advance(self, *, is_sent: bool = True) -> None:
@@ -337,19 +345,21 @@ class ArmServer:
             self._cpu_latency_lock.switch(self.controller.is_moving)
         self._server.step(is_sent=is_sent)
         self._environment.step()
-        faults = self.controller.faults
-        if faults is not self._logged_faults and faults != self._logged_faults:
-            self._log_faults(faults)
+        self._log_new_faults()
 
-    def _log_faults(self, faults: tuple[FaultCode, ...]) -> None:
+    def _log_new_faults(self) -> None:
         """Logs the reason for new error bits."""
+        faults = self.controller.faults
+        if faults is self._logged_faults or faults == self._logged_faults:
+            return
         self._logged_faults = faults
         if faults:
-            line = f"{name_faults(faults)}: {self.controller.reason}; the arm stops"
-            self._log_limiter.write("fault", line, "faults stopped the arm", _MOST_LINES)
-            if self.controller.lacks_commands and self.controller.arm.playout.lost:
-                line = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
-                self._log_limiter.write("playout", line, "motions lacked commands")
+            controller, names = self.controller, [fault.manual_name for fault in faults]
+            text = f"{name_faults(faults)}: {controller.reason}; the arm stops"
+            self._log.write("fault", text, faults=names, reason=str(controller.reason), phase=controller.phase_name)
+            if controller.lacks_commands and controller.arm.playout.lost:
+                text = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
+                self._log.write("advice", text)
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:
@@ -359,8 +369,9 @@ class ArmServer:
                 case FrameArrived(peer, frame):
                     self._server.receive(peer, frame)
                 case ClientConnected(peer):
+                    self._server.connect(peer)  # First: it sends a state, for which the client may wait only briefly.
+                    self._log.write("connected", f"client {peer.address} connected", client=peer.address)
                     self._warn_of_other_target(peer.address)
-                    self._server.connect(peer)
                 case ClientDisconnected(peer, reason):
                     self._handle_disconnect(peer, reason)
                 case ExtraSocketsReady(sockets):
@@ -368,24 +379,36 @@ class ArmServer:
                         self._simulation_port.serve(sockets)
                 case UnknownSenderDetected(address, client):
                     whose = f"the client is at {client}" if client else "no client is connected"
-                    line = f"ignored a UDP datagram from {address} and will ignore further ones: {whose}"
-                    self._log_limiter.write("unknown sender", line, "were ignored")
+                    text = f"ignored a UDP datagram from {address} and will ignore further ones: {whose}"
+                    self._log.write("unknown_sender", text, sender=address, client=client)
                 case ClientRefused(address, holder):
-                    line = f"refused another client from {address}: {holder} is connected"
-                    self._log_limiter.write("refused", line, "clients were refused")
+                    text = f"refused another client from {address}: {holder} is connected"
+                    self._log.write("client_refused", text, client=address, connected=holder)
 
     def _warn_of_other_target(self, address: str) -> None:
-        target = self._endpoint.fixed_host
-        if target not in (None, address):
-            line = (
-                f"{address} connected, but states go to {target}, because of --client: it will receive none; start "
-                f"with --client {address}, or without"
-            )
-            self._log_limiter.write("elsewhere", line, "connected")
+        """Warns of a client that does not receive the states, because another address was given for them.
+
+        Two addresses of this machine are those of one client if a socket there receives the states.
+        """
+        target = self._endpoint.fixed_target
+        if target is None or target[0] == address:
+            return
+        advice = f"start with --client {address}, or without"
+        if is_local_address(address) and is_local_address(target[0]):
+            if is_received_locally(*target):
+                return
+            consequence = f"no program receives them there; {advice}"
+        else:
+            consequence = f"unless that is another address of its machine, it receives none; {advice}"
+        text = "{} connected, but states go to {}:{}, because of --client: ".format(address, *target) + consequence
+        self._log.write("states_elsewhere", text, client=address, target="{}:{}".format(*target))
 
     def _handle_disconnect(self, peer: Peer, reason: str) -> None:
+        phase = self.controller.phase_name
         if self._server.disconnect(peer):
-            line = f"the client {reason} during a motion: the arm stops"
-            self._log_limiter.write("left in motion", line, "clients were lost during a motion", _MOST_LINES)
-        elif reason != "closed the connection":
-            self._log_limiter.write("left", f"the client {reason}", "clients were lost")
+            text, kind = f"client {peer.address} {reason} during a motion: the arm stops", "client_lost"
+        elif reason == CLOSED:
+            text, kind = f"client {peer.address} disconnected", "disconnected"
+        else:
+            text, kind = f"client {peer.address} {reason}", "client_dropped"
+        self._log.write(kind, text, client=peer.address, reason=reason, phase=phase)

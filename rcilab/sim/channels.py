@@ -103,6 +103,6 @@ class ClientLink(Protocol):
         """Ends a connection."""
         ...
 
-    def log(self, line: str, /) -> None:
-        """Logs the line about a refused request for the operator; after some lines, they are only counted."""
+    def log(self, kind: str, text: str, /, **facts: object) -> None:
+        """Logs an event for the operator; see `ControllerLog.write`."""
         ...

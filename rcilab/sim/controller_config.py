@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, get_args
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.sim.api import NetworkFaults, Stall
+from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
 from rcilab.sim.streamed_motion import PREFILL
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
@@ -79,6 +80,8 @@ class ControllerConfig:
     """Pauses of the controller's clock; their `after` counts from the start of `run`."""
     world_port: int | None = 0
     """TCP port of the simulation port, on loopback; 0: any free one; None: no simulation port."""
+    log_format: LogFormat = "text"
+    """Lines of the log on stderr: text, or one JSON object each."""
     realtime: bool = True
     """Whether to request SCHED_FIFO and locked memory; never in lock-step, which has no deadlines."""
     parent_pid: int | None = None
@@ -95,6 +98,8 @@ class ControllerConfig:
             raise InvalidValueError("host", self.host, "is not a valid address; use 127.0.0.2 for this machine only")
         if self.plant not in PLANT_KINDS:
             raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
+        if self.log_format not in LOG_FORMATS:
+            raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.patience is not None and not 0.01 <= self.patience <= 3600.0:

@@ -22,6 +22,9 @@ from rcilab.sim.arrivals import (
 )
 from rcilab.sim.channels import LOWEST_CLIENT_PORT, Channel, Framer, Peer, TcpChannel, UdpChannel
 
+CLOSED = "closed the connection"
+"""Reason for the end of a connection that its client closed."""
+
 _LARGEST_DATAGRAM = 2048  # Larger than any valid one, so that a wrong length is detected.
 _DATAGRAMS_AT_ONCE = 512  # Read in one call; the rest waits for the next, so that a flood cannot delay the cycle.
 _UNKNOWN_AT_ONCE = 64  # The same for the shared socket once the client has its own: the rest fills the kernel's buffer.
@@ -99,8 +102,13 @@ class Endpoint:
         return "?" + "&".join(words) if words else ""
 
     @property
+    def fixed_target(self) -> tuple[str, int] | None:
+        """Host and port for states, independent of the client; None: states go to the client that connects."""
+        return self._fixed_target
+
+    @property
     def fixed_host(self) -> str | None:
-        """Host for states, independent of the client; None: states go to the client that connects."""
+        """Host of `fixed_target`."""
         return None if self._fixed_target is None else self._fixed_target[0]
 
     @property
@@ -303,10 +311,10 @@ class Endpoint:
         except BlockingIOError:
             return
         except OSError as error:
-            self.drop(connection.peer, f"connection broke ({error.strerror})")
+            self.drop(connection.peer, f"lost the connection ({error.strerror})")
             return
         if not data:
-            self.drop(connection.peer, "closed the connection")
+            self.drop(connection.peer, CLOSED)
             return
         try:
             self._arrivals.extend(FrameArrived(connection.peer, frame) for frame in connection.framer.feed(data))

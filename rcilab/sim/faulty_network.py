@@ -22,7 +22,7 @@ class FaultyNetwork:
 
     Attributes:
         has_lost: Whether the newest state, or a command since then, is lost: this state may never be answered.
-        log: Receives the line about a refused request; does not block.
+        log: Receives the events of a maker's controller; see `ClientLink.log`.
 
     Args:
         endpoint: The sockets.
@@ -38,7 +38,7 @@ class FaultyNetwork:
         clock: Clock,
         commands: NetworkFaults,
         states: NetworkFaults,
-        log: Callable[[str], None] = lambda _: None,
+        log: Callable[..., None] = lambda *_, **__: None,
     ) -> None:
         self._endpoint = endpoint
         self._clock = clock

@@ -1,111 +1,167 @@
-"""Log lines from a loop that must not block: a separate thread writes them."""
+"""The log of a controller's loop, which must not block: entries are limited in rate, and a thread writes them."""
 
 from __future__ import annotations
 
 import logging
 import os
 import threading
+import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
-_MAX_QUEUED = 200  # [lines] A tuning value.
-_PERIOD = 10.0  # [s] For which lines of a kind that any peer can cause are counted together. A tuning value.
-_CLOSE_TIMEOUT = 0.5  # [s] For the last lines at the end of the controller, if they are not read.
+from rcilab.sim.log_entry import LogEntry, LogFormat
+
+_MAX_QUEUED = 200  # [entries] A tuning value.
+_PERIOD = 10.0  # [s] For which entries of a kind that any peer can cause are counted together. A tuning value.
+_CLOSE_TIMEOUT = 0.5  # [s] For the last entries at the end of the controller, if they are not read.
 
 
-class LineHandler(logging.Handler):
-    """Passes the log records of the simulation to a writer of lines.
+class Kind(NamedTuple):
+    """A kind of entries."""
+
+    more: str
+    """What the entries that were only counted are about, such as "requests were refused"."""
+    most: int = 20
+    """Largest number of entries that are written per period. A tuning value."""
+
+
+KINDS: Mapping[str, Kind] = MappingProxyType(
+    {
+        "connected": Kind("clients connected"),
+        "disconnected": Kind("clients disconnected"),
+        "client_lost": Kind("clients were lost during a motion"),
+        "client_dropped": Kind("clients were dropped", 1),
+        "client_refused": Kind("clients were refused", 1),
+        "states_elsewhere": Kind("connected", 1),
+        "unknown_sender": Kind("were ignored", 1),
+        "power_on": Kind("times the motors were switched on"),
+        "power_off": Kind("times the motors were switched off"),
+        "motion_started": Kind("motions started"),
+        "motion_ended": Kind("motions ended"),
+        "guiding_started": Kind("hand guidings started"),
+        "guiding_ended": Kind("hand guidings ended"),
+        "refused": Kind("requests were refused"),
+        "fault": Kind("faults stopped the arm"),
+        "advice": Kind("motions lacked commands", 1),
+        "slip": Kind("motions took longer"),
+        "safety_stop": Kind("safety stops"),
+        "safety_release": Kind("safety stops ended"),
+        "recovered": Kind("recoveries"),
+        "warning": Kind("warnings"),
+        "skipped": Kind("times entries were dropped"),
+    }
+)
+"""Every kind of entry, by its name in the JSON form."""
+
+
+class LogHandler(logging.Handler):
+    """Passes the records of the loggers of the simulation to a controller's log.
 
     Args:
-        write: Writes a line; does not block.
+        log: The log.
     """
 
-    def __init__(self, write: Callable[[str], None]) -> None:
+    def __init__(self, log: ControllerLog) -> None:
         super().__init__()
-        self._write = write
+        self._log = log
 
     def emit(self, record: logging.LogRecord) -> None:
         """Writes one record."""
-        self._write(record.getMessage())
+        self._log.write("warning", record.getMessage())
 
 
 @dataclass(slots=True)
-class _Kind:
-    """Lines of a kind in the current period."""
+class _Period:
+    """Entries of a kind in the current period."""
 
     end: float  # [s]
-    more: str
     written: int = 0
     counted: int = 0
 
 
-class RateLimitedLog:
-    """Limits the rate of lines that any peer can cause: some of a kind per period, then the number of skipped ones.
+class ControllerLog:
+    """Stamps entries and limits the rate of each kind, because any peer can cause them; the rest is counted.
 
     Args:
-        write: Writes a line; does not block.
-        clock: Returns the time, [s].
+        put: Takes an entry; does not block.
+        clock: Returns the time for the periods, [s].
+        cycle: Returns the number of the last state.
+        wall: Returns the time of day, [s] since the epoch.
     """
 
-    def __init__(self, write: Callable[[str], None], clock: Callable[[], float]) -> None:
-        self._write, self._clock = write, clock
-        self._kinds: dict[str, _Kind] = {}
+    def __init__(
+        self,
+        put: Callable[[LogEntry], None],
+        clock: Callable[[], float],
+        cycle: Callable[[], int],
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self._put, self._clock, self._cycle, self._wall = put, clock, cycle, wall
+        self._periods: dict[str, _Period] = {}
 
-    def write(self, kind: str, line: str, more: str, most: int = 1) -> None:
-        """Writes a line, or counts it.
+    def write(self, kind: str, text: str, **facts: object) -> None:
+        """Writes an entry, or counts it.
 
         Args:
-            kind: Kind of line, one of a few; lines of a kind are counted together.
-            line: The line.
-            more: Text for the counted ones, such as "were refused".
-            most: Number of lines of this kind that are written per period.
+            kind: One of `KINDS`.
+            text: One sentence.
+            facts: Its numbers and words.
         """
         self.write_counts()
-        seen = self._kinds.setdefault(kind, _Kind(self._clock() + _PERIOD, more))
-        if seen.written < most:
+        seen = self._periods.setdefault(kind, _Period(self._clock() + _PERIOD))
+        if seen.written < KINDS[kind].most:
             seen.written += 1
-            self._write(line)
+            self._write(kind, text, facts)
         else:
             seen.counted += 1
 
     def write_counts(self) -> None:
-        """Writes how many lines were skipped in each period that is over. Call it periodically."""
-        if not self._kinds:
+        """Writes how many entries were skipped in each period that is over. Call it periodically."""
+        if not self._periods:
             return
         now = self._clock()
-        for kind, seen in list(self._kinds.items()):
+        for kind, seen in list(self._periods.items()):
             if now >= seen.end:
-                del self._kinds[kind]
+                del self._periods[kind]
                 if seen.counted:
-                    self._write(f"{seen.counted} more {seen.more} within {_PERIOD:g} s")
+                    text = f"{seen.counted} more {KINDS[kind].more} within {_PERIOD:g} s"
+                    self._write(kind, text, {"count": seen.counted})
+
+    def _write(self, kind: str, text: str, facts: Mapping[str, object]) -> None:
+        self._put(LogEntry(kind=kind, text=text, cycle=self._cycle(), wall=self._wall(), facts=facts))
 
 
 class LogLines:
-    """Writes lines to a descriptor. `write` may be called from one thread, and does not block.
+    """Writes entries as lines to a descriptor. `write` may be called from one thread, and does not block.
 
     Args:
         descriptor: Descriptor, such as 2. It is used directly: the lock of a stream would delay the end of the
             interpreter while its reader is blocked.
+        form: Format of the lines.
     """
 
-    def __init__(self, descriptor: int) -> None:
+    def __init__(self, descriptor: int, form: LogFormat = "text") -> None:
         self._descriptor = descriptor
-        self._lines: deque[str] = deque()
+        self._form: LogFormat = form
+        self._entries: deque[LogEntry] = deque()
         self._skipped = 0
         self._wake, self._is_ending = threading.Event(), False
         self._thread = threading.Thread(target=self._run, name="log", daemon=True)
         self._thread.start()
 
-    def write(self, line: str) -> None:
-        """Queues a line; a full queue skips it, and a later line reports the number of skipped lines."""
-        if len(self._lines) >= _MAX_QUEUED:
+    def write(self, entry: LogEntry) -> None:
+        """Queues an entry; a full queue skips it, and a later entry reports the number of skipped ones."""
+        if len(self._entries) >= _MAX_QUEUED:
             self._skipped += 1
             return
         if self._skipped:
-            self._lines.append(f"{self._skipped} lines were dropped: the stream was not read")
+            text, facts = f"{self._skipped} lines were dropped: the stream was not read", {"count": self._skipped}
+            self._entries.append(LogEntry(kind="skipped", text=text, cycle=entry.cycle, wall=entry.wall, facts=facts))
             self._skipped = 0
-        self._lines.append(line)
+        self._entries.append(entry)
         self._wake.set()
 
     def close(self) -> None:
@@ -118,8 +174,8 @@ class LogLines:
         while True:
             self._wake.wait()
             self._wake.clear()
-            while self._lines:
-                data = f"rcilab controller: {self._lines.popleft()}\n".encode(errors="replace")
+            while self._entries:
+                data = f"{self._entries.popleft().written(self._form)}\n".encode(errors="replace")
                 try:
                     while data:
                         data = data[os.write(self._descriptor, data) :]

@@ -11,6 +11,7 @@ and velocity. `fault_stop` lists the reaction to each fault.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 from rcilab.core.arrays import JointVector
@@ -23,6 +24,7 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.fault_stop import faults_of, is_beyond_range
 from rcilab.makers.rokae.controller.model_download import model_response
 from rcilab.makers.rokae.controller.modes import MODES
+from rcilab.makers.rokae.controller.phase_log import Situation
 from rcilab.makers.rokae.controller.reporter import StateReporter
 from rcilab.makers.rokae.controller.request_handlers import (
     Reply,
@@ -84,6 +86,7 @@ class RciController:
         state: The last reported state.
         ignored: Number of commands that arrived outside of a motion.
         safety_stop: The active safety stop.
+        on_transition: Receives the situation before and after every transition; None: nobody does.
 
     Args:
         arm: The arm after power-up.
@@ -106,6 +109,7 @@ class RciController:
         self.faults: tuple[Fault, ...] = ()
         self.reason = Remark("")
         self.ignored = 0
+        self.on_transition: Callable[[Situation, Situation], None] | None = None
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
         self._model_response = model_response(model.description)  # Computed here: it takes longer than a cycle.
@@ -239,7 +243,8 @@ class RciController:
         """Handles a request and returns the answer."""
         content = answer_query(request, self.phase, self.safety_stop, self.settings, self._model_response)
         if content is not None:
-            return Reply(content)
+            status = getattr(content, "status", rci.SettingStatus.SUCCESS)
+            return Reply(content, refusal=self._describe(request, status) if status else "")
         cell = check_request(request, self.phase, self.settings, self.arm)
         if not isinstance(cell, Transition):
             return self._refuse(request, cell)
@@ -254,7 +259,10 @@ class RciController:
         return Reply(rci.StatusResponse(cell.status), cell.when, Action.REBOOT in cell.actions)
 
     def _refuse(self, request: rci.Request, status: rci.Status) -> Reply:
-        why = describe_refusal(
+        return Reply(rci.StatusResponse(status), refusal=self._describe(request, status))
+
+    def _describe(self, request: rci.Request, status: rci.Status) -> str:
+        return describe_refusal(
             request,
             status,
             self.phase,
@@ -263,11 +271,11 @@ class RciController:
             safety_stop=self.safety_stop,
             faults=self.faults,
         )
-        return Reply(rci.StatusResponse(status), refusal=why)
 
-    def conclude(self, reply: Reply) -> rci.Response:
+    def conclude(self, request: rci.Request, reply: Reply) -> Reply:
         """Returns the answer that is due: a recovery may have been interrupted meanwhile."""
-        return conclude(reply, self.phase)
+        status = conclude(reply, self.phase)
+        return reply if status is None else self._refuse(request, status)
 
     def on_event(self, event: Event, *faults: Fault) -> None:
         """Handles an event other than a client's request; `faults` are the bits that it may set."""
@@ -350,6 +358,7 @@ class RciController:
         )
 
     def _enter(self, cell: Transition, *, request: rci.Request | None = None, faults: tuple[Fault, ...] = ()) -> None:
+        before = self._situation
         self._is_still = False
         for action in cell.actions:
             self._act(action, request, faults)
@@ -358,6 +367,12 @@ class RciController:
         self.phase = cell.phase
         self.arm.is_monitored = cell.phase in _MOVING
         self.arm.resting_law = _RESTING_LAWS.get(cell.phase, ControlLaw.POSITION)
+        if self.on_transition is not None:
+            self.on_transition(before, self._situation)
+
+    @property
+    def _situation(self) -> Situation:
+        return Situation(self.phase, self.faults, self._shown[0], self._message_id)
 
     def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:

@@ -10,6 +10,7 @@ from collections import deque
 from rcilab.core.errors import DecodeError
 from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.bounds import DEFAULT_PORT
+from rcilab.makers.rokae.controller.phase_log import PhaseLog
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.makers.rokae.controller.request_handlers import Reply
 from rcilab.makers.rokae.controller.state_machine import Event, Phase, When
@@ -30,7 +31,8 @@ from rcilab.sim.virtual_arm import VirtualArm
 SHUTDOWN_NOTICE = 20  # [cycles] For which states are still sent after the end of a motion, with the error bit.
 _PROTOCOL = "RCI"
 _QUIET = (Phase.OFF, Phase.IDLE)
-_ACTIVE = (Phase.MOVING, Phase.STOPPING, Phase.GUIDING)
+_ACTIVE = (Phase.MOVING, Phase.GUIDING)
+"""Not STOPPING: its motion was ended by StopMove, after which the vendor's client may close the connection at once."""
 
 
 def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
@@ -76,6 +78,7 @@ class RciServer:
     def attach(self, link: ClientLink) -> None:
         """Sets the link to clients."""
         self._link = link
+        self.controller.on_transition = PhaseLog(self.controller.playout, link.log).record
 
     def connect(self, peer: Peer) -> None:
         """Accepts a client and sends a state first: the vendor's client waits for it for a few milliseconds."""
@@ -83,7 +86,7 @@ class RciServer:
         self.send_states()
 
     def disconnect(self, peer: Peer) -> bool:
-        """Stops the arm; returns whether it was moving."""
+        """Stops the arm; returns whether this ends a motion or hand guiding."""
         was_moving = self.controller.phase in _ACTIVE
         self._peer = None
         self._frames.clear()
@@ -143,8 +146,7 @@ class RciServer:
                 self._link.drop(peer, f"sent bytes that are not valid {_PROTOCOL}: {error}")
                 return
             reply = self.controller.handle(request)
-            if reply.refusal:
-                self._link.log(reply.refusal)
+            self._log_refusal(request, reply)
             if isinstance(request, Connect):
                 self._link.direct_datagrams(peer, request.udp_port)
             # An answer is sent when its effect is visible: after a deferred answer, every state has the new mode.
@@ -154,6 +156,15 @@ class RciServer:
                 self._pending, self._pending_since = (request, command_id, reply), self.controller.state.message_id
 
     def _answer(self, peer: Peer, request: Request, command_id: int, reply: Reply) -> None:
-        self._link.send_frame(peer, encode_response(request.code, command_id, self.controller.conclude(reply)))
+        due = self.controller.conclude(request, reply)
+        if due is not reply:
+            self._log_refusal(request, due)
+        self._link.send_frame(peer, encode_response(request.code, command_id, due.response))
         if reply.ends_connection:
             self._link.drop(peer, "requested a reboot")
+
+    def _log_refusal(self, request: Request, reply: Reply) -> None:
+        if reply.refusal:
+            status = getattr(reply.response, "status", None)
+            facts = {"request": type(request).__name__, "phase": self.controller.phase_name}
+            self._link.log("refused", reply.refusal, status=getattr(status, "name", ""), **facts)

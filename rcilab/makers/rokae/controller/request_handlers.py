@@ -143,8 +143,10 @@ def describe_refusal(
     faults: Iterable[Fault],
 ) -> str:
     """Returns why a request was refused, for the log."""
-    why: object = _describe_phase(phase, safety_stop, faults)
-    if isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
+    why: object = None
+    if status.name == "INVALID_ARGUMENT":
+        why = _describe_argument(request, settings, arm)
+    elif isinstance(request, rci.StartMove) and phase is Phase.IDLE and status is rci.StartStatus.NOT_POSSIBLE:
         pair = f"controller mode {request.controller_mode} with motion mode {request.motion_mode}"
         why = f"there is no {pair}" if arm.commanded.is_stationary else _STILL_MOVING
     elif request.code in GROUNDED and Action.APPLY in transition(phase, request.code).actions:
@@ -155,8 +157,7 @@ def describe_refusal(
         why = arm.measured_state.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
         why = f"{_find_outside(settings, arm.measured_state)}: power off and on, then move it back"
-    if status.name == "INVALID_ARGUMENT":
-        why = _describe_argument(request, settings, arm)
+    why = why or _describe_phase(phase, safety_stop, faults)
     return f"refused {type(request).__name__} ({status.name.lower().replace('_', ' ')}): {why}"
 
 
@@ -175,6 +176,23 @@ def _describe_phase(phase: Phase, safety_stop: rci.SafetyStop, faults: Iterable[
 
 def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm) -> str:
     """Returns the value of a request that is out of its bounds."""
+    match request:
+        case rci.SetMotorPower(power=power):
+            return f"power {power} does not exist; 0 is off, 1 is on"
+        case rci.StartMove(controller_mode=mode) if mode >= ControllerMode.OTHER:
+            return f"controller mode {mode} does not exist; there are 0 to {ControllerMode.OTHER - 1}"
+        case rci.StartMove(motion_mode=mode):
+            return f"motion mode {mode} does not exist; there are 0 to {max(rci.StartMotionMode)}"
+        case rci.StartDrag(space=space) if space not in tuple(rci.DragSpace):
+            return f"space {space} does not exist; there are 0 to {max(rci.DragSpace)}"
+        case rci.StartDrag(type=kind):
+            return f"type {kind} does not exist; there are 0 to {max(rci.DragType)}"
+        case rci.GetDIState(signal=signal):
+            return f"signal {signal} does not exist; there are 0 to {SIGNAL_COUNT - 1}"
+        case rci.Connect(udp_port=port):
+            return f"UDP port {port} is below {LOWEST_CLIENT_PORT}"
+        case _:
+            pass
     try:
         apply_request(settings, request, arm.model.description)
     except InvalidValueError as error:
@@ -182,12 +200,12 @@ def _describe_argument(request: rci.Request, settings: Settings, arm: VirtualArm
     return f"a value does not exist: {request}"
 
 
-def conclude(reply: Reply, phase: Phase) -> rci.Response:
-    """Returns the answer that is due: for an interrupted recovery, the cause."""
+def conclude(reply: Reply, phase: Phase) -> rci.RecoveryStatus | None:
+    """Returns the status of a recovery that was interrupted before its answer was due; None for any other answer."""
     status = getattr(reply.response, "status", None)
-    if reply.when is When.AT_REST and isinstance(status, rci.RecoveryStatus):
-        return rci.StatusResponse(_RECOVERY_RESULTS.get(phase, rci.RecoveryStatus.ABORTED))
-    return reply.response
+    if reply.when is not When.AT_REST or not isinstance(status, rci.RecoveryStatus):
+        return None
+    return _RECOVERY_RESULTS.get(phase, rci.RecoveryStatus.ABORTED) or None
 
 
 _STOP_DESCRIPTIONS = {
@@ -198,7 +216,9 @@ _STILL_MOVING = "the arm still moves"
 _PHASE_DESCRIPTIONS = {
     Phase.OFF: "the motors are off",
     Phase.IDLE: "the robot is idle",
-    **dict.fromkeys((Phase.STARTING, Phase.MOVING, Phase.STOPPING), "a motion is in progress"),
+    Phase.STARTING: "a motion is starting",
+    Phase.MOVING: "a motion is in progress",
+    Phase.STOPPING: "the arm is still stopping after a motion",
     Phase.GUIDING: "the arm is guided by hand",
     Phase.RECOVERING: "an error recovery is in progress",
 }

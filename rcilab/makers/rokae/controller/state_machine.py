@@ -250,7 +250,7 @@ def _events(phase: Phase) -> dict[Trigger, Transition]:
     rows[E.SAFETY_STOP] = Transition(P.USER_STOPPED, (*faults, _modes_after(phase), A.DISCARD))
     if phase in (P.STARTING, P.GUIDING):
         rows[E.CLIENT_LOST] = Transition(P.IDLE, (A.HIDE_MODES, A.DISCARD))
-    elif phase in (P.MOVING, P.STOPPING):
+    elif phase is P.MOVING:  # After StopMove the queued commands are played: the vendor's client may leave at once.
         rows[E.CLIENT_LOST] = Transition(P.STOPPING, (A.HIDE_MODES, A.DISCARD))
     return rows
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import select
 import signal
@@ -12,6 +13,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime
 
 import pytest
 
@@ -64,7 +66,8 @@ def test_it_says_where_it_is_when_it_is_ready_and_ends_cleanly(number: signal.Si
         assert re.fullmatch(r"world 127\.0\.0\.2:\d+\n", process.stdout.readline())
         process.send_signal(number)
         output, errors = process.communicate(timeout=PATIENCE)
-        assert (process.returncode, output, errors) == (0, "", "")
+        assert (process.returncode, output) == (0, "")
+        assert all(re.search(r" s client 127\.0\.0\.1 (dis)?connected$", line) for line in errors.splitlines())
 
 
 def status_of(process: subprocess.Popen[str]) -> WorldStatus:
@@ -90,6 +93,23 @@ def test_the_faults_of_the_command_line_are_in_force() -> None:
     assert status.stalls == 1
 
 
+def test_with_json_each_line_of_the_log_is_an_object_and_stdout_stays_as_it_is() -> None:
+    options = ("--port", "0", "--lockstep", "--host", "0.0.0.0", "--log-format", "json")
+    with controller("--model", "xMate3", *options) as process:
+        found = re.fullmatch(r"listening rci://0\.0\.0\.0:(\d+) model=xMate3 plant=ideal\n", first_line(process))
+        assert found
+        with socket.create_connection(("127.0.0.1", int(found[1])), timeout=PATIENCE):
+            assert process.stderr is not None
+            lines = [json.loads(process.stderr.readline()) for _ in range(2)]
+        process.terminate()
+    warning, connected = lines
+    assert "reachable from outside" in warning["text"]
+    assert {**connected, "time": "", "t": 0.0} == {
+        "time": "", "t": 0.0, "kind": "connected", "text": "client 127.0.0.1 connected", "client": "127.0.0.1",
+    }  # fmt: skip
+    assert datetime.fromisoformat(connected["time"]).tzinfo is not None
+
+
 def test_without_a_world_there_is_no_second_line() -> None:
     with controller("--model", "xMate3", "--port", "0", "--lockstep", "--no-world") as process:
         assert first_line(process).startswith("listening ")
@@ -108,6 +128,7 @@ def test_without_a_world_there_is_no_second_line() -> None:
         ("--stall", "soon", r"--stall needs seconds, as 0\.05@2\.0.*, got 'soon'"),
         ("--stall", "9", "duration needs 0.001 to 5.*, got 9.0"),
         ("--stall", "0.5/0.1", "period needs .*, got 0.1"),
+        ("--log-format", "xml", "--log-format: 'xml' is unknown; known: text, json"),
         ("--limits", "none", "--limits: 'none' is unknown; known: manual, sdk"),
         ("--world-port", "70000", "--world-port: 70000 is not a valid port"),
     ],

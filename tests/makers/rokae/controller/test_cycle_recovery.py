@@ -60,12 +60,15 @@ def test_a_recovery_that_is_overtaken_by_an_emergency_stop_says_so(make_hand) ->
     hand.start()
     hand.command(hand.state.q_c + 6e-3)
     assert hand.cycle.phase is Phase.REFLEX
-    reply = hand.cycle.handle(rci.AutomaticErrorRecovery())
+    request = rci.AutomaticErrorRecovery()
+    reply = hand.cycle.handle(request)
     hand.step(5)
     hand.cycle.press_safety_stop(rci.SafetyStop.GSTOP)
     hand.step()
     assert hand.cycle.is_settled
-    assert hand.cycle.conclude(reply) == rci.StatusResponse(rci.RecoveryStatus.USER_STOP)
+    answer = hand.cycle.conclude(request, reply)
+    assert answer.response == rci.StatusResponse(rci.RecoveryStatus.USER_STOP)
+    assert answer.refusal == "refused AutomaticErrorRecovery (user stop): the safety gate is open"
 
 
 def test_power_off_in_mid_motion_is_one_controlled_stop_and_then_brakes(hand) -> None:

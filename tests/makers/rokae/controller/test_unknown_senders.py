@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import signal
 import socket
 import struct
@@ -23,7 +24,8 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import plan_joint
 from rcilab.sim import log_lines
 from rcilab.sim.channels import LOWEST_CLIENT_PORT
-from rcilab.sim.log_lines import LineHandler, LogLines, RateLimitedLog
+from rcilab.sim.log_entry import LogEntry
+from rcilab.sim.log_lines import ControllerLog, LogHandler, LogLines
 from tests.makers.rokae.controller.test_server import PATIENCE, Peer, Running, bind_udp, running
 from tests.waiting import wait_for
 
@@ -200,18 +202,19 @@ def test_a_connect_request_is_for_its_own_connection_and_for_ports_of_programs()
 
 
 def test_what_anybody_can_cause_is_written_once_in_a_while_and_summed_up():
-    written, now = [], 100.0
-    lines = RateLimitedLog(written.append, lambda: now)
+    entries, now = [], 100.0
+    log = ControllerLog(entries.append, lambda: now, lambda: 7)
     for number in range(1000):
-        lines.write("left", f"the client left {number}", "clients were lost")
-    lines.write("refused", "another kind", "were refused")
-    assert written == ["the client left 0", "another kind"]
+        log.write("client_dropped", f"the client left {number}")
+    log.write("refused", "another kind")
+    assert [entry.text for entry in entries] == ["the client left 0", "another kind"]
     now += 60.0
-    lines.write_counts()
-    assert written[2:] == ["999 more clients were lost within 10 s"]
-    for number in range(5):
-        lines.write("left", f"the client left {number}", "clients were lost", 3)
-    assert written[3:] == [f"the client left {number}" for number in range(3)]
+    log.write_counts()
+    assert [entry.text for entry in entries[2:]] == ["999 more clients were dropped within 10 s"]
+    assert entries[2].facts == {"count": 999}
+    for number in range(30):
+        log.write("refused", f"refused {number}")
+    assert [entry.text for entry in entries[3:]] == [f"refused {number}" for number in range(20)]
 
 
 def test_a_client_that_is_refused_again_and_again_fills_no_log(monkeypatch):
@@ -239,18 +242,22 @@ def test_connections_that_speak_no_rci_are_summed_up(sent):
 def test_lines_that_are_not_read_are_dropped_and_counted_and_do_not_block():
     reader, writer = os.pipe()
     lines = LogLines(writer)
+
+    def entry(text: str) -> LogEntry:
+        return LogEntry(kind="refused", text=text, cycle=1234, wall=0.0)
+
     began = time.monotonic()
     for number in range(20_000):
-        lines.write(f"line {number} " + "x" * 100)
+        lines.write(entry(f"line {number} " + "x" * 100))
     assert time.monotonic() - began < 5.0, "a pipe takes 64 kB, and then waits for ever"
     time.sleep(0.2)
     with os.fdopen(reader, "rb", buffering=0) as stream:
         said = b""
         while b"lines were dropped" not in said:
             said += stream.read(65536)
-            lines.write("the last one")
+            lines.write(entry("the last one"))
         lines.close()
-    assert said.startswith(b"rcilab controller: line 0 ")
+    assert re.match(rb"rcilab controller: \d\d:\d\d:\d\d\.\d\d\d 1\.234 s line 0 ", said)
 
 
 def test_a_controller_whose_stderr_is_never_read_goes_on_and_ends_when_it_is_told_to():
@@ -268,14 +275,15 @@ def test_a_controller_whose_stderr_is_never_read_goes_on_and_ends_when_it_is_tol
 
 def test_what_the_simulation_finds_odd_goes_the_way_of_all_lines(capfd: pytest.CaptureFixture[str]) -> None:
     """A warning of MuJoCo comes in the middle of a cycle."""
-    lines: list[str] = []
-    handler, log = LineHandler(lines.append), logging.getLogger("rcilab.sim")
+    entries: list[LogEntry] = []
+    handler = LogHandler(ControllerLog(entries.append, lambda: 0.0, lambda: 0))
+    log = logging.getLogger("rcilab.sim")
     log.addHandler(handler)
     try:
         log.warning("MuJoCo: %s", "odd")
     finally:
         log.removeHandler(handler)
-    assert lines == ["MuJoCo: odd"]
+    assert [(entry.kind, entry.text) for entry in entries] == [("warning", "MuJoCo: odd")]
     assert capfd.readouterr().err == ""
 
 
