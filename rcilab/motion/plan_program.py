@@ -61,7 +61,7 @@ def plan_program(
     noted in `motion.notes`.
 
     Args:
-        model: The arm; its tool applies if the program has none.
+        model: The arm; its tool and its load apply if the program has none.
         program: The waypoints.
         speed: Factor on the speed of every waypoint, above 0 to 1.
         start: Joint angles of the stationary arm, shape (n,), [rad]. If they differ from the program's start, a joint
@@ -81,8 +81,7 @@ def plan_program(
     """
     speed = _require_valid(model, program, speed, rounds, law, max_rows)
     count = len(program.waypoints)
-    if program.T_flange_tool is not None:
-        model = model.with_tool(program.T_flange_tool)
+    model = program.applied_to(model)
     done = 0.0
 
     def report(part: float) -> None:

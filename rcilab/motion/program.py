@@ -8,13 +8,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from os import PathLike
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from rcilab.core.arrays import as_vector, described
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
 from rcilab.motion.program_file import load_program, program_text, read_program, save_program
 from rcilab.motion.waypoint import Floats, Waypoint, angles_of, named_value, require_count, require_fit, vector_of
 from rcilab.robots import describe_robot
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
 
 _HEAD = '''"""Plans a program of rcilab and prints the report; `python SCRIPT OUT.npz` also saves the motion."""
 
@@ -27,11 +35,11 @@ program = Program(
 '''
 
 _TAIL = """
-model = rcilab.load_model(program.model)
+model = program.applied_to(rcilab.load_model(program.model))
 motion = rcilab.plan_program(model, program, law="torque_rate_limited")
 
 if __name__ == "__main__":
-    report = rcilab.check(motion, model)
+    report = rcilab.check(motion, model, box=program.safety_box)
     print(report)
     if len(sys.argv) > 1:
         motion.save(sys.argv[1])
@@ -58,6 +66,12 @@ class Program:
     tool: Floats | None = None
     """Pose of the tool in the flange frame, position [m] and wxyz, 7 numbers; None is the tool of the model passed
     to `plan_program`."""
+    payload: Floats | None = None
+    """The load at the flange: mass [kg], centre of mass in the flange frame [m] and, unless it is a point mass, inertia
+    about it in flange axes, row by row [kg m^2]; 4 or 13 numbers. None is the load of the model."""
+    box: Floats | None = None
+    """The safety box of the tool: edges [m], then the pose of its centre in base, position [m] and wxyz, 10 numbers.
+    None is no box."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isprintable():
@@ -82,11 +96,39 @@ class Program:
         if self.tool is not None:
             tool = as_vector(self.tool, 7, "tool", "position m, wxyz").tolist()
             object.__setattr__(self, "tool", (*vector_of("tool", tool[:3]), *vector_of("wxyz", tool[3:])))
+        if self.payload is not None:
+            count = 4 if np.size(self.payload) == 4 else 13
+            numbers = as_vector(self.payload, count, "payload", "kg, m, kg m^2").tolist()
+            object.__setattr__(self, "payload", tuple(numbers))
+            if payload_of(self.payload).mass > robot.rated_payload:
+                problem = f"kg is above {robot.rated_payload:g} kg, the payload {robot.name} is rated for"
+                raise InvalidValueError("payload", numbers[0], problem)
+        if self.box is not None:
+            box = as_vector(self.box, 10, "box", "edges m, position m, wxyz").tolist()
+            pose = (*vector_of("box position", box[3:6]), *vector_of("box wxyz", box[6:]))
+            object.__setattr__(self, "box", (*box[:3], *pose))
+            _ = self.safety_box
 
     @property
     def T_flange_tool(self) -> Pose | None:
         """The tool as a pose."""
         return None if self.tool is None else Pose(self.tool[:3], self.tool[3:])
+
+    @property
+    def safety_box(self) -> SafetyBox | None:
+        """The safety box."""
+        if self.box is None:
+            return None
+        try:
+            return SafetyBox(size=self.box[:3], T_base_box=Pose(self.box[3:6], self.box[6:]))
+        except InvalidValueError as error:
+            raise InvalidValueError("box", self.box, f"is not valid: {error}") from error
+
+    def applied_to(self, model: RobotModel) -> RobotModel:
+        """Returns the arm with the tool and the load of this program, each unless it is None."""
+        tool, payload = self.T_flange_tool, self.payload
+        changed = model if tool is None else model.with_tool(tool)
+        return changed if payload is None else changed.with_load(payload_of(payload))
 
     def to_json(self) -> str:
         """Returns the program as JSON, which `from_json` reads back exactly."""
@@ -135,9 +177,34 @@ class Program:
         return f"<Program{f' {self.name!r}' if self.name else ''} for {self.model}: {counts}>"
 
 
+def payload_of(payload: Floats) -> Payload:
+    """Returns the load of a program as a rigid body; see `Program.payload`."""
+    inertia = np.zeros((3, 3)) if len(payload) == 4 else np.reshape(payload[4:], (3, 3))
+    try:
+        return Payload(mass=payload[0], center_of_mass=np.array(payload[1:4]), inertia=inertia)
+    except InvalidValueError as error:
+        raise InvalidValueError("payload", payload, f"is not valid: {error}") from error
+
+
+def tool_numbers(tool: Pose) -> Floats:
+    """Returns a tool as in `Program.tool`."""
+    return (*tool.position.tolist(), *tool.wxyz.tolist())
+
+
+def payload_numbers(load: Payload) -> Floats:
+    """Returns a load as in `Program.payload`, 13 numbers."""
+    return (load.mass, *load.center_of_mass.tolist(), *load.inertia.ravel().tolist())
+
+
+def box_numbers(box: SafetyBox) -> Floats:
+    """Returns a safety box as in `Program.box`."""
+    return (*box.size, *box.T_base_box.position.tolist(), *box.T_base_box.wxyz.tolist())
+
+
 def program_script(program: Program) -> str:
     """Returns the script; numbers are exact, and text of the program appears only in string literals."""
-    head = [("name", program.name), ("model", program.model), ("tool", program.tool), ("start", program.start)]
+    head = [("name", program.name), ("model", program.model), ("tool", program.tool)]
+    head += [("payload", program.payload), ("box", program.box), ("start", program.start)]
     lines = [f"    {key}={value!a},\n" for key, value in head if value not in (None, "")]
     waypoints = "".join(f"        {_call(waypoint)},\n" for waypoint in program.waypoints)
     return _HEAD + "".join(lines) + f"    waypoints=(\n{waypoints}    ),\n)\n" + _TAIL

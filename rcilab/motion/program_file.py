@@ -26,15 +26,16 @@ VERSION = 1
 
 _EXCERPT_LENGTH = 40  # [characters] Of a value in an error message.
 _SCALARS = ("angle", "psi", "speed", "blend", "dwell")
-_PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "start", "waypoints")
+_PROGRAM_KEYS = ("format", "version", "name", "model", "tool", "payload", "box", "start", "waypoints")
 
 
 def program_text(program: Program) -> str:
     """Returns a program as JSON, one waypoint per line."""
     head = {"format": FORMAT, "version": VERSION, "name": program.name, "model": program.model}
     lines = [f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in head.items()]
-    if program.tool is not None:
-        lines.append(f'  "tool": {json.dumps(program.tool)}')
+    for key, numbers in (("tool", program.tool), ("payload", program.payload), ("box", program.box)):
+        if numbers is not None:
+            lines.append(f"  {json.dumps(key)}: {json.dumps(numbers)}")
     lines.append(f'  "start": {json.dumps(program.start)}')
     waypoints = ",\n".join(f"    {json.dumps(_as_json_object(waypoint))}" for waypoint in program.waypoints)
     lines.append(f'  "waypoints": [\n{waypoints}\n  ]')
@@ -115,7 +116,7 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
                 f"{name}, {key}", None, "is missing; a program has model, start and waypoints"
             ).coded("file_missing", file=name, key=key)
     texts = {key: _text(name, found[key], key) for key in ("name", "model") if key in found}
-    vectors = {key: _vector(name, found[key], key) for key in ("start", "tool") if key in found}
+    vectors = {key: _vector(name, found[key], key) for key in ("start", "tool", "payload", "box") if key in found}
     waypoint_list = found["waypoints"]
     if not isinstance(waypoint_list.value, list):
         raise InvalidValueError(
@@ -135,7 +136,8 @@ def read_program(content: bytes, name: str, build: Callable[..., P]) -> P:
     try:
         return build(waypoints=waypoints, **texts, **vectors)
     except InvalidValueError as error:
-        raise _with_line(error, name, found.get("tool" if error.name == "wxyz" else error.name, root)) from error
+        key = "tool" if error.name == "wxyz" else error.name.split()[0]  # "box wxyz" is about "box".
+        raise _with_line(error, name, found.get(key, root)) from error
 
 
 def _waypoint(node: Node, number: int, name: str, robot: RobotDescription) -> Waypoint:

@@ -557,7 +557,7 @@ def test_a_program_for_another_tool_is_planned_and_judged_with_it_and_not_execut
         line.pose @ Pose([0.0, 0.0, 0.1]).inverse() @ MODEL.T_flange_tool, 1e-6
     )
     bench.edit("tool")
-    assert bench.program.draft.has_tool_of(MODEL)
+    assert bench.program.draft.is_for(MODEL)
 
 
 def test_a_program_longer_than_any_motion_may_be_is_told_before_it_is_sampled(square):

@@ -31,6 +31,6 @@ def outdated(state: UiState) -> Message | None:
             return message("ready.program_fails")
         if program.planned is not None or not stale:  # Without a plan of its own it may be the program of this plan.
             return message("ready.program")
-    if plan.program is not None and not program.draft.has_tool_of(state.model):
+    if plan.program is not None and not program.draft.is_for(state.model):
         return message("ready.program_tool")
     return message("ready.stale", what=name_parts(stale)) if stale else None

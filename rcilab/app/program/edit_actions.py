@@ -71,7 +71,7 @@ class EditActions:
             "add": lambda: self._add(request), "start": self._start_here,
             "undo": self._history.undo, "redo": self._history.redo,
             "clear": lambda: self._history.change(Draft(model=self._draft.model), None),
-            "tool": lambda: self._history.change(replace(self._draft, tool=None), self._history.state.selected),
+            "tool": self._take_setup,
             "script": lambda: self._history.set(is_script_shown=not self._history.state.is_script_shown),
         }  # fmt: skip
         if request.what in whole:
@@ -108,6 +108,11 @@ class EditActions:
     @property
     def _draft(self) -> Draft:
         return self._history.draft
+
+    def _take_setup(self) -> None:
+        """Makes the program one for tool, load and safety box of the page."""
+        draft = replace(self._draft, tool=None, payload=None, box=None)
+        self._history.change(draft, self._history.state.selected)
 
     def _rename(self, request: TypeField) -> None:
         name = request.text.strip()

@@ -129,7 +129,12 @@ class ProgramActions:
         self._store.clear_problems(FILE_FIELD)
         draft = draft_of(program, self._store.state.model)
         self._history.change(draft, draft.steps[0].key)
-        self._store.notify("good", message("program.loaded", count=len(draft.steps), name=request.name[:LONGEST_NAME]))
+        loaded = message("program.loaded", count=len(draft.steps), name=request.name[:LONGEST_NAME])
+        other = self._describe_other_setup(draft)
+        if other is None:
+            self._store.notify("good", loaded)
+        else:
+            self._store.notify("warn", message("program.both", first=loaded, second=other))
 
     def restore(self, program: Program) -> None:
         """Restores a program of the previous workbench."""
@@ -189,6 +194,13 @@ class ProgramActions:
     def _refuse_file(self, why: Message) -> None:
         """Shows why a file was not loaded, until the next file, edit or plan."""
         self._store.set_problem(FILE_FIELD, why)
+
+    def _describe_other_setup(self, draft: Draft) -> Message | None:
+        """Returns in what a program differs from tool, load and safety box of the page, or None."""
+        state = self._store.state
+        is_other = not draft.is_for(state.model), draft.has_other_box(state.setup.wanted.box)
+        keys = ("program.other_arm", "program.other_box")
+        return _join([message(key) for key, other in zip(keys, is_other, strict=True) if other])
 
     def _drop_planning(self) -> bool:
         if self._planner.progress is None:

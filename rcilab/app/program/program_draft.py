@@ -9,10 +9,11 @@ import numpy as np
 
 from rcilab.app.goal.goal import Tone
 from rcilab.app.planning import Plan
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Message, Remark, message
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion.program import Program
+from rcilab.motion.program import Program, box_numbers, payload_numbers, payload_of, tool_numbers
 from rcilab.motion.waypoint import Floats, Waypoint, WaypointType
 
 TYPES: tuple[WaypointType, ...] = ("joint", "line", "arc")
@@ -47,6 +48,10 @@ class Draft:
     name: str = ""
     tool: Floats | None = None
     """Pose of the tool in the flange frame, as in `Program`; None: the tool of the page."""
+    payload: Floats | None = None
+    """The load, as in `Program`; None: that of the page."""
+    box: Floats | None = None
+    """The safety box of its file, as in `Program`; the page plans with its own."""
 
     def index(self, key: int | None) -> int | None:
         """Returns the index of a step, from 0, or None for an unknown key."""
@@ -78,10 +83,16 @@ class Draft:
         """Returns the draft with another waypoint in a step."""
         return replace(self, steps=tuple(Step(key, waypoint) if step.key == key else step for step in self.steps))
 
-    def program(self, model: RobotModel, upto: int | None = None) -> Program | None:
+    def program(self, model: RobotModel, upto: int | None = None, box: SafetyBox | None = None) -> Program | None:
         """Returns the program, or its part up to a step; None if it is empty.
 
-        The tool of the page is written into it, so that file and script describe the same motion anywhere.
+        Tool, load and safety box of the page are written into it, so that file and script describe the same motion
+        anywhere.
+
+        Args:
+            model: The arm of the page.
+            upto: Key of the last step; None: all.
+            box: The safety box of the page.
         """
         last = self.index(upto)
         steps = self.steps if last is None else self.steps[: last + 1]
@@ -89,16 +100,33 @@ class Draft:
             return None
         waypoints = tuple(step.waypoint for step in steps)
         return Program(
-            model=self.model, start=self.start, waypoints=waypoints, name=self.name, tool=self.tool or tool_of(model)
+            model=self.model,
+            start=self.start,
+            waypoints=waypoints,
+            name=self.name,
+            tool=self.tool or tool_numbers(model.T_flange_tool),
+            payload=self.payload or (payload_numbers(model.load) if model.load.mass > 0.0 else None),
+            box=self.box or (box_numbers(box) if box is not None and box.active else None),
         )
 
-    def has_tool_of(self, model: RobotModel) -> bool:
-        """Returns whether the program is for the tool of the page."""
-        return self.tool is None or self.arm(model).T_flange_tool.is_close(model.T_flange_tool)
+    def is_for(self, model: RobotModel) -> bool:
+        """Returns whether the program is for tool and load of the page."""
+        arm = self.arm(model)
+        numbers, here = payload_numbers(arm.load), payload_numbers(model.load)
+        same_load = self.payload is None or np.allclose(numbers, here, rtol=0.0, atol=1e-9)
+        return bool(same_load) and (self.tool is None or arm.T_flange_tool.is_close(model.T_flange_tool))
+
+    def has_other_box(self, box: SafetyBox | None) -> bool:
+        """Returns whether the program has a safety box, and the page another one or none."""
+        if self.box is None:
+            return False
+        here = None if box is None or not box.active else box_numbers(box)
+        return here is None or not np.allclose(self.box, here, rtol=0.0, atol=1e-9)
 
     def arm(self, model: RobotModel) -> RobotModel:
-        """Returns the arm with the tool that this program is for."""
-        return model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
+        """Returns the arm with the tool and the load that this program is for."""
+        changed = model if self.tool is None else model.with_tool(Pose(self.tool[:3], self.tool[3:]))
+        return changed if self.payload is None else changed.with_load(payload_of(self.payload))
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,21 +185,23 @@ def notes_of(plan: Plan, steps: tuple[Step, ...]) -> tuple[Note, ...]:
 
 
 def draft_of(program: Program, model: RobotModel) -> Draft:
-    """Returns a program as a draft; if it is for the tool of the page, it follows changes of that tool.
+    """Returns a program as a draft; if it is for tool and load of the page, it follows their changes.
 
     Args:
         program: The program.
         model: The arm of the page, with its tool.
     """
     steps = tuple(Step(next(_KEYS), waypoint) for waypoint in program.waypoints)
-    draft = Draft(model=program.model, start=program.start, steps=steps, name=program.name, tool=program.tool)
-    return replace(draft, tool=None) if draft.has_tool_of(model) else draft
-
-
-def tool_of(model: RobotModel) -> Floats:
-    """Returns the page's tool in the form of programs."""
-    T = model.T_flange_tool
-    return (*T.position.tolist(), *T.wxyz.tolist())
+    draft = Draft(
+        model=program.model,
+        start=program.start,
+        steps=steps,
+        name=program.name,
+        tool=program.tool,
+        payload=program.payload,
+        box=program.box,
+    )
+    return replace(draft, tool=None, payload=None) if draft.is_for(model) else draft
 
 
 def target_of(waypoint: Waypoint, arm: RobotModel) -> Pose | None:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rcilab.app.program.program_draft import Draft
     from rcilab.app.store import UiState
     from rcilab.control_process import SupervisorStatus
+    from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
 
 
@@ -25,7 +26,7 @@ class ProgramFilePanel:
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
-        self._made_of: tuple[Draft, RobotModel] | None = None
+        self._made_of: tuple[Draft, RobotModel, SafetyBox | None] | None = None
         self._program: Program | None = None
         self._script_text = ""
 
@@ -71,13 +72,14 @@ class ProgramFilePanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the program."""
         text, draft = self._text, state.program.draft
-        if self._made_of != (draft, state.model):
-            self._made_of, self._program = (draft, state.model), draft.program(state.model)
+        box = state.setup.wanted.box
+        if self._made_of != (draft, state.model, box):
+            self._made_of, self._program = (draft, state.model, box), draft.program(state.model, box=box)
             self._script_text = ""
         there = self._program is not None and draft.model == state.model.name
         self._save.disabled = self._clear.disabled = not there
         self._python.disabled = not there
-        self._tool.visible = there and not draft.has_tool_of(state.model)
+        self._tool.visible = there and (not draft.is_for(state.model) or draft.has_other_box(box))
         self._name.show(draft.name, state.problems.get(self._name.field), state.entered)
         labels = [(FILE_FIELD, text("program.load")), ("program.0.name", text("program.name"))]
         sentence = problems_html(state, text, labels)
