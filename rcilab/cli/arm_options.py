@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from argparse import ArgumentParser
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rcilab.core.errors import InvalidValueError
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from rcilab.core.spatial import Pose
     from rcilab.makers.configuration import SoftJointLimits
     from rcilab.model.dynamics.payload import Payload
+    from rcilab.model.robot_model import RobotModel
 
 JOINTS_FORM = "Q1,Q2,...[deg]"
 TOOL_FORM = "X,Y,Z[mm][,RX,RY,RZ[deg]]"
@@ -44,6 +46,24 @@ def add_arm_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--box", metavar=BOX_FORM, help="safety box: edges, and its centre in the base frame: 1,1,1@0.4,0,0.5"
     )
+
+
+def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
+    """Returns tool, load and safety box of an arm in one line; "" without any of them."""
+    from rcilab.core.spatial import IDENTITY
+
+    parts: list[str] = []
+    tool, load = model.T_flange_tool, model.load
+    if not tool.is_close(IDENTITY):
+        turns = [math.degrees(turn) for turn in tool.rpy]
+        turned = f" turned by {_listed(turns)} deg" if any(abs(turn) > 1e-6 for turn in turns) else ""
+        parts.append(f"tool {_listed(1e3 * tool.position)} mm{turned}")
+    if load.mass > 0.0:
+        parts.append(f"load {load.mass:g} kg at {_listed(1e3 * load.center_of_mass)} mm")
+    if box is not None:
+        edges = " x ".join(f"{1e3 * edge:g}" for edge in box.size)
+        parts.append(f"safety box {edges} mm around {_listed(1e3 * box.T_base_box.position)} mm")
+    return f"with {', '.join(parts)}" if parts else ""
 
 
 def parse_joints(text: str, count: int, option: str = "--start") -> tuple[float, ...]:
@@ -134,6 +154,10 @@ def parse_soft_limits(text: str, count: int, option: str = "--soft-limits") -> S
                 option, text, f"has an empty range {pair} for joint {joint}; the lower bound is first"
             )
     return SoftJointLimits(lower=lower, upper=upper)
+
+
+def _listed(numbers: Iterable[float]) -> str:
+    return ", ".join(f"{number:.6g}" for number in numbers)
 
 
 def _pose(text: str, part: str, option: str, form: str) -> Pose:

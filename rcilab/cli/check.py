@@ -1,34 +1,47 @@
-"""`rcilab check FILE --model NAME`: checks a motion or program in a file, and writes a slowed motion that conforms."""
+"""`rcilab check FILE`: checks a motion, a program or a recorded run, and writes a slowed motion that conforms."""
 
 from __future__ import annotations
 
 import os
 from argparse import ArgumentParser, Namespace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcilab.cli.arm_options import add_arm_options, describe_arm, parse_box, parse_load, parse_tool
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
 from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
+from rcilab.core.fault import name_faults
 from rcilab.i18n.locale import LANGUAGES
 
 if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
+    from rcilab.core.arrays import JointVector
+    from rcilab.core.safety_box import SafetyBox
+    from rcilab.core.spatial import Pose
+    from rcilab.core.state import Mode
+    from rcilab.model.dynamics.payload import Payload
+    from rcilab.model.robot_model import RobotModel
+    from rcilab.motion import Motion, Program
 
 
 def add_parser(subparsers: Any) -> None:
     """Adds the command to the `rcilab` parser."""
     parser: ArgumentParser = subparsers.add_parser(
         "check",
-        help="check a saved motion or program by the robot's conditions",
-        description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles) or on the "
-        "motion of a program (.json from Program.save). Exit code: 0 it conforms, or the written motion does; 1 it "
-        "does not; 2 the file or the model name is not valid, or the program cannot be planned.",
+        help="check a saved motion, program or recorded run by the robot's conditions",
+        description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles), on the "
+        "motion of a program (.json from Program.save), or on what the client of a recorded run (.rcirun) commanded: "
+        "the joint angles as sent, or for poses those that the controller commanded. Exit code: 0 it conforms, or the "
+        "written motion does; 1 it does not; 2 the file or the model name is not valid, or the program cannot be "
+        "planned.",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
+    parser.add_argument("file", type=Path, metavar="FILE", help=f"{HELP}, or recorded run (.rcirun)")
     parser.add_argument(
-        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); default for a program: its own"
+        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); default: that of the program or the run"
     )
+    add_arm_options(parser)
     parser.add_argument(
         "--slow-down",
         type=Path,
@@ -38,8 +51,8 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--mode",
         metavar="MODE",
-        default="joint_position",
-        help="command mode, which determines the conditions: %(default)s, cartesian_position, torque ...",
+        help="command mode, which determines the conditions: joint_position, cartesian_position, torque ...; default: "
+        "that of a recorded run, else joint_position",
     )
     add_max_rows(parser)
     form = parser.add_mutually_exclusive_group()
@@ -69,19 +82,16 @@ def run(args: Namespace) -> int:
 def _run(args: Namespace) -> int:
     from rcilab.cli.report_json import as_json_text, report_as_json
     from rcilab.conformance.check import check
-    from rcilab.model.robot_model import load_model
-    from rcilab.motion import Program
 
     out: Path | None = args.slow_down
     if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
         raise InvalidValueError("--slow-down", str(out), "is the file to check; choose another one")
-    found = read_file(args.file, args.max_rows)
-    name = found.model if args.model is None and isinstance(found, Program) else args.model
-    if name is None:
-        raise UsageError("a motion file does not name its arm: add --model NAME, such as --model xMatePro7")
-    model = load_model(name, tool=found.T_flange_tool if isinstance(found, Program) else None)
-    motion = as_motion(found, model, args.file, show=(lambda line: None) if args.json else show, max_rows=args.max_rows)
-    report = check(motion, model, mode=args.mode)
+    tell = (lambda line: None) if args.json else show
+    subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args)
+    motion, model = as_motion(subject.found, subject.model, args.file, show=tell, max_rows=args.max_rows), subject.model
+    for line in filter(None, (describe_arm(model, subject.box), subject.note)):
+        tell(f"note: {line}")
+    report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
     slowed = None if out is None else report.slow_down()
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)
@@ -95,6 +105,82 @@ def _run(args: Namespace) -> int:
                 show(f"written: {args.slow_down}")
     conforms = report.ok if slowed is None else slowed.motion is not None
     return 0 if conforms else 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Subject:
+    """What is checked, and for which arm."""
+
+    found: Motion | Program
+    model: RobotModel
+    box: SafetyBox | None
+    mode: Mode
+    start: JointVector | None = None
+    """Commanded joint angles before the first command, [rad]; None: those of the motion's start."""
+    note: str = ""
+
+
+def _read_motion(args: Namespace) -> _Subject:
+    from rcilab.model.robot_model import load_model
+    from rcilab.motion import Program
+    from rcilab.motion.program import box_numbers, payload_numbers, tool_numbers
+
+    found = read_file(args.file, args.max_rows)
+    tool, load, box = _arm_options(args)
+    if isinstance(found, Program):
+        found = replace(
+            found,
+            tool=found.tool if tool is None else tool_numbers(tool),
+            payload=found.payload if load is None else payload_numbers(load),
+            box=found.box if box is None else box_numbers(box),
+        )
+        model = found.applied_to(load_model(found.model if args.model is None else args.model))
+        box = found.safety_box
+    elif args.model is None:
+        raise UsageError("a motion file does not name its arm: add --model NAME, such as --model xMatePro7")
+    else:
+        model = load_model(args.model, tool=tool, load=load)
+    return _Subject(found=found, model=model, box=box, mode=args.mode or "joint_position")
+
+
+def _read_run(args: Namespace) -> _Subject:
+    from rcilab.core.state import MODES
+    from rcilab.model.robot_model import load_model
+    from rcilab.recording.run import load_run
+    from rcilab.recording.sent_motion import sent_motion
+
+    run = load_run(args.file, max_rows=args.max_rows)
+    tool, load, box = _arm_options(args)
+    if run.model is None and args.model is None:
+        raise UsageError("this run does not name its arm: add --model NAME, such as --model xMatePro7")
+    model = run.model
+    if model is None or args.model is not None:
+        own = {} if model is None else {"tool": model.T_flange_tool, "load": model.load}
+        model = load_model(args.model, **own)
+    model = model if tool is None else model.with_tool(tool)
+    model = model if load is None else model.with_load(load)
+    motion = sent_motion(run)
+    recorded = run.setup.mode if run.setup.mode in MODES else "joint_position"
+    ended = str(run.stopped or name_faults(run.faults))
+    notes = [f"the run was ended early: {ended}"] if ended else []
+    if run.truncated:
+        notes.append("the beginning of the run is missing, so that the motion begins with a jump")
+    return _Subject(
+        found=motion,
+        model=model,
+        box=box,
+        mode=args.mode or recorded,
+        start=None if run.truncated else run.q_c[0],
+        note="; ".join(notes),
+    )
+
+
+def _arm_options(args: Namespace) -> tuple[Pose | None, Payload | None, SafetyBox | None]:
+    return (
+        None if args.tool is None else parse_tool(args.tool),
+        None if args.load is None else parse_load(args.load),
+        None if args.box is None else parse_box(args.box),
+    )
 
 
 def _slow_down_as_json(slowed: SlowDown | None, file: Path | None) -> dict[str, Any]:

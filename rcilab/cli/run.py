@@ -6,8 +6,9 @@ import math
 import signal
 import sys
 import threading
+import warnings
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -30,8 +31,10 @@ if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate
     from rcilab.conformance.report import Report
     from rcilab.core.arrays import JointVector
+    from rcilab.core.safety_box import SafetyBox
     from rcilab.core.state import RobotState
     from rcilab.execution.session import RobotSession
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
     from rcilab.recording.run import Run
 
@@ -58,6 +61,11 @@ def add_parser(subparsers: Any) -> None:
         "--to-start",
         action="store_true",
         help="first clear a fault and move the arm to the start of the motion, with its own report and confirmation",
+    )
+    parser.add_argument(
+        "--apply",
+        action="store_true",
+        help="first send tool, load and safety box of the program to the controller; without it what differs is told",
     )
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
@@ -148,8 +156,8 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     """Appends the motions with their outcomes to `moves` and returns the name of the arm."""
     from rcilab.conformance.check import check
     from rcilab.execution.command_validation import find_start_mismatch
-    from rcilab.execution.session import connect
     from rcilab.model.robot_model import load_model
+    from rcilab.motion import Program
     from rcilab.recording.export import require_ending
 
     if args.save is not None:
@@ -158,8 +166,15 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             raise InvalidValueError("--save", str(args.save), "is in a folder that does not exist")
     found = read_file(args.file, args.max_rows)
     model = load_model(args.model) if args.model else None
-    with connect(args.robot, model, args.timeout) as robot:
-        show_note = partial(print, file=_text_stream(args))
+    box = None
+    if isinstance(found, Program):
+        model, box = found.applied_to(model or load_model(found.model)), found.safety_box
+    elif args.apply:
+        raise UsageError("--apply sends tool, load and safety box of a program, and a motion file has none")
+    show_note = partial(print, file=_text_stream(args))
+    with _connect(args, model, show_note) as robot:
+        if box is not None and args.apply:
+            robot.set_safety_box(box)
         motion = as_motion(found, robot.model, args.file, show=show_note, max_rows=args.max_rows)
         state = robot.state
         if motion.n != robot.model.n:
@@ -173,17 +188,29 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             motions = [motion]
         else:
             motions = [*_plan_to_start(motion, robot, state.q_c), motion]
-            report = check(motion, robot.model, start=motion.q[0])
+            report = check(motion, robot.model, start=motion.q[0], box=box)
             if not report.ok:  # Known before the arm moves to its start.
                 moves.append(_refuse(report, args))
                 motions = []
         if motions and args.to_start and state.faults:
             _recover(robot, state, args)
         for planned in motions:
-            _move(planned, robot, stopper, args, moves)
+            _move(planned, robot, stopper, args, moves, box if planned is motion else robot.safety_box)
             if moves[-1].outcome != "done":
                 break
         return robot.model.name
+
+
+def _connect(args: Namespace, model: RobotModel | None, tell: Callable[[str], None]) -> RobotSession:
+    """Returns a session; what differs from the model's tool and load is told."""
+    from rcilab.execution.session import connect
+
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        robot = connect(args.robot, model, args.timeout, apply=args.apply)
+    for warning in found:
+        tell(f"note: {warning.message}; rcilab run --apply sends tool, load and safety box of the program")
+    return robot
 
 
 def _show_json(
@@ -247,12 +274,19 @@ class _Move:
         return {"outcome": self.outcome, "report": report_as_json(self.report), "run": run}
 
 
-def _move(motion: Motion, robot: RobotSession, stopper: _Stopper, args: Namespace, moves: list[_Move]) -> None:
+def _move(
+    motion: Motion,
+    robot: RobotSession,
+    stopper: _Stopper,
+    args: Namespace,
+    moves: list[_Move],
+    box: SafetyBox | None,
+) -> None:
     """Checks a motion, shows the report, asks for confirmation, runs the motion, and appends it to `moves`."""
     from rcilab.conformance.check import check
 
     out = _text_stream(args)
-    report = check(motion, robot.model, start=robot.state.q_c)
+    report = check(motion, robot.model, start=robot.state.q_c, box=box)
     if not report.ok:
         moves.append(_refuse(report, args))
         return

@@ -7,7 +7,6 @@ import weakref
 import numpy as np
 
 from rcilab.control_process.launch import require_plant, start_controller
-from rcilab.core.spatial import IDENTITY
 from rcilab.execution.session import RobotSession, open_session
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
@@ -42,8 +41,9 @@ def simulate(
         assert controller.address is not None  # Set by start_controller.
         session = open_session(
             controller.address,
-            model.with_tool(IDENTITY),  # As the controller starts; the tool is set below.
+            model,
             ANSWER_TIMEOUT,
+            apply=True,
             record_all=record_all,
             realtime=not lockstep,
             state_timeout=STATE_TIMEOUT_IN_LOCKSTEP if lockstep else None,
@@ -55,14 +55,10 @@ def simulate(
         controller.end()
         raise
     try:
-        if not model.T_flange_tool.is_close(IDENTITY, 0.0):
-            session.set_tool(model.T_flange_tool)
         own, joint = load_model(model.name).limits.joint, model.limits.joint
         if not (np.array_equal(joint.lower, own.lower) and np.array_equal(joint.upper, own.upper)):
             soft = SoftJointLimits(lower=tuple(joint.lower.tolist()), upper=tuple(joint.upper.tolist()))
             session.configure(RobotConfiguration(joints=soft))
-        if model.load.mass > 0.0:
-            session.set_load(model.load.mass, model.load.center_of_mass, model.load.inertia)
     except BaseException:
         session.close()
         raise

@@ -14,12 +14,13 @@ from rcilab.core.command import CartesianPosition, Command, JointPosition, Joint
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.rotation import as_rotation9
-from rcilab.core.spatial import find_rotation_error
+from rcilab.core.spatial import IDENTITY, Pose, as_pose, find_rotation_error
 from rcilab.core.state import RobotState
 
 START_TOLERANCE = 1e-6  # [rad] or [m] Such an offset makes a jerk of 1000 rad/s^3, below every limit.
 _ARRIVED = 1e-12  # [rad] Commanded angles return over the wire unchanged, except for the sign of zero.
 _POSE_ARRIVED = 1e-9  # [m], or an element of a rotation: a controller may normalise the pose.
+_LONGEST_TOOL = 0.5  # [m] Tuning value: a longer one is another pose rather than another tool.
 _START_ADVICE = (
     "plan the motion from robot.state.q_c, or move the arm to its start first: "
     "robot.execute(plan_joint(robot.model, robot.state.q_c, motion.q[0]))"
@@ -78,7 +79,9 @@ def find_start_mismatch(start: JointVector, q_c: JointVector, advice: str = _STA
     )
 
 
-def require_start(command: Command, state: RobotState, limits: Limits, *, has_psi: bool) -> None:
+def require_start(
+    command: Command, state: RobotState, limits: Limits, *, has_psi: bool, T_flange_tool: Pose = IDENTITY
+) -> None:
     """Rejects a first command that differs from the commanded state: the arm would jump.
 
     Args:
@@ -86,6 +89,7 @@ def require_start(command: Command, state: RobotState, limits: Limits, *, has_ps
         state: The state for which it was computed.
         limits: Bounds of the arm: the first torques may differ from zero by one cycle's rate.
         has_psi: Whether the arm has a redundancy; its angle is then checked.
+        T_flange_tool: The tool of the controller, for the cause of a difference.
 
     Raises:
         InvalidValueError: It differs; the message names the joint, both values and the tolerance.
@@ -109,7 +113,7 @@ def require_start(command: Command, state: RobotState, limits: Limits, *, has_ps
                 "first command",
                 command.T_base_tool[:3, 3].tolist(),
                 f"must be the present pose: an element differs by {off:.3g} (tolerance {START_TOLERANCE:g}); "
-                "begin with state.T_base_tool_c",
+                f"begin with state.T_base_tool_c{_describe_other_tool(command, state, T_flange_tool)}",
             )
         if command.psi is not None and has_psi:
             off = abs(math.remainder(command.psi - state.psi_c, math.tau))
@@ -132,6 +136,19 @@ def require_start(command: Command, state: RobotState, limits: Limits, *, has_ps
                 f"N m must be near zero: joint {joint + 1} begins with {command.tau[joint]:.4g} N m, and the torque "
                 f"rate allows less than {bound:g} N m in the first cycle; begin with zeros, or set rate_limit='manual'",
             )
+
+
+def _describe_other_tool(command: CartesianPosition, state: RobotState, T_flange_tool: Pose) -> str:
+    """Returns which tool gives the commanded pose at the arm's angles, if that may be the cause of a difference."""
+    T_base_flange = state.T_base_tool_c @ T_flange_tool.inverse()
+    implied = (T_base_flange.inverse() @ as_pose(command.T_base_tool)).position
+    if float(np.linalg.norm(implied)) > _LONGEST_TOOL:
+        return ""
+    theirs, ours = (", ".join(f"{1e3 * x + 0.0:.1f}" for x in place) for place in (implied, T_flange_tool.position))
+    return (
+        f". If it was computed at the arm's present angles, then with a tool at ({theirs}) mm in the flange, but the "
+        f"controller has one at ({ours}) mm: robot.model has the controller's tool, robot.set_tool sets another"
+    )
 
 
 def distance_to(state: RobotState, command: Command, *, has_psi: bool) -> float:

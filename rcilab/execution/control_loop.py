@@ -429,7 +429,8 @@ class ControlLoop:
                 stage.begin(command)
             command = stage.step(command)
         if is_first:
-            require_start(command, state, self._limits, has_psi=self._has_psi)
+            tool = self._model.T_flange_tool
+            require_start(command, state, self._limits, has_psi=self._has_psi, T_flange_tool=tool)
         return command
 
     def _time(self, state: RobotState) -> float:

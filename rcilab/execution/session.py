@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import warnings
 import weakref
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -23,6 +24,7 @@ from rcilab.core.state import Mode, RobotState, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
 from rcilab.execution.control_loop import LOCAL_STATE_TIMEOUT, STATE_TIMEOUT, Callback
 from rcilab.execution.filters import CommandFilter, LowPass, RateLimiter
+from rcilab.execution.load_comparison import describe_other_load
 from rcilab.execution.motion_executor import MotionStream
 from rcilab.execution.motion_runner import (
     MotionProgress,
@@ -79,16 +81,27 @@ def open_sessions() -> list[RobotSession]:
 
 
 def connect(
-    address: str, model: RobotModel | None = None, timeout: float = 3.0, *, record_all: bool = False
+    address: str,
+    model: RobotModel | None = None,
+    timeout: float = 3.0,
+    *,
+    apply: bool = False,
+    record_all: bool = False,
 ) -> RobotSession:
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
+
+    Tool and load are settings of the controller, which change what the arm does: they are sent only with `apply`.
+    Without it a warning says in one sentence what differs from the model. The tool is known from the state. The load is
+    not: it is compared by the torques at standstill, which show 2 kg in most poses and may not show 0.5 kg; if they
+    cannot show the model's load, the warning says so.
 
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,
             `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`.
-        model: The arm, with its tool and load; None uses the arm that the controller reports. The tool is the
-            controller's: a warning reports a difference from the model's, which `robot.set_tool` sets.
+        model: The arm, with its tool and load; None uses the arm that the controller reports. Without `apply`, the
+            session's model has the controller's tool.
         timeout: Timeout of the connection, of the first state, and of every response, [s].
+        apply: Whether the model's tool and load are sent to the controller.
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
 
     Raises:
@@ -96,7 +109,7 @@ def connect(
         ModelError: The model differs from the controller's arm, or that arm is not known.
         InvalidValueError: The address, the model or the timeout is not valid.
     """
-    return open_session(address, model, timeout, record_all=record_all)
+    return open_session(address, model, timeout, apply=apply, record_all=record_all)
 
 
 def open_session(
@@ -104,6 +117,7 @@ def open_session(
     model: RobotModel | None,
     timeout: float,
     *,
+    apply: bool = False,
     record_all: bool = False,
     realtime: bool = True,
     state_timeout: float | None = None,
@@ -117,6 +131,7 @@ def open_session(
         address: See `connect`, also for the next three.
         model: The arm.
         timeout: [s].
+        apply: As for `connect`.
         record_all: As for `connect`.
         realtime: False for a controller in lock-step, which has no timing.
         state_timeout: Time without a state, while moving, that counts as a lost connection, [s]; None is
@@ -129,11 +144,15 @@ def open_session(
     require_timeout(timeout)
     if model is not None:
         require_driver(require_model(model))
+    elif apply:
+        raise InvalidValueError("apply", apply, "needs a model with the tool and the load to send")
     driver = open_driver(address, timeout, None if model is None else ExpectedArm.of(model))
     try:
         if model is None:
             model = load_model(driver.arm_name)
-        model = driver.with_tool(model)
+        if not apply:
+            model = driver.with_tool(model)
+            _warn_of_other_load(driver, model)
         if world is None and driver.simulation_address is not None:
             world = SimulationControl(*driver.simulation_address)
         exit_stack = ExitStack()
@@ -148,10 +167,21 @@ def open_session(
         runner = MotionRunner(
             driver, lock, arm, realtime=realtime, state_timeout=state_timeout, partner=partner, record_all=record_all
         )
-        return RobotSession(driver, arm, lock, runner, world)
+        session = RobotSession(driver, arm, lock, runner, world)
+        if apply:
+            session.configure(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
+        return session
     except BaseException:
         driver.close()
         raise
+
+
+def _warn_of_other_load(driver: StreamingDriver, model: RobotModel) -> None:
+    if driver.latest is None:
+        return
+    sentence = describe_other_load(model, driver.latest, driver.name)
+    if sentence:
+        warnings.warn(sentence, stacklevel=4)
 
 
 class RobotSession(Closeable):

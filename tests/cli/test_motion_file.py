@@ -128,5 +128,5 @@ def test_a_waypoint_that_cannot_be_planned_is_named_with_its_file_and_line(tmp_p
 def test_a_recorded_run_is_refused_with_the_command_that_shows_it(tmp_path, capsys):
     run = tmp_path / "mine.rcirun"
     run.write_bytes(b"of a run")
-    assert main(["check", str(run), "--model", "xMatePro7"]) == 2
+    assert main(["run", str(run), "--robot", "rci://127.0.0.1:1"]) == 2
     assert f"open it with `rcilab replay {run}`" in capsys.readouterr().err

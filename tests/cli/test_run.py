@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -249,3 +250,28 @@ def test_bad_input_is_one_line_and_exit_code_two(motion_file, capsys):
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 5
     assert "teach pendant" in lines[0]
+
+
+def test_tool_load_and_box_of_a_program_are_told_and_sent_with_apply(tmp_path, capsys):
+    controller = start_controller(MODEL.name, lockstep=True)
+    file = tmp_path / "program.json"
+    program = Program(
+        model=MODEL.name,
+        start=MODEL.home,
+        waypoints=(Waypoint.joint(GOAL, speed=1.0),),
+        tool=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0),
+        payload=(2.0, 0.0, 0.0, 0.0),
+        box=(2.0, 2.0, 2.0, 0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0),
+    )
+    program.save(file)
+    try:
+        assert main(["run", str(file), "--robot", controller.address, "--yes"]) == 0
+        told = capsys.readouterr().out
+        assert told.count("note: the tool of") == told.count("note: the load of") == 1
+        replace(program, start=tuple(GOAL), waypoints=(Waypoint.joint(MODEL.home, speed=1.0),)).save(file)
+        assert main(["run", str(file), "--robot", controller.address, "--yes", "--apply"]) == 0
+        assert "note:" not in capsys.readouterr().out
+        with connect(controller.address, program.applied_to(MODEL)) as robot:  # A difference would be a warning.
+            assert robot.state.tau[1] == pytest.approx(-57.52, abs=0.01)
+    finally:
+        controller.end()

@@ -5,14 +5,21 @@ from __future__ import annotations
 import math
 import socket
 import threading
+import warnings
+from collections.abc import Iterator
 
 import pytest
 
 from rcilab.cli import _build_parser
+from rcilab.control_process.launch import start_controller
+from rcilab.core.command import CartesianPosition
 from rcilab.core.errors import ConnectionLostError, DeadlineError, InvalidValueError, ModelError
+from rcilab.core.spatial import Pose
+from rcilab.execution.load_comparison import describe_other_load
 from rcilab.execution.session import connect
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.driver.identify import require_same_arm
+from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from tests.execution.peer import HOST, MODEL, Peer, Script, wave
 
@@ -104,3 +111,60 @@ def test_short_long_and_foreign_datagrams_are_ignored(make_robot):
     run = robot.control(wave(150))
     assert len(run.t) > 150
     assert robot.state.message_id > 1000
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    controller = start_controller(MODEL.name, lockstep=True)
+    assert controller.address is not None
+    yield controller.address
+    controller.end()
+
+
+def test_tool_and_load_are_sent_only_on_request_and_otherwise_compared_in_one_sentence(address: str) -> None:
+    loaded = MODEL.with_tool(Pose((0.0, 0.0, 0.12))).with_load(Payload(mass=2.0))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        with connect(address, loaded) as robot:
+            assert robot.state.tau[1] == pytest.approx(-45.14, abs=0.01)
+    tool, load = map(str, (warning.message for warning in found))
+    assert "the tool of rci://127.0.0.2" in tool
+    assert "120.0 mm" in tool
+    assert "at standstill joint 4 has -19.93 N m, the model -28.03 N m" in load
+    assert "which has a load of 2 kg" in load
+    assert all("apply=True" in sentence for sentence in (tool, load))
+    with connect(address, loaded, apply=True) as robot:
+        assert robot.state.tau[1] == pytest.approx(-57.52, abs=0.01)
+        assert robot.state.T_base_tool.is_close(loaded.forward(robot.state.q), 1e-9)
+    with connect(address, loaded):  # Now they are the same: no warning, which would be an error here.
+        pass
+    with pytest.warns(UserWarning, match="which has no load"), connect(address, MODEL):
+        pass
+    with connect(address, MODEL, apply=True) as robot:
+        assert robot.state.tau[1] == pytest.approx(-45.14, abs=0.01)
+        assert robot.state.T_base_tool.is_close(MODEL.forward(robot.state.q), 1e-9)
+
+
+def test_apply_needs_a_model() -> None:
+    with pytest.raises(InvalidValueError, match=r"apply.*needs a model"):
+        connect("rci://127.0.0.2:9", apply=True)
+
+
+def test_a_load_that_the_torques_do_not_show_is_said_to_be_unknown(address: str) -> None:
+    light = MODEL.with_load(Payload(mass=0.5))
+    with connect(address) as robot:
+        state = robot.state
+    assert "is not known" in describe_other_load(light, state, "robot")
+    assert describe_other_load(MODEL, state, "robot") == ""
+
+
+def test_a_pose_computed_with_another_tool_is_refused_with_that_cause(address: str) -> None:
+    with connect(address, MODEL.with_tool(Pose((0.0, 0.0, 0.12))), apply=True) as robot:
+        robot.power_on()
+        q = robot.state.q_c
+        with pytest.raises(InvalidValueError) as raised:
+            robot.control(lambda state, t: CartesianPosition(MODEL.forward(q).matrix), mode="cartesian_position")
+        robot.set_tool(Pose())
+    assert "with a tool at (0.0, 0.0, 0.0) mm in the flange, but the controller has one at (0.0, 0.0, 120.0) mm" in (
+        str(raised.value)
+    )

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -382,3 +383,34 @@ def test_too_many_waypoints_in_a_spoiled_file_are_one_kind_of_error(end: str):
     text = '{"waypoints": [' + ",".join(10_001 * ["1"]) + end
     with pytest.raises(InvalidValueError, match="waypoints must be 1 to 10000, got 10001"):
         Program.from_json(text.encode(), "program.json")
+
+
+def test_load_and_box_come_back_from_file_and_script_and_older_files_have_none(tmp_path):
+    program = replace(PROGRAM, payload=(2.0, 0.0, 0.0, 0.05), box=(1.0, 1.0, 2.0, 0.4, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0))
+    program.save(tmp_path / "a.json")
+    assert Program.load(tmp_path / "a.json") == program
+    validator().validate(json.loads(program.to_json()))
+    scope = {}
+    exec(program.to_python().split("model = ")[0], scope)
+    assert scope["program"] == program
+    arm = program.applied_to(MODEL)
+    assert (arm.load.mass, arm.load.center_of_mass.tolist()) == (2.0, [0.0, 0.0, 0.05])
+    assert program.safety_box.size == (1.0, 1.0, 2.0)
+    older = Program.from_json(PROGRAM.to_json())
+    assert (older.payload, older.box, older.safety_box) == (None, None, None)
+    assert older.applied_to(MODEL).load is MODEL.load
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('"payload": [99, 0, 0, 0]', "line 2, payload: .*rated for"),
+        ('"payload": [1, 0, 0]', "line 2, payload: .* needs .13,."),
+        ('"payload": [1, 0, 0, 50]', "line 2, payload: .*unit is metres"),
+        ('"box": [1, 1, 0, 0, 0, 0, 1, 0, 0, 0]', "line 2, box: .*above 0"),
+        ('"box": [1, 1, 1, 0, 0, 0, 2, 0, 0, 0]', "line 2, box wxyz: .*length 2"),
+    ],
+)
+def test_a_bad_load_or_box_is_refused_with_its_line(line, words):
+    with pytest.raises(InvalidValueError, match=words):
+        Program.from_json(lines(GOOD, head=f'"format": "rcilab program", "version": 1, {line}'))

@@ -25,11 +25,13 @@ from rcilab.app.run.readiness import may_go_back, may_plan_again, obstacle
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.control_process import SupervisorStatus
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint
+from rcilab.motion.program import payload_numbers
 from rcilab.workbench.panels.program_list import list_html, notes_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.scene.waypoint_markers import label_of, labels_of
@@ -589,3 +591,32 @@ def test_another_name_leaves_the_plan_as_it_is(square):
     assert outdated(square.state) is None
     square.edit("undo")
     assert square.program.draft.name == "square"
+
+
+def test_load_and_box_of_a_file_survive_the_page_and_what_differs_from_setup_is_told(bench):
+    box = (1.0, 1.0, 2.0, 0.4, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0)
+    step = Waypoint.joint(MODEL.home + 0.1)
+    payload = payload_numbers(Payload(mass=2.0))
+    bench.load(Program(model=MODEL.name, start=MODEL.home, waypoints=(step,), payload=payload, box=box))
+    said = Text("en").render(bench.state.notices[-1].text)
+    assert "different tool or load than in Setup" in said
+    assert "safety box is not that of Setup" in said
+    saved = bench.program.draft.program(MODEL)
+    assert (saved.payload, saved.box) == (payload, box)
+    bench.plan()
+    assert bench.state.plan.model.load.mass == 2.0
+    status = SimpleNamespace(
+        phase="idle", code="idle", powered=True, is_pressed=False, q_c=HOME, setup=RobotConfiguration()
+    )
+    assert obstacle(bench.state, status).code == "ready.program_tool"
+    bench.edit("tool")
+    assert bench.program.draft.is_for(MODEL)
+    assert not bench.program.draft.has_other_box(None)
+
+
+def test_a_saved_program_has_load_and_box_of_the_page(square):
+    loaded = MODEL.with_load(Payload(mass=1.5))
+    box = SafetyBox(size=(1.0, 1.0, 1.0), T_base_box=Pose((0.4, 0.0, 0.5)))
+    saved = square.program.draft.program(loaded, box=box)
+    assert saved.payload[0] == 1.5
+    assert saved.safety_box.size == box.size

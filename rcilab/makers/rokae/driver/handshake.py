@@ -65,7 +65,8 @@ def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
     if not mine.is_close(IDENTITY, 0.0):
         warnings.warn(
             f"the tool of {link.name} is {1e3 * off:.1f} mm and {math.degrees(turned):.1f} deg from the model's; the "
-            "session goes on with the controller's. robot.set_tool(model.T_flange_tool) sets the model's",
-            stacklevel=4,
+            "session goes on with the controller's. robot.set_tool(model.T_flange_tool), or connect(..., apply=True), "
+            "sends the model's",
+            stacklevel=5,
         )
     return model.with_tool(tool)

@@ -1,0 +1,67 @@
+"""What a client commanded in a recorded run, as a motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array, JointPath
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import state_cycles
+from rcilab.core.errors import UsageError
+from rcilab.motion.motion import Motion
+
+if TYPE_CHECKING:
+    from rcilab.recording.run import Run
+
+
+def sent_motion(run: Run) -> Motion:
+    """Returns the motion that a client commanded, on the grid of the controller's cycles.
+
+    It has the joint angles as they were sent; if poses of the tool were sent, the joint angles that the controller
+    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them.
+
+    Raises:
+        UsageError: Nothing was commanded, or torques were.
+    """
+    rows = run.cycles
+    if np.isfinite(rows["command_pose"]).any():
+        return run.commanded()
+    sent = rows[np.isfinite(rows["command"]).all(axis=1)]
+    if not len(sent):
+        what = "torques were sent, which have no path" if np.isfinite(rows["command_tau"]).any() else "nothing was sent"
+        raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
+    period = state_cycles(rows)
+    index = np.rint((sent["t"] - sent["t"][0]) / (period * CYCLE_TIME)).astype(np.intp)
+    index, first = np.unique(index, return_index=True)
+    motion = Motion.from_cycles(_fill_gaps(index, sent["command"][first]), period)
+    lost = int(index[-1]) + 1 - len(index)
+    return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
+
+
+def _fill_gaps(index: NDArray[np.intp], q: JointPath) -> JointPath:
+    """Returns one row for every cycle; in a gap, those of the cubic through the two rows before and after it.
+
+    Args:
+        index: Number of the cycle of each row, ascending, shape (N,).
+        q: The rows, shape (N, n), [rad].
+    """
+    full = np.empty((int(index[-1]) + 1, q.shape[1]))
+    full[index] = q
+    for last in np.flatnonzero(np.diff(index) > 1).tolist():
+        around = slice(max(last - 1, 0), last + 3)
+        missing = np.arange(index[last] + 1, index[last + 1])
+        full[missing] = _lagrange_weights(missing, index[around]) @ q[around]
+    return full
+
+
+def _lagrange_weights(x: Array | NDArray[np.intp], nodes: NDArray[np.intp]) -> Array:
+    """Returns the weight of each node in the polynomial through all of them at x, shape (len(x), len(nodes))."""
+    weights = np.ones((len(x), len(nodes)))
+    for column, node in enumerate(nodes):
+        for other in np.delete(nodes, column):
+            weights[:, column] *= (x - other) / (node - other)
+    return weights

@@ -1,0 +1,139 @@
+"""`rcilab check` of recorded runs, and with tool, load and safety box on the command line."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcilab.cli import main
+from rcilab.control_process.simulate import simulate
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.robot_model import load_model
+from rcilab.motion import Motion, Program, Waypoint, plan_joint
+from rcilab.motion.program import box_numbers
+from rcilab.recording.run import build_run
+from rcilab.recording.sent_motion import sent_motion
+from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles, some_run
+
+BOX = SafetyBox(size=(2.0, 2.0, 2.0), T_base_box=Pose((0.0, 0.0, 0.5)))
+
+
+def run_of(cycles: np.ndarray, **facts):
+    return build_run(cycles, plan=None, model=MODEL, setup=SETUP, **facts)
+
+
+def report_of(capsys, *argv: str) -> tuple[int, dict]:
+    code = main(["check", *argv, "--json"])
+    return code, json.loads(capsys.readouterr().out)
+
+
+def row(report: dict, condition: str) -> dict:
+    return next(entry for entry in report["conditions"] if entry["id"] == condition)
+
+
+def test_a_run_is_checked_with_its_own_arm_tool_and_load(tmp_path, capsys):
+    run_of(some_cycles()).save(tmp_path / "a.rcirun")
+    assert main(["check", str(tmp_path / "a.rcirun")]) == 0
+    said = capsys.readouterr().out
+    assert "note: with tool 0, 10, 120 mm turned by" in said
+    assert "load 1.5 kg at 0, 0, 0 mm" in said
+    assert "xMatePro7" in said
+
+
+def test_what_was_sent_is_checked_not_the_plan_and_not_what_the_controller_made_of_it(tmp_path, capsys):
+    cycles = some_cycles().copy()
+    cycles["command"][200, 3] += 5e-4
+    build_run(cycles, plan=PLAN, model=MODEL, setup=SETUP).save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 1
+    worst = report["violations"][0]
+    assert (worst["place"], worst["worst_time"]) == ("joint 4", pytest.approx(0.2, abs=2.1e-3))
+
+
+def test_lost_commands_are_interpolated_without_a_step(tmp_path):
+    cycles = some_cycles().copy()
+    cycles["command"][150:153] = cycles["command"][300] = np.nan
+    motion = sent_motion(run_of(cycles))
+    np.testing.assert_allclose(motion.q, PLAN.q, atol=2e-8)  # 0.1 of the step that 100 rad/s^3 makes in 3 ms.
+    assert motion.notes == ("4 commands did not arrive and are interpolated",)
+    assert sent_motion(run_of(some_cycles())).notes == ()
+
+
+def test_the_first_command_is_compared_with_the_state_before_it(tmp_path, capsys):
+    cycles = some_cycles().copy()
+    cycles["q_c"] -= 0.01
+    run_of(cycles).save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 1
+    assert report["violations"][0]["time"] <= 0.001
+
+
+def test_a_run_of_poses_is_checked_by_the_angles_that_the_controller_commanded(tmp_path, capsys):
+    model = load_model("xMatePro7")
+    motion = plan_joint(model, model.home, model.home + 0.05, speed=0.1)
+    with simulate(model) as robot:
+        robot.power_on()
+        robot.execute(plan_joint(model, robot.state.q_c, model.home))
+        robot.execute(motion, mode="cartesian_position").save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 0
+    assert "cartesian_position" in report["title"]
+    assert row(report, "cartesian.velocity.translation")["value"] > 0.0
+
+
+def test_a_run_of_torques_is_refused_in_one_sentence(tmp_path, capsys):
+    cycles = some_cycles().copy()
+    cycles["command"], cycles["command_tau"] = np.nan, 0.0
+    run_of(cycles).save(tmp_path / "a.rcirun")
+    assert main(["check", str(tmp_path / "a.rcirun")]) == 2
+    assert "torques were sent" in capsys.readouterr().err
+
+
+def test_why_a_run_ended_early_is_told_with_its_report(tmp_path, capsys):
+    some_run(stopped="on request").save(tmp_path / "a.rcirun")
+    assert main(["check", str(tmp_path / "a.rcirun")]) == 0
+    assert "the run was ended early: on request" in capsys.readouterr().out
+
+
+def test_options_take_the_place_of_the_tool_the_load_and_the_box_of_a_file(tmp_path, capsys):
+    file = tmp_path / "a.csv"
+    Motion.from_cycles(PLAN.q).save(file)
+    argv = [str(file), "--model", "xMatePro7", "--mode", "cartesian_position"]
+    _, short = report_of(capsys, *argv)
+    _, long = report_of(capsys, *argv, "--tool", "0,0,300mm", "--load", "3@0,0,100mm", "--box", "2,2,2@0,0,0.5")
+    speed = "cartesian.velocity.translation"
+    assert abs(row(long, speed)["value"]) > 1.1 * abs(row(short, speed)["value"])
+    assert {entry["id"] for entry in long["conditions"]} - {entry["id"] for entry in short["conditions"]} == {
+        "cartesian.position"
+    }
+    heavy = report_of(capsys, str(file), "--model", "xMatePro7", "--load", "3@0,0,100mm")[1]
+    light = report_of(capsys, str(file), "--model", "xMatePro7")[1]
+    assert abs(row(heavy, "joint.torque")["value"]) > 1.1 * abs(row(light, "joint.torque")["value"])
+    assert main(["check", *argv, "--tool", "0,0"]) == 2
+    assert "--tool: '0,0' is not of the form" in capsys.readouterr().err
+
+
+def test_a_program_file_is_checked_with_its_own_load_and_box(tmp_path, capsys):
+    model = load_model("xMatePro7")
+    program = Program(
+        model=model.name,
+        start=model.home,
+        waypoints=(Waypoint.joint(model.home + 0.1),),
+        tool=(0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 0.0),
+        payload=(2.0, 0.0, 0.0, 0.05),
+        box=box_numbers(BOX),
+    )
+    program.save(tmp_path / "a.json")
+    assert main(["check", str(tmp_path / "a.json")]) == 0
+    assert "with tool 0, 0, 100 mm, load 2 kg at 0, 0, 50 mm, safety box 2000 x 2000 x 2000 mm around 0, 0, 500 mm" in (
+        capsys.readouterr().out
+    )
+    tool = program.applied_to(model).forward(model.home)
+    narrow = SafetyBox(size=(0.02, 0.02, 0.02), T_base_box=tool)
+    replace(program, box=box_numbers(narrow)).save(tmp_path / "a.json")
+    assert main(["check", str(tmp_path / "a.json")]) == 1
+    assert main(["check", str(tmp_path / "a.json"), "--box", "2,2,2@0,0,0.5"]) == 0
