@@ -24,6 +24,8 @@ OTHER_STATE_FIELDS = (
     "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
 )  # fmt: skip
 """Further fields of a complete row: the rest of the state, plain numbers last."""
+PLAYOUT_FIELDS = ("motion", "played", "queued", "missed", "late")
+"""Further fields of a row that a virtual controller records: what it did with the commands of its client."""
 
 _POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
 _SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
@@ -36,7 +38,7 @@ _SCREWS = {
 """Units of fields with three linear and three angular components."""
 
 
-def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
+def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.dtype[np.void]:
     """Returns the layout of one recorded cycle of an arm with n joints.
 
     ======================  ==================================================================================
@@ -62,11 +64,22 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
     ======================  ==================================================================================
 
     A complete row continues with the rest of the state, `OTHER_STATE_FIELDS`, named as in `RobotState`. A field that is
-    missing in a file of an earlier version is NaN.
+    missing in a file of an earlier version is NaN. A row that a virtual controller recorded ends with `PLAYOUT_FIELDS`:
+
+    ======================  ==================================================================================
+    motion                  number of the motion of its client, from 1; 0 outside
+    played                  message_id of the row with the command that was played in this cycle; 0: none
+    queued                  commands left in the queue
+    missed                  1: the motion was in progress and no command was there for this cycle
+    late                    commands of this motion so far that came after their cycle and were dropped
+    ======================  ==================================================================================
+
+    There, received_ns is when the state was sent, sent_ns when its answer arrived, and lateness the time between them.
 
     Args:
         n: Number of joints.
         complete: Whether a row holds every field of the state.
+        playout: Whether a row holds what the controller did with the commands.
     """
     vector = ("<f8", (n,))
     return np.dtype(
@@ -92,6 +105,7 @@ def cycle_dtype(n: int, *, complete: bool = False) -> np.dtype[np.void]:
             ("command_psi", "<f8"),
             ("command_tau", *vector),
             *((name, "<f8", _shape(name, n)) for name in STATE_FIELDS + (OTHER_STATE_FIELDS if complete else ())),
+            *((name, "<u8") for name in (PLAYOUT_FIELDS if playout else ())),
         ]
     )
 

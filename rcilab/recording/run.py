@@ -24,6 +24,7 @@ from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
 from rcilab.recording.data_frame import to_pandas
 from rcilab.recording.export import save_run
+from rcilab.recording.playout import played_joints, playout_delay
 from rcilab.recording.run_file import decode_content, read_run
 from rcilab.recording.run_html import run_html
 from rcilab.recording.run_setup import Setup
@@ -199,7 +200,12 @@ class Run:
 
     @property
     def delay(self) -> int:
-        """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1."""
+        """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1.
+
+        A virtual controller records which command it played in which cycle; then it is the usual distance of both.
+        """
+        if "played" in (self.cycles.dtype.names or ()):
+            return playout_delay(self.cycles)
         reference = self.command
         if self.plan is not None and not np.isfinite(reference).any():  # Poses were sent: take the planned angles.
             reference = self._planned(0)
@@ -255,13 +261,16 @@ class Run:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
 
         Used in place of a plan, for drawing and checking, if a callback moved the arm. Lost cycles are interpolated
-        linearly.
+        linearly. Where a virtual controller recorded which commands it played, these are taken, up to one that it
+        refused.
 
         Raises:
             UsageError: No cycle was recorded.
         """
         if not len(self.t):
             raise UsageError("this run has no cycle: nothing was commanded")
+        if "played" in (self.cycles.dtype.names or ()):
+            return Motion.from_cycles(played_joints(self.cycles))
         times = self.t - self.delay * CYCLE_TIME
         grid = CYCLE_TIME * np.arange(max(round(float(times[-1]) / CYCLE_TIME), 0) + 1)
         return Motion.from_cycles(np.stack([np.interp(grid, times, column) for column in self.q_c.T], axis=1))

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited
-from rcilab.core.cycle_log import OTHER_STATE_FIELDS, STATE_FIELDS, cycle_dtype
+from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
@@ -376,7 +376,11 @@ def _layout_for(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
     if theirs.get("faults") == np.dtype("<u4"):  # Written by the first versions.
         theirs["faults"] = np.dtype("<u8")
     n = theirs["q"].shape[0] if "q" in theirs else 0
-    ours = cycle_dtype(n, complete=any(name in theirs for name in OTHER_STATE_FIELDS))
+    ours = cycle_dtype(
+        n,
+        complete=any(name in theirs for name in OTHER_STATE_FIELDS),
+        playout=any(name in theirs for name in PLAYOUT_FIELDS),
+    )
     known = _stored_fields(ours)
     if not theirs.items() <= known.items() or known.keys() - theirs.keys() - _OPTIONAL_FIELDS:
         raise ValueError("its cycles have other fields than this version writes")

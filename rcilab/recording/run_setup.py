@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 
@@ -19,6 +20,10 @@ class Setup:
     """Control mode, such as "joint_position"."""
     started_ns: int = 0
     """Start of the run, nanoseconds since 1970 (UTC); 0: not known."""
+    client: str = ""
+    """Address of the program that commanded it, where a virtual controller recorded the run; "" for rcilab itself."""
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """Settings of the controller in force, in SI units, where it recorded the run."""
 
     @property
     def started(self) -> str:
@@ -36,4 +41,4 @@ class Setup:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Setup:
         """Returns the setup from the data of `as_dict`; fields of a later version are ignored."""
-        return cls(**{field.name: values[field.name] for field in fields(cls) if field.name in values})
+        return cls(**{item.name: values[item.name] for item in fields(cls) if item.name in values})

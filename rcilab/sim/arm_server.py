@@ -19,6 +19,7 @@ import os
 from collections.abc import Callable
 
 from rcilab.core.clock import CYCLE_TIME, SystemClock
+from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode, name_faults
 from rcilab.realtime.cpu_latency import CpuLatencyLock
@@ -36,6 +37,7 @@ from rcilab.sim.arrivals import (
 from rcilab.sim.channels import Peer
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.cycle_capture import CycleCapture
 from rcilab.sim.cycle_timer import CycleTimer
 from rcilab.sim.endpoint import CLOSED, Endpoint
 from rcilab.sim.environment import Environment, ServerCounters
@@ -66,6 +68,7 @@ class ArmServer:
     Attributes:
         controller: The controller without its wire; owned by the thread that runs.
         bad_datagrams: Number of malformed datagrams of the client.
+        ring: Every cycle, with the commands of the client; None unless the configuration asks for it.
 
     Args:
         server: The maker's part: channels, codec, behaviour.
@@ -108,8 +111,13 @@ class ArmServer:
             self._stalls,
             self._clock,
             lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.unknown_senders),
+            lambda: -1 if self.ring is None else self.ring.descriptor,
         )
+        self.ring: CycleRing | None = None
+        self._capture: CycleCapture | None = None
         self._simulation_port = self._open_simulation_port()
+        if config.is_recorded:
+            self._begin_record()
 
     @property
     def missed(self) -> int:
@@ -175,6 +183,24 @@ class ArmServer:
         self._endpoint.close()
         if self._simulation_port is not None:
             self._simulation_port.close()
+        if self.ring is not None:
+            self.ring.close()
+
+    def _begin_record(self) -> None:
+        controller, config = self.controller, self.config
+        facts = {"model": controller.arm.model.name, "plant": controller.arm.plant.kind, "url": self.url}
+        try:
+            self.ring = CycleRing.create(controller.arm.model.n, {**facts, "realtime": not config.lockstep})
+        except UsageError:
+            self.close()
+            raise
+        settings = {
+            "prefill": config.prefill_cycles,
+            "lost_limit": config.lost_limit,
+            "limit_table": controller.limit_table,
+            "lockstep": config.lockstep,
+        }
+        self._capture = CycleCapture(self.ring, controller, lambda: settings)
 
     def _open_simulation_port(self) -> SimulationPort | None:
         if self.config.world_port is None:
@@ -299,6 +325,8 @@ class ArmServer:
         else:
             self._clock.sleep_until(due)
         self._server.send_states()
+        if self._capture is not None:
+            self._capture.write()
         if self.controller.is_moving is not was_moving and not self.config.lockstep:
             self._log_slip()
         self._server.settle()
@@ -323,6 +351,8 @@ class ArmServer:
         for _ in range(extra):
             if self.controller.wants_commands:
                 self._advance(is_sent=False)
+                if self._capture is not None:
+                    self._capture.write()
 
     def _log_event(self, kind: str, text: str, **facts: object) -> None:
         """Logs an event of the maker's controller, after the fault that caused it."""
@@ -372,6 +402,8 @@ class ArmServer:
                     self._server.connect(peer)  # First: it sends a state, for which the client may wait only briefly.
                     self._log.write("connected", f"client {peer.address} connected", client=peer.address)
                     self._warn_of_other_target(peer.address)
+                    if self._capture is not None:
+                        self._capture.connect(peer.address)
                 case ClientDisconnected(peer, reason):
                     self._handle_disconnect(peer, reason)
                 case ExtraSocketsReady(sockets):
@@ -406,6 +438,8 @@ class ArmServer:
     def _handle_disconnect(self, peer: Peer, reason: str) -> None:
         phase = self.controller.phase_name
         if self._server.disconnect(peer):
+            if self._capture is not None:
+                self._capture.disconnect(reason)
             text, kind = f"client {peer.address} {reason} during a motion: the arm stops", "client_lost"
         elif reason == CLOSED:
             text, kind = f"client {peer.address} disconnected", "disconnected"

@@ -82,6 +82,8 @@ class ControllerConfig:
     """TCP port of the simulation port, on loopback; 0: any free one; None: no simulation port."""
     log_format: LogFormat = "text"
     """Lines of the log on stderr: text, or one JSON object each."""
+    is_recorded: bool = False
+    """Whether every cycle is written to shared memory, for recorders and pages that watch."""
     realtime: bool = True
     """Whether to request SCHED_FIFO and locked memory; never in lock-step, which has no deadlines."""
     parent_pid: int | None = None

@@ -6,6 +6,7 @@ runs with the same requests at the same cycles have the same result.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -62,6 +63,7 @@ class Environment:
         stalls: Stalls of its clock.
         clock: Clock for the stalls.
         counters: Returns the counters of the server.
+        record: Returns the descriptor of the record of all cycles; -1 without one.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Environment:
         stalls: StallSchedule,
         clock: Clock,
         counters: Callable[[], ServerCounters],
+        record: Callable[[], int] = lambda: -1,
     ) -> None:
         self._controller = controller
         self._plant = controller.arm.plant
@@ -78,6 +81,7 @@ class Environment:
         self._stalls = stalls
         self._clock = clock
         self._counters = counters
+        self._record = record
         self._push = ForceProfile()
         self._has_walls = False
         self._walls: SafetyBox | None = None
@@ -170,6 +174,8 @@ class Environment:
             auto_limit=controller.auto_limit,
             commands=commands,
             states=states,
+            pid=os.getpid(),
+            record=self._record(),
         )
 
 

@@ -11,6 +11,7 @@ from typing import Protocol
 
 from rcilab.core.fault import FaultCode
 from rcilab.core.safety_box import SafetyBox
+from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.channels import Channel, ClientLink, Peer
@@ -50,6 +51,11 @@ class SimulatedController(Protocol):
     @property
     def arm(self) -> VirtualArm:
         """The arm, with its sensors and the queue of commands."""
+        ...
+
+    @property
+    def state(self) -> RobotState:
+        """The last state."""
         ...
 
     @property

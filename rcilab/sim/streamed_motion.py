@@ -7,7 +7,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
 from rcilab.sim.generators.motion_limits import MotionMode
-from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer
+from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer, Playback
 from rcilab.sim.violations import ArmCondition, ArmViolation
 
 PREFILL = 10  # [cycles] Pauses of client and network that are absorbed, and the delay of commands. On one busy
@@ -23,6 +23,7 @@ class StreamedMotion:
     Attributes:
         playout: The queue of commands, with its counts.
         is_followed: Whether commands are played: from `begin` to `discard`, or until `drain` has played the queue.
+        playback: The output of the queue in the last `step`; None: it had none.
 
     Args:
         prefill: Cycles between the first command and its play-out.
@@ -33,6 +34,7 @@ class StreamedMotion:
     def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
+        self.playback: Playback | None = None
         self.mode = MotionMode(ControlLaw.POSITION, False)
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
@@ -67,6 +69,7 @@ class StreamedMotion:
     def step(self) -> GeneratorOutput | None:
         """Plays the command that is due in this cycle; None without one. Do not follow an output with violations."""
         playout = self.playout
+        self.playback = None
         if self._drain is not None:
             self._drain = self._drain - 1 if len(playout) else 0
             if self._drain == 0:
@@ -74,7 +77,7 @@ class StreamedMotion:
                 return None
         generator = self._generator
         assert generator is not None  # `begin` has set it.
-        playback = playout.take(generator.is_next)
+        playback = self.playback = playout.take(generator.is_next)
         if playback.command is None and not playback.is_lost:
             return None
         output = generator.step(playback)

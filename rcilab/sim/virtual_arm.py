@@ -11,6 +11,7 @@ the last good command; where it was compliant (impedance, torque, hand guiding),
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from rcilab.sim.generators import build_generator
 from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
 from rcilab.sim.generators.start import start_tolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
-from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.jitter_buffer import JitterBuffer, Playback
 from rcilab.sim.measured_state import MeasuredStateMonitor
 from rcilab.sim.plant import Measurement, Plant, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
@@ -78,6 +79,8 @@ class VirtualArm:
         measured_state: The sensors.
         resting_law: The control law while no command is followed. BRAKED engages the brakes at standstill.
         is_monitored: Whether measurements are checked.
+        playback: The output of the queue in the last cycle; None while no commands are followed.
+        on_command: Called with every command that is queued.
 
     Args:
         model: The arm.
@@ -107,6 +110,8 @@ class VirtualArm:
         self.measured_state = MeasuredStateMonitor(model, measured)
         self.resting_law = ControlLaw.BRAKED
         self.is_monitored = False
+        self.playback: Playback | None = None
+        self.on_command: Callable[[ArmCommand], None] = lambda command: None
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
         self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
         self._actuator = Actuator(model, parameters)
@@ -122,6 +127,16 @@ class VirtualArm:
     def playout(self) -> JitterBuffer:
         """The queue of commands, with its counts."""
         return self._motion.playout
+
+    @property
+    def mode(self) -> MotionMode:
+        """The mode of the motion in progress, or of the last one."""
+        return self._motion.mode
+
+    @property
+    def parameters(self) -> ArmParameters:
+        """The configuration."""
+        return self._parameters
 
     @property
     def is_following(self) -> bool:
@@ -223,9 +238,11 @@ class VirtualArm:
 
     def receive(self, command: ArmCommand) -> bool:
         """Queues a command; returns whether one was expected."""
-        if self._motion.is_followed:
-            self._motion.playout.push(command)
-        return self._motion.is_followed
+        if not self._motion.is_followed:
+            return False
+        self.on_command(command)
+        self._motion.playout.push(command)
+        return True
 
     def step(self, command: ArmCommand | None = None) -> StepResult:
         """Advances by one cycle: the reference advances, the plant moves, the sensors are read.
@@ -237,8 +254,10 @@ class VirtualArm:
             self.receive(command)
         result = _CLEAN
         has_moved = False
+        self.playback = None
         if self._motion.is_followed:
             output = self._motion.step()
+            self.playback = self._motion.playback
             if output is not None and output.violations:
                 result = StepResult(command_violations=output.violations)
                 self._react()

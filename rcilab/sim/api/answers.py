@@ -72,11 +72,15 @@ class WorldStatus:
     """Faults of the network towards the controller."""
     states: NetworkFaults = field(default_factory=NetworkFaults)
     """Faults of the network towards the client, TCP included."""
+    pid: int = 0
+    """Id of the controller's process; 0: unknown."""
+    record: int = -1
+    """Its descriptor of the record of all cycles, see `rcilab.core.cycle_ring`; -1: it keeps none."""
 
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
 
-_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "bad_datagrams", "unknown_senders", "ignored", "stalls")
+_COUNTS = ("cycle", "lost", "lost_in_row", "missed", "bad_datagrams", "unknown_senders", "ignored", "stalls", "pid")
 _LARGEST_COUNT = 2**63
 
 
@@ -99,6 +103,8 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
     for name in _COUNTS:
         if name in checked:
             checked[name] = as_integer(checked[name], name, 0, _LARGEST_COUNT)
+    if "record" in checked:
+        checked["record"] = as_integer(checked["record"], "record", -1, _LARGEST_COUNT)
     checked["reason"] = _reason(checked.get("reason", ""), checked.pop("remark", None))
     for name in ("model", "plant", "phase", "button"):
         if name in checked:

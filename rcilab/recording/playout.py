@@ -1,0 +1,47 @@
+"""The play-out of a client's commands, from rows with `PLAYOUT_FIELDS`: which command was played in which cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import JointPath
+
+
+def playout_delay(cycles: NDArray[np.void]) -> int:
+    """Returns the usual number of cycles between a state and the one in which its command was played, at least 1.
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+    """
+    rows, sources = _played(cycles)
+    return max(int(np.median(rows - sources)), 1) if rows.size else 1
+
+
+def played_joints(cycles: NDArray[np.void]) -> JointPath:
+    """Returns the joint angles of the played commands, from the first played one to the last, shape (M, n), [rad].
+
+    In cycles without a command, and where poses or torques were commanded, they are those that the controller reports
+    as commanded.
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+    """
+    rows, sources = _played(cycles)
+    if not rows.size:
+        return cycles["q_c"][:1].copy()
+    q = cycles["q_c"].copy()
+    sent = cycles["command"][sources]
+    has_angles = np.isfinite(sent).all(axis=1)
+    q[rows[has_angles]] = sent[has_angles]
+    return q[rows[0] : rows[-1] + 1]
+
+
+def _played(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Returns the rows in which a command was played, and the rows whose states those commands answer."""
+    rows = np.flatnonzero(cycles["played"])
+    numbers, first = np.unique(cycles["message_id"], return_index=True)
+    wanted = cycles["played"][rows]
+    at = np.minimum(np.searchsorted(numbers, wanted), len(numbers) - 1)
+    is_known = numbers[at] == wanted
+    return rows[is_known], first[at][is_known]
