@@ -66,7 +66,10 @@ LATE_TARGETS = {  # What a function may import, and why not the module.
 LATE_PARTS = {"cli": "a command loads what it needs and not what the others do"}
 LATE_FILES = re.compile(r"rcilab\.makers\.\w+\.maker")
 """A maker is cheap to import: its codec, controller and driver are loaded by the methods that need them."""
-NAMES_A_MAKER = {"rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI"}
+NAMES_A_MAKER = {
+    "rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI",
+    "rcilab.diagnostics.bench.record": "measures the record of the RCI controller",
+}
 """Modules outside `makers` that import a maker's folder, and why."""
 
 MODULES = sorted((ROOT / "rcilab").rglob("*.py"))

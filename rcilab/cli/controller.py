@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcilab.cli.output import print_interruptibly
@@ -12,6 +14,7 @@ from rcilab.cli.output import print_interruptibly
 if TYPE_CHECKING:
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import NetworkFaults, Stall
+    from rcilab.sim.arm_server import ArmServer
     from rcilab.sim.controller_config import ControllerConfig
 
 DESCRIPTION = """\
@@ -82,6 +85,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="FORMAT",
         help="lines of the log on stderr: text, or json for one object each (%(default)s)",
     )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FOLDER",
+        help="write each motion of any client to FOLDER: a run (.rcirun, for rcilab replay and check) with every state "
+        "and command, a report (.txt), and a line on stderr",
+    )
     _add_world_options(parser)
     _add_network_options(parser)
     parser.add_argument("--exit-with-parent", nargs="?", type=int, const=0, metavar="PID", help=argparse.SUPPRESS)
@@ -141,8 +151,18 @@ def run(args: argparse.Namespace) -> int:
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
-    server.run(lambda: print_interruptibly(f"{server.description}{world}"))
+    with _recording(args, server):
+        server.run(lambda: print_interruptibly(f"{server.description}{world}"))
     return 0
+
+
+def _recording(args: argparse.Namespace, server: ArmServer) -> AbstractContextManager[None]:
+    """Returns the recorder of --record; without it nothing."""
+    if args.record is None or server.ring is None:
+        return nullcontext()
+    from rcilab.cli.motion_recorder import recorder_process
+
+    return recorder_process(args.record, server.ring, server.config.log_format, lambda: server.controller.cycle_number)
 
 
 def _config(args: argparse.Namespace) -> ControllerConfig:
@@ -171,6 +191,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         stalls=tuple(map(parse_stall, args.stall)),
         log_format=args.log_format,
         world_port=None if args.no_world else args.world_port,
+        is_recorded=args.exit_with_parent is None or args.record is not None,
         # Without a number: the parent process, while it still exists.
         parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
     )

@@ -33,7 +33,7 @@ CAPACITY = 16384
 _MAGIC = b"RCILABCY"
 _VERSION = 1
 _HEADER = struct.Struct("<8sIIII")
-_EVENT_SLOTS, _EVENT_SIZE = 64, 2 * PAGE
+_EVENT_SLOTS, _EVENT_SIZE = 64, 4 * PAGE
 _LENGTH = struct.Struct("<I")
 
 

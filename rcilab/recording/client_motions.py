@@ -156,4 +156,4 @@ class ClientMotions:
 
 def _end(event: dict[str, Any]) -> MotionEnd:
     counts = {name: event[name] for name in ("received", "lost", "most_lost", "late", "dropped", "duplicates")}
-    return MotionEnd(stopped=Remark(event["stopped"], event["code"]) if event["stopped"] else None, **counts)
+    return MotionEnd(stopped=Remark.from_dict(event["stopped"]) if event["stopped"] else None, **counts)

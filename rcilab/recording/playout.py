@@ -19,10 +19,10 @@ def playout_delay(cycles: NDArray[np.void]) -> int:
 
 
 def played_joints(cycles: NDArray[np.void]) -> JointPath:
-    """Returns the joint angles of the played commands, from the first played one to the last, shape (M, n), [rad].
+    """Returns the joint angles of the played commands, from the first one to the last row, shape (M, n), [rad].
 
-    In cycles without a command, and where poses or torques were commanded, they are those that the controller reports
-    as commanded.
+    In cycles without a command, in those of the controller's own stop, and where poses or torques were commanded, they
+    are those that the controller reports as commanded. A command that it refused is not among them.
 
     Args:
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
@@ -32,9 +32,9 @@ def played_joints(cycles: NDArray[np.void]) -> JointPath:
         return cycles["q_c"][:1].copy()
     q = cycles["q_c"].copy()
     sent = cycles["command"][sources]
-    has_angles = np.isfinite(sent).all(axis=1)
+    has_angles = np.isfinite(sent).all(axis=1) & (cycles["faults"][rows] == 0)
     q[rows[has_angles]] = sent[has_angles]
-    return q[rows[0] : rows[-1] + 1]
+    return q[rows[0] :]
 
 
 def _played(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -261,8 +261,7 @@ class Run:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
 
         Used in place of a plan, for drawing and checking, if a callback moved the arm. Lost cycles are interpolated
-        linearly. Where a virtual controller recorded which commands it played, these are taken, up to one that it
-        refused.
+        linearly. Where a virtual controller recorded which commands it played, these are taken, then its own stop.
 
         Raises:
             UsageError: No cycle was recorded.

@@ -21,6 +21,7 @@ from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIEL
 from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
 from rcilab.core.fault import FaultCode
 from rcilab.core.state import RobotState
+from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
@@ -133,7 +134,8 @@ class CycleCapture:
     def _follow_motion(self, state: RobotState) -> None:
         """Writes the events of a motion that begins or has ended."""
         controller = self._controller
-        is_moving = controller.is_moving and (self._is_moving or controller.arm.is_following)
+        is_following = controller.arm.is_following or controller.arm.playback is not None
+        is_moving = is_following or (self._is_moving and controller.is_moving)
         if is_moving is self._is_moving:
             return
         self._is_moving = is_moving
@@ -157,13 +159,12 @@ class CycleCapture:
             )
             return
         playout = arm.playout
-        reason = controller.reason if controller.faults else self._lost_client
+        reason = controller.reason if controller.faults else Remark(self._lost_client)
         self._ring.add_event(
             {
                 "event": "end",
                 "motion": self._motion,
-                "stopped": str(reason),
-                "code": getattr(reason, "code", ""),
+                "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
                 "lost": playout.lost,
                 "most_lost": playout.max_consecutive_lost,

@@ -35,6 +35,7 @@ ROWS = MappingProxyType(
         "controller_mujoco": "controller",
         "controller_cartesian": "controller",
         "controller_impedance": "controller",
+        "record": "record",
         "client_answer": "client",
         "jog": "compute",
         "plan_line": "paths",

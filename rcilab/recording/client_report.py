@@ -1,0 +1,141 @@
+"""The report on a recorded motion of a client: how near its commands came to each limit, and their timing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+
+from rcilab.conformance.advice import share
+from rcilab.conformance.check import check
+from rcilab.conformance.report import Report
+from rcilab.core.errors import RcilabError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.core.state import require_mode
+from rcilab.i18n.translator import Remark
+from rcilab.recording.client_motions import MotionEnd
+from rcilab.recording.run import Run
+
+_EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
+_BAR = 40  # Characters of the longest bar.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ClientReport:
+    """The report on one motion."""
+
+    line: str
+    """The result in one line."""
+    text: str
+    """All conditions, counts and the histogram, as lines."""
+
+
+def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion") -> ClientReport:
+    """Returns the report on a run that a virtual controller recorded.
+
+    Args:
+        run: The run, with `PLAYOUT_FIELDS`.
+        end: The counts of its commands; None: those that the rows show.
+        name: Its name at the beginning of the line.
+    """
+    report, problem = _check(run)
+    reason = (None if end is None else end.stopped) or run.stopped
+    stopped = f"stopped: {_shorten(reason)}" if reason else "ran to its end"
+    nearest = problem if report is None else "" if run.faults else f"; {_describe_nearest(report)}"
+    missed = int(run.cycles["missed"].sum())
+    answered = int((run.cycles["sent_ns"] != 0).sum())
+    received = answered if end is None else end.received
+    late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
+    counts = f"{received} commands, {missed} cycles without one, {late} late"
+    line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
+    lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
+    if report is not None:
+        if run.faults:
+            lines.append("The accepted commands, and the controller's own stop:")
+        lines += [str(report), ""]
+    lines += _describe_commands(run, end, counts)
+    lines += ["", "Settings in force (SI units):"]
+    lines += [f"  {name}: {_format(value)}" for name, value in run.setup.settings.items()]
+    return ClientReport(line=line, text="\n".join(lines) + "\n")
+
+
+def _check(run: Run) -> tuple[Report | None, str]:
+    """Returns the check of the commanded motion in its mode, or why there is none."""
+    if run.model is None or len(run.cycles) < 2:
+        return None, "; too short for a check"
+    try:
+        mode = require_mode(run.setup.mode)
+        start = run.cycles["q_c"][0]
+        return check(run.commanded(), run.model, start=start, box=_box(run), distance=None, mode=mode), ""
+    except RcilabError as error:
+        return None, f"; not checked: {error}"
+
+
+def _box(run: Run) -> SafetyBox | None:
+    box = run.setup.settings.get("safety_box")
+    if box is None:
+        return None
+    return SafetyBox(size=tuple(box["size"]), T_base_box=Pose.from_row_major(box["pose"]), active=box["active"])
+
+
+def _describe_nearest(report: Report) -> str:
+    usage = report.usage()
+    condition = usage.conditions[usage.row[usage.ratio.argmax()]]
+    row = next(row for row in report.rows if row.condition is condition)
+    verb = "nearest limit" if row.ok else "violates"
+    return f"{verb}: {row.condition.quantity} of {row.location}, {share(row.ratio)} of its bound at {row.time:.3f} s"
+
+
+def _parts(reason: str | None) -> tuple[str, ...]:
+    return reason.parts if isinstance(reason, Remark) else (reason,) if reason else ()
+
+
+def _shorten(reason: str) -> str:
+    first, *more = _parts(reason)
+    return f"{first} (and {len(more)} more)" if more else first
+
+
+def _format(value: object) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_format, cast("list[object]", value))) + "]"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str]:
+    lines = [f"Commands of {run.setup.client or 'the client'}: {counts}"]
+    if end is not None:
+        lines.append(
+            f"  most cycles in a row without one: {end.most_lost}; arrived twice: {end.duplicates}; "
+            f"found the queue full: {end.dropped}"
+        )
+    gaps = _find_gaps(run)
+    if gaps:
+        lines.append("  without commands: " + ", ".join(f"{count} ms at {start:.3f} s" for start, count in gaps[:10]))
+    answered = run.cycles["sent_ns"] != 0
+    if not run.realtime or not answered.any():
+        return [*lines, "  in lock-step, times have no meaning"] if not run.realtime else lines
+    times = 1e3 * run.cycles["lateness"][answered]
+    lines.append(
+        f"  from state to command: median {np.median(times):.3f} ms, 99 % {np.percentile(times, 99):.3f} ms, "
+        f"longest {times.max():.3f} ms at {run.t[answered][times.argmax()]:.3f} s"
+    )
+    return [*lines, *_histogram(times)]
+
+
+def _find_gaps(run: Run) -> list[tuple[float, int]]:
+    """Returns the beginnings of missed commands, [s], and the number of cycles of each, longest first."""
+    edges = np.flatnonzero(np.diff(run.cycles["missed"].astype(np.int8), prepend=0, append=0))
+    pairs = [(float(run.t[start]), int(stop - start)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
+    return sorted(pairs, key=lambda pair: -pair[1])
+
+
+def _histogram(times: np.ndarray) -> list[str]:
+    counts = np.histogram(times, [0.0, *_EDGES, np.inf])[0]
+    largest = max(int(counts.max()), 1)
+    names = [f"below {_EDGES[0]:g} ms", *(f"{a:g} to {b:g} ms" for a, b in pairwise(_EDGES))]
+    names.append(f"above {_EDGES[-1]:g} ms")
+    rows = zip(names, counts.tolist(), strict=True)
+    return [f"  {name:>14} {count:>8} {'#' * -(-_BAR * count // largest)}".rstrip() for name, count in rows if count]

@@ -1,0 +1,200 @@
+"""The controller's own record of a foreign client: a scripted peer of the vendor's library, over real sockets."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.errors import UsageError, VersionMismatchError
+from rcilab.recording.client_motions import ClientMotions, MotionPart
+from rcilab.recording.client_recorder import ClientRecorder
+from rcilab.recording.client_report import report_on_client
+from rcilab.recording.run import Run, build_run, load_run
+from tests.peers import programs, wire
+from tests.peers.arena import Arena, arena
+from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
+from tests.waiting import wait_for
+
+NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad]
+SECONDS = 1.0  # [s]
+
+
+@contextmanager
+def watched(**options: Any) -> Iterator[tuple[Arena, ClientMotions]]:
+    with arena(is_recorded=True, **options) as place:
+        assert place.server.ring is not None
+        yield place, ClientMotions(CycleRing.attach(os.getpid(), place.server.ring.descriptor))
+
+
+def collect(motions: ClientMotions, count: int) -> list[list[MotionPart]]:
+    """The parts of the next motions that end, one list a motion."""
+    found: list[list[MotionPart]] = [[]]
+
+    def has_ended() -> bool:
+        for part in motions.poll():
+            found[-1].append(part)
+            if part.end is not None:
+                found.append([])
+        return len(found) > count
+
+    wait_for(has_ended)
+    return found[:count]
+
+
+def as_run(parts: list[MotionPart]) -> Run:
+    motion = parts[0].motion
+    cycles = np.concatenate([part.cycles for part in parts])
+    return build_run(cycles, plan=None, model=motion.model, setup=motion.setup, realtime=False)
+
+
+def sent_commands(robot: Robot) -> list[bytes]:
+    """Keeps every datagram that a peer sends."""
+    kept: list[bytes] = []
+    send = robot._udp.sendto
+
+    class Tapped:
+        def sendto(self, data: bytes, address: tuple[str, int]) -> int:
+            kept.append(data)
+            return send(data, address)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(udp, name)
+
+    udp, robot._udp = robot._udp, Tapped()  # type: ignore[assignment]
+    return kept
+
+
+PROGRAMS: dict[str, tuple[Callable[..., Any], str, slice]] = {
+    "joint_position": (programs.joint_sine, "command", slice(8, 64)),
+    "cartesian_position": (programs.line, "command_pose", slice(64, 192)),
+    "torque": (programs.torque, "command_tau", slice(-56, None)),
+}
+
+
+@pytest.mark.parametrize("mode", PROGRAMS)
+def test_every_command_of_a_client_is_recorded_bit_for_bit(mode: str) -> None:
+    program, field, place_in_datagram = PROGRAMS[mode]
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        sent = sent_commands(robot)
+        program(robot, SECONDS, period=SECONDS)
+        parts = collect(motions, 2)[1]
+    run, end = as_run(parts), parts[-1].end
+    assert (run.setup.mode, run.setup.client) == (mode, "127.0.0.1")
+    answered = run.cycles[run.cycles["sent_ns"] != 0]
+    assert [row.tobytes() for row in answered[field]] == [data[place_in_datagram] for data in sent]
+    assert [int.from_bytes(data[:8], "big") for data in sent] == answered["message_id"].tolist()
+    assert end is not None
+    assert (end.stopped, end.received, end.lost) == (None, len(sent), 0)
+    played = run.cycles["played"]
+    assert played[played != 0].tolist() == answered["message_id"].tolist()
+
+
+def test_a_recorded_motion_sent_again_moves_the_arm_alike(tmp_path: Path) -> None:
+    """The same commands give the same commanded angles, bit for bit, also from a file."""
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.joint_sine(robot, SECONDS, period=SECONDS)
+        first = as_run(collect(motions, 2)[1])
+    first.save(tmp_path / "first.rcirun")
+    loaded = load_run(tmp_path / "first.rcirun")
+    assert loaded.cycles.tobytes() == first.cycles.tobytes()
+    assert loaded.setup == first.setup
+    commands = iter(loaded.command[loaded.cycles["sent_ns"] != 0].tolist())
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        robot.filter_frequency = UNFILTERED
+        count = int((loaded.cycles["sent_ns"] != 0).sum())
+        outputs = [Output(q=tuple(next(commands))) for _ in range(count)]
+        outputs.append(Output(q=outputs[-1].q, finished=True))  # The library sends nothing for the last one.
+        queue = iter(outputs)
+        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+        robot.control(lambda state: next(queue))
+        second = as_run(collect(motions, 2)[1])
+    rows = min(len(first.q_c), len(second.q_c))
+    assert rows > 0.9 * len(first.q_c)
+    assert second.q_c[:rows].tobytes() == first.q_c[:rows].tobytes()
+
+
+def test_a_refused_command_is_recorded_with_its_fault() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        with pytest.raises(ControlException):
+            programs.joint_sine(robot, SECONDS, period=0.05)
+        parts = collect(motions, 2)[1]
+    run, end = as_run(parts), parts[-1].end
+    assert end is not None
+    assert end.stopped is not None
+    assert "jerk" in end.stopped
+    assert run.faults
+    faulty = run.cycles[run.cycles["faults"] != 0][0]
+    assert faulty["played"] == run.cycles["message_id"][run.cycles["sent_ns"] != 0][-1]
+    found = report_on_client(run, end)
+    assert "stopped: joint 1: commanded" in found.line
+    assert all(part in found.text for part in end.stopped.parts)
+
+
+def test_tool_load_and_settings_in_force_are_recorded() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        tool = (1, 0, 0, 0.1, 0, 1, 0, 0.0, 0, 0, 1, 0.2, 0, 0, 0, 1)
+        robot.set_coor(tool)
+        robot.set_load(1.5, (0.0, 0.0, 0.05), (0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01))
+        robot.set_collision_behavior((20.0,) * 7)
+        programs.joint_sine(robot, SECONDS, period=SECONDS)
+        motion = collect(motions, 2)[1][0].motion
+    assert motion.model.load.mass == 1.5
+    assert motion.model.T_flange_tool.as_row_major() == pytest.approx(tool)
+    assert motion.setup.settings["collision_thresholds"] == [20.0] * 7
+    assert motion.setup.settings["limit_table"] == "manual"
+
+
+def test_the_recorder_writes_a_run_and_a_report_for_every_motion(tmp_path: Path) -> None:
+    lines: list[str] = []
+    with arena(is_recorded=True) as place:
+        assert place.server.ring is not None
+        recorder = ClientRecorder(tmp_path, place.server.ring, lambda kind, text: lines.append(text))
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=1.0)
+            programs.line(robot, SECONDS, period=SECONDS)
+        wait_for(lambda: (recorder.poll(), len(lines) == 2)[1])
+    first, second = sorted(tmp_path.glob("*.rcirun"))
+    run = load_run(second)
+    assert run.is_complete
+    assert run.setup.mode == "cartesian_position"
+    assert run.report is None
+    assert str(second) in lines[1]
+    assert "ran to its end; nearest limit: " in lines[1]
+    report = second.with_suffix(".txt").read_text()
+    assert "cartesian.velocity.translation" in report
+    assert "Settings in force" in report
+    assert str(first) in lines[0]
+
+
+def test_a_folder_that_cannot_be_written_to_costs_the_run_and_not_the_motion(tmp_path: Path) -> None:
+    lines: list[str] = []
+    folder = tmp_path / "gone"
+    folder.write_text("a file")
+    with arena(is_recorded=True) as place:
+        assert place.server.ring is not None
+        recorder = ClientRecorder(folder, place.server.ring, lambda kind, text: lines.append(text))
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=1.0)
+            programs.joint_sine(robot, SECONDS, period=SECONDS)
+            assert not any(state.errors for state in robot.states)
+        wait_for(lambda: (recorder.poll(), len(lines) == 2)[1])
+    assert all("is not recorded from here on" in line for line in lines)
+
+
+def test_the_record_of_a_process_that_has_none_is_refused() -> None:
+    with pytest.raises(UsageError, match="cannot be opened"):
+        CycleRing.attach(os.getpid(), 9999)
+    with open(os.devnull, "rb+") as other, pytest.raises((VersionMismatchError, UsageError)):
+        CycleRing.attach(os.getpid(), other.fileno())
