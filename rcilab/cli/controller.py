@@ -80,6 +80,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"
     )
     parser.add_argument(
+        "--force-sign",
+        default="on-arm",
+        metavar="SIGN",
+        help="sign of reported external forces: on-arm, as exerted on the arm, or by-arm, as exerted by it "
+        "(%(default)s; that of a real arm is not verified)",
+    )
+    parser.add_argument(
         "--log-format",
         default="text",
         metavar="FORMAT",
@@ -186,6 +193,7 @@ def _config(args: argparse.Namespace) -> ControllerConfig:
         auto_limit=args.auto_limit,
         loop_back=args.loop_back,
         limit_table=args.limits,
+        force_sign=args.force_sign,
         network=network,
         states_network=states_network,
         stalls=tuple(map(parse_stall, args.stall)),

@@ -100,9 +100,10 @@ class RobotState:
     dtau_c: JointVector
     """Rate of the commanded joint torques, [N m/s] (manual: tau_vel_c)."""
     tau_ext_in_base: Array
-    """External force and moment in the base frame, (6,), [N, N m]."""
+    """External force and moment in the base frame, (6,), [N, N m]. The virtual controller reports what the environment
+    exerts on the arm, unless it has `force_sign="by-arm"`; the sign of a real arm is not verified, see the README."""
     tau_ext_in_stiff: Array
-    """External force and moment in the force-control frame, (6,), [N, N m]."""
+    """External force and moment in the force-control frame, (6,), [N, N m]; sign as of `tau_ext_in_base`."""
     theta: JointVector
     """Motor positions, motor side of the gear, [rad] (manual: theta_m). The virtual controller assumes a gear ratio of
     101, typical of strain-wave gears of this size: the manual gives none."""

@@ -13,6 +13,9 @@ from rcilab.sim.streamed_motion import PREFILL
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
+ForceSign: TypeAlias = Literal["on-arm", "by-arm"]
+"""Sign of reported external forces: exerted by the environment on the arm, or by the arm on the environment."""
+FORCE_SIGNS: tuple[ForceSign, ...] = get_args(ForceSign)
 
 DEFAULT_HOST = "127.0.0.2"
 """Loopback, but not the client's own address: a vendor's client may bind the UDP port of every address of its machine,
@@ -71,6 +74,8 @@ class ControllerConfig:
     """Whether every digital output is wired to the input of the same number."""
     limit_table: str = "manual"
     """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
+    force_sign: ForceSign = "on-arm"
+    """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`. That of a real arm is not verified: the manual does not say."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
     """Simulated network faults, from power-up on."""
     states_network: NetworkFaults | None = None
@@ -100,6 +105,8 @@ class ControllerConfig:
             raise InvalidValueError("host", self.host, "is not a valid address; use 127.0.0.2 for this machine only")
         if self.plant not in PLANT_KINDS:
             raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
+        if self.force_sign not in FORCE_SIGNS:
+            raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:

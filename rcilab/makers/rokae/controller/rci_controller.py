@@ -41,7 +41,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
-from rcilab.sim.controller_config import MODE_DELAY
+from rcilab.sim.controller_config import MODE_DELAY, ForceSign
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
 from rcilab.sim.violations import Violations, describe_violations
@@ -92,6 +92,7 @@ class RciController:
         arm: The arm after power-up.
         mode_delay: Cycles from StartMove to the requested modes in the state.
         recovery_time: Shortest duration of an error recovery, [cycles].
+        force_sign: Sign of the reported external forces.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class RciController:
         *,
         mode_delay: int = round(MODE_DELAY / CYCLE_TIME),
         recovery_time: int = RECOVERY_TIME,
+        force_sign: ForceSign = "on-arm",
     ) -> None:
         model = arm.model
         self._limit_table = "manual"
@@ -115,7 +117,7 @@ class RciController:
         self._model_response = model_response(model.description)  # Computed here: it takes longer than a cycle.
         self.arm = arm
         arm.configure(self.settings)
-        self._reporter = StateReporter(model, self.settings)
+        self._reporter = StateReporter(model, self.settings, force_sign)
         self._requested = self._shown = _IDLE_MODES
         self._countdown = 0
         self._is_still = False

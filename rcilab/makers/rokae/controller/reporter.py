@@ -13,8 +13,10 @@ Computation of the fields:
   wrench on the tool, base axes, at the tool's origin. `tau_ext_in_stiff` is the same wrench at the origin of the force
   frame of setFcCoor, in the axes of its type: WORLD those of the base, TOOL those of the force frame, PATH x along
   the commanded velocity of the tool (at standstill, its last direction), z as near as possible to the force frame's
-  z; at a sharp turn of the path its axes turn within 0.5 s. The sign is that of the action on the arm: a hand
-  that presses down gives a negative z in base axes. The manual does not define it.
+  z; at a sharp turn of the path its axes turn within 0.5 s. By default the sign is that of the action on the
+  arm: a hand that presses down gives a negative z in base axes. With "by-arm" it is that of the arm's action on its
+  environment. The manual does not define it, and it is not verified on an arm: a published admittance program that ran
+  on one follows the hand with "by-arm" only.
 * Motor angles, velocities and torques come from the drive model. Filtered torques pass a first-order low pass at the
   frequency of SetTorqueFilterCutOffFrequency.
 """
@@ -34,6 +36,7 @@ from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, Ro
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.controller_config import ForceSign
 from rcilab.sim.drive_report import DriveReport
 from rcilab.sim.force_frame import ForceAxes
 from rcilab.sim.tool_kinematics import ToolKinematics
@@ -51,9 +54,11 @@ class StateReporter:
     Args:
         model: The arm with its tool and load.
         settings: The client's settings.
+        force_sign: Sign of the reported external forces.
     """
 
-    def __init__(self, model: RobotModel, settings: Settings) -> None:
+    def __init__(self, model: RobotModel, settings: Settings, force_sign: ForceSign = "on-arm") -> None:
+        self._is_by_arm = force_sign == "by-arm"
         self._zeros = readonly_copy(np.zeros(model.n))
         self._axes = ForceAxes(model, settings)
         self.configure(model, settings)
@@ -110,6 +115,8 @@ class StateReporter:
     def _compute(self, signals: CycleSignals) -> tuple[Any, ...]:
         """Returns the fields of a state between its number and its faults, in their order."""
         commanded, tool_c, measured, tool, tau_commanded, _, wrench = signals
+        if self._is_by_arm and wrench.any():
+            wrench = make_readonly(-wrench)
         before = self._last_signals
         q_c, dq_c, ddq_c = commanded.arrays
         if tau_commanded is not None:

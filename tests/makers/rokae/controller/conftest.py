@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +22,9 @@ class Hand:
     """Sends requests and commands to a cycle, one step a command, and keeps every state."""
 
     def __init__(self, model: RobotModel, plant: str = "ideal", **options: object) -> None:
+        sign: Any = options.pop("force_sign", "on-arm")
         arm = VirtualArm(model, build_plant(plant, model), **{"prefill": 0, **options})  # type: ignore[arg-type]
-        self.cycle = RciController(arm, mode_delay=3)
+        self.cycle = RciController(arm, mode_delay=3, force_sign=sign)
         self.states: list[RobotState] = [self.cycle.state]
 
     @property

@@ -171,3 +171,20 @@ def test_an_arm_angle_that_is_undefined_keeps_its_last_value(hand) -> None:
     """Where the arm is stretched, the arm angle keeps its last value; before there is one, it is zero."""
     hand.cycle.reset(np.zeros(7))
     assert hand.step().psi == 0.0
+
+
+@pytest.mark.parametrize("sign", ["on-arm", "by-arm"])
+def test_an_admittance_that_yields_to_minus_the_reported_force_follows_the_hand_with_by_arm(make_hand, sign) -> None:
+    """A published program for the xMate yields by minus the reported force; see `ControllerConfig.force_sign`."""
+    hand = make_hand(plant="mujoco", force_sign=sign)
+    hand.start(1, 2)
+    T, speed = hand.state.T_base_tool_c.matrix, np.zeros(3)
+    start = T[:3, 3].copy()
+    hand.cycle.plant.push((0.0, 8.0, 0.0, 0.0, 0.0, 0.0))
+    for _ in range(300):
+        speed += 1e-3 * (-hand.state.tau_ext_in_base[:3] - 40.0 * speed) / 8.0  # 8 kg, 40 N s/m.
+        T[:3, 3] += 1e-3 * speed
+        assert not hand.pose(T).faults
+    moved = T[:3, 3] - start
+    assert (moved[1] > 0.005) if sign == "by-arm" else (moved[1] < -0.005)
+    assert abs(moved[1]) > 5.0 * abs(moved[0])
