@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from argparse import ArgumentParser
+from argparse import ArgumentParser, _ArgumentGroup
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -33,7 +33,7 @@ _MASS = {"": 1.0, "kg": 1.0, "g": 1e-3}  # [kg]
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*([a-z]*)", re.ASCII | re.IGNORECASE)
 
 
-def add_arm_options(parser: ArgumentParser) -> None:
+def add_arm_options(parser: ArgumentParser | _ArgumentGroup) -> None:
     """Adds `--tool`, `--load` and `--box`; a value that begins with "-" is written after "=": `--tool=-0.1,0,0`."""
     parser.add_argument(
         "--tool",
@@ -81,6 +81,24 @@ def parse_joints(text: str, count: int, option: str = "--start") -> tuple[float,
         InvalidValueError: The text is not valid.
     """
     return _quantities(text, text.split(","), count, _ANGLE, option, f"{JOINTS_FORM} with {count} joint angles")
+
+
+def parse_angles(text: str, option: str) -> tuple[float, ...]:
+    """Parses any number of angles, [rad]; `option` is their name in errors.
+
+    Raises:
+        InvalidValueError: The text is not valid.
+    """
+    return _quantities(text, text.split(","), text.count(",") + 1, _ANGLE, option, JOINTS_FORM)
+
+
+def parse_lengths(text: str, option: str) -> tuple[float, ...]:
+    """Parses three lengths, [m]; `option` is their name in errors.
+
+    Raises:
+        InvalidValueError: The text is not valid.
+    """
+    return _quantities(text, text.split(","), 3, _LENGTH, option, "X,Y,Z[mm]")
 
 
 def parse_tool(text: str, option: str = "--tool") -> Pose:

@@ -5,10 +5,21 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from rcilab.cli.arm_options import (
+    JOINTS_FORM,
+    SOFT_LIMITS_FORM,
+    add_arm_options,
+    parse_box,
+    parse_joints,
+    parse_load,
+    parse_soft_limits,
+    parse_tool,
+)
 from rcilab.cli.output import print_interruptibly
 
 if TYPE_CHECKING:
@@ -23,15 +34,60 @@ program that uses the vendor's client library. It prints one line when it is rea
 simulation port, and ends on Ctrl-C.
 """
 
-_OPTIONS = {"limit table": "--limits", "client_host": "--client", "client_port": "--client"}
+EPILOG = """A set-up file holds what the teach pendant of your arm holds, and options of this command; options on the
+command line take precedence over it. Numbers are in SI units; a text is as on the command line:
+
+  [arm]
+  model = "xMatePro7"
+  start = "0,30,0,60,0,90,0deg"     # or a list of angles in rad
+  di = [0, 3]                       # digital inputs that are high
+  [tool]
+  position = [0, 0, 0.12]           # in the flange frame
+  rpy = "0,0,90deg"                 # turns about the fixed x, y and z axes
+  [load]
+  mass = 2.0                        # kg; also inertia: 9 numbers, kg m^2
+  center_of_mass = [0, 0, 0.05]
+  [box]
+  size = [1.2, 1.2, 1.0]
+  center = [0.4, 0, 0.5]            # in the base frame; also rpy
+  [soft_limits]
+  lower = "-160,-110,-160,-110,-160,-110,-350deg"
+  upper = "160,110,160,110,160,110,350deg"
+  [controller]
+  plant = "mujoco"                  # every option of the first list, with _ for -
+  mode_delay = 0.2
+
+With --lockstep an unmodified client runs as fast as this machine computes, and its results are the same in every run.
+"""
+
+_OPTIONS = {
+    "limit table": "limits",
+    "client_host": "client",
+    "client_port": "client",
+    "joint angles": "start",
+    "safety box": "box",
+    "soft limits": "soft_limits",
+    "digital input": "di",
+}
 """Options whose names differ from those of their settings."""
+_HOST = "127.0.0.2"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command to the command line."""
-    parser = subparsers.add_parser("controller", help="run a virtual controller", description=DESCRIPTION)
-    parser.add_argument("--model", required=True, metavar="NAME", help="arm, such as xMatePro7")
-    parser.add_argument("--host", default="127.0.0.2", metavar="ADDR", help="address to listen on (%(default)s)")
+    parser = subparsers.add_parser(
+        "controller",
+        help="run a virtual controller",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        argument_default=argparse.SUPPRESS,  # An option that is not given may be in the file.
+    )
+    parser.add_argument(
+        "file", nargs="?", type=Path, default=None, metavar="FILE", help="set-up of the arm, such as my_arm.toml"
+    )
+    parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; required here or in the file")
+    parser.add_argument("--host", metavar="ADDR", help=f"address to listen on ({_HOST})")
     parser.add_argument(
         "--port", type=int, metavar="N", help="TCP port (default: that of the interface, RCI: 1337); 0: any free one"
     )
@@ -41,8 +97,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="HOST[:PORT]",
         help="destination of the states from the start on, also without a connection (port: as --port)",
     )
-    parser.add_argument("--plant", default="ideal", metavar="KIND", help="simulated arm: ideal or mujoco (%(default)s)")
-    parser.add_argument("--lockstep", action="store_true", help="advance a motion only when its commands arrive")
+    parser.add_argument("--plant", metavar="KIND", help="simulated arm: ideal or mujoco (ideal)")
+    parser.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="advance a motion only when its commands arrive: your unmodified client runs as fast as this machine",
+    )
     parser.add_argument(
         "--mode-delay",
         type=float,
@@ -64,9 +124,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--lost-limit",
         type=int,
-        default=20,
         metavar="N",
-        help="number of consecutive lost commands that stops a motion, 10 to 20; 0: none (%(default)s). Fewer stop it "
+        help="number of consecutive lost commands that stops a motion, 10 to 20; 0: none (20). Fewer stop it "
         "if the next command could only be reached with a jump: --prefill helps there",
     )
     parser.add_argument(
@@ -76,21 +135,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "leaves the commanded pose",
     )
     parser.add_argument("--loop-back", action="store_true", help="connect digital outputs to the inputs")
-    parser.add_argument(
-        "--limits", default="manual", metavar="TABLE", help="Cartesian limits: manual or sdk (%(default)s)"
-    )
+    parser.add_argument("--limits", metavar="TABLE", help="Cartesian limits: manual or sdk (manual)")
     parser.add_argument(
         "--force-sign",
-        default="on-arm",
         metavar="SIGN",
         help="sign of reported external forces: on-arm, as exerted on the arm, or by-arm, as exerted by it "
-        "(%(default)s; that of a real arm is not verified)",
+        "(on-arm; that of a real arm is not verified)",
     )
     parser.add_argument(
-        "--log-format",
-        default="text",
-        metavar="FORMAT",
-        help="lines of the log on stderr: text, or json for one object each (%(default)s)",
+        "--log-format", metavar="FORMAT", help="lines of the log on stderr: text, or json for one object each (text)"
     )
     parser.add_argument(
         "--record",
@@ -99,16 +152,36 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="write each motion of any client to FOLDER: a run (.rcirun, for rcilab replay and check) with every state "
         "and command, a report (.txt), and a line on stderr",
     )
+    _add_arm_options(parser)
     _add_world_options(parser)
     _add_network_options(parser)
     parser.add_argument("--exit-with-parent", nargs="?", type=int, const=0, metavar="PID", help=argparse.SUPPRESS)
     parser.set_defaults(run=run)
 
 
+def _add_arm_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "set-up of the arm",
+        "what its teach pendant holds, kept by a reboot; a value that begins with - follows =, as --tool=-10,0,120mm",
+    )
+    group.add_argument(
+        "--start",
+        metavar=JOINTS_FORM,
+        help="joint angles at power-up, in rad without a unit: 0,30,0,60,0,90,0deg (home)",
+    )
+    add_arm_options(group)
+    group.add_argument(
+        "--soft-limits",
+        metavar=SOFT_LIMITS_FORM,
+        help="range of each joint, as --soft-limits=-160:160,-110:110,...deg (those of the arm)",
+    )
+    group.add_argument("--di", metavar="N,N,...", help="digital inputs that are high: 0,3")
+
+
 def _add_world_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("simulation port", "control of the simulated environment of the robot")
     choice = group.add_mutually_exclusive_group()
-    choice.add_argument("--world-port", type=int, default=0, metavar="N", help="TCP port, on loopback (any free one)")
+    choice.add_argument("--world-port", type=int, metavar="N", help="TCP port, on loopback (any free one)")
     choice.add_argument("--no-world", action="store_true", help="no simulation port")
 
 
@@ -120,22 +193,19 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
         ("duplicate", "datagrams that arrive twice"),
         ("corrupt", "datagrams with a flipped bit"),
     ):
-        group.add_argument(f"--{name}", type=float, default=0.0, metavar="SHARE", help=f"share of {meaning}, 0 to 1")
-    group.add_argument("--delay", type=float, default=0.0, metavar="S", help="delay of every datagram")
-    group.add_argument("--jitter", type=float, default=0.0, metavar="S", help="largest random delay in addition")
+        group.add_argument(f"--{name}", type=float, metavar="SHARE", help=f"share of {meaning}, 0 to 1")
+    group.add_argument("--delay", type=float, metavar="S", help="delay of every datagram")
+    group.add_argument("--jitter", type=float, metavar="S", help="largest random delay in addition")
+    group.add_argument("--faults-on", metavar="WAY", help="affected datagrams: commands, states or both (both)")
+    group.add_argument("--tcp-delay", type=float, metavar="S", help="delay of every TCP reply")
     group.add_argument(
-        "--faults-on", default="both", metavar="WAY", help="affected datagrams: commands, states or both (%(default)s)"
-    )
-    group.add_argument("--tcp-delay", type=float, default=0.0, metavar="S", help="delay of every TCP reply")
-    group.add_argument(
-        "--tcp-split", nargs="?", type=int, const=1, default=0, metavar="N", help="send replies N bytes at a time (1)"
+        "--tcp-split", nargs="?", type=int, const=1, metavar="N", help="send replies N bytes at a time (1)"
     )
     group.add_argument("--tcp-break", type=int, metavar="N", help="close TCP after N bytes of replies")
-    group.add_argument("--seed", type=int, default=0, metavar="N", help="seed of random faults (%(default)s)")
+    group.add_argument("--seed", type=int, metavar="N", help="seed of random faults (0)")
     group.add_argument(
         "--stall",
         action="append",
-        default=[],
         metavar="S[@T][/P]",
         help="stop the clock for S seconds, first after T, then every P, such as 0.05@2.0 or 0.02/1.0",
     )
@@ -143,74 +213,117 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the controller until it receives a signal to end."""
+    from rcilab.cli.arm_file import ArmFile, read_arm_file
     from rcilab.core.errors import InvalidValueError
     from rcilab.makers.virtual_controller import build_virtual_controller
 
+    given = vars(args)
+    file = ArmFile({}, {}) if args.file is None else read_arm_file(args.file)
     try:
-        server = build_virtual_controller(_config(args))
+        server = build_virtual_controller(_config({**file.options, **given}))
     except InvalidValueError as error:
-        raise _with_option_name(error, args) from error
+        raise _with_option_name(error, given, file.keys) from error
     signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
-    if args.exit_with_parent is None:
+    if "exit_with_parent" not in given:
         signal.signal(signal.SIGINT, lambda *_: server.request_stop())
     else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
-    with _recording(args, server):
+    with _recording(given.get("record"), server):
         server.run(lambda: print_interruptibly(f"{server.description}{world}"))
     return 0
 
 
-def _recording(args: argparse.Namespace, server: ArmServer) -> AbstractContextManager[None]:
+def _recording(folder: Path | None, server: ArmServer) -> AbstractContextManager[None]:
     """Returns the recorder of --record; without it nothing."""
-    if args.record is None or server.ring is None:
+    if folder is None or server.ring is None:
         return nullcontext()
     from rcilab.cli.motion_recorder import recorder_process
 
-    return recorder_process(args.record, server.ring, server.config.log_format, lambda: server.controller.cycle_number)
+    return recorder_process(folder, server.ring, server.config.log_format, lambda: server.controller.cycle_number)
 
 
-def _config(args: argparse.Namespace) -> ControllerConfig:
-    from rcilab.sim.controller_config import VENDOR_MODE_DELAY, ControllerConfig
+def _config(options: Mapping[str, Any]) -> ControllerConfig:
+    """Returns the configuration from options of the command line and the file: texts, or values of their types."""
+    from rcilab.core.errors import UsageError
+    from rcilab.robots import describe_robot
+    from rcilab.sim.controller_config import MOST_LOST, VENDOR_MODE_DELAY, ControllerConfig
 
-    client_host, client_port = _client(args.client)
-    network, states_network = _networks(args)
+    option = options.get
+    if "model" not in options:
+        raise UsageError("the arm is not named; add --model NAME, such as --model xMatePro7, or a file with its set-up")
+    n = describe_robot(options["model"]).n
+    client_host, client_port = _client(option("client"))
+    network, states_network = _networks(options)
+    parent, is_lockstep = option("exit_with_parent"), option("lockstep", False)
     return ControllerConfig(
-        model=args.model,
-        host=args.host,
-        port=args.port,
-        udp_port=args.udp_port,
+        model=options["model"],
+        host=option("host", _HOST),
+        port=option("port"),
+        udp_port=option("udp_port"),
         client_host=client_host,
         client_port=client_port,
-        plant=args.plant,
-        lockstep=args.lockstep,
-        mode_delay=VENDOR_MODE_DELAY if args.mode_delay is None and not args.lockstep else args.mode_delay,
-        prefill=args.prefill,
-        patience=args.patience,
-        lost_limit=args.lost_limit or None,  # 0 switches it off.
-        auto_limit=args.auto_limit,
-        loop_back=args.loop_back,
-        limit_table=args.limits,
-        force_sign=args.force_sign,
+        plant=option("plant", "ideal"),
+        lockstep=is_lockstep,
+        mode_delay=option("mode_delay", None if is_lockstep else VENDOR_MODE_DELAY),
+        prefill=option("prefill"),
+        patience=option("patience"),
+        lost_limit=option("lost_limit", MOST_LOST) or None,  # 0 switches it off.
+        auto_limit=option("auto_limit", False),
+        loop_back=option("loop_back", False),
+        limit_table=option("limits", "manual"),
+        force_sign=option("force_sign", "on-arm"),
+        start=_parsed(option("start"), lambda text: parse_joints(text, n)),
+        tool=_parsed(option("tool"), parse_tool),
+        load=_parsed(option("load"), parse_load),
+        safety_box=_parsed(option("box"), parse_box),
+        soft_limits=_parsed(option("soft_limits"), lambda text: _soft_limits(text, n)),
+        inputs=_parsed(option("di", ()), _signals),
         network=network,
         states_network=states_network,
-        stalls=tuple(map(parse_stall, args.stall)),
-        log_format=args.log_format,
-        world_port=None if args.no_world else args.world_port,
-        is_recorded=args.exit_with_parent is None or args.record is not None,
+        stalls=tuple(map(parse_stall, option("stall", ()))),
+        log_format=option("log_format", "text"),
+        world_port=None if option("no_world") else option("world_port", 0),
+        is_recorded="record" in options or "exit_with_parent" not in options,
         # Without a number: the parent process, while it still exists.
-        parent_pid=os.getppid() if args.exit_with_parent == 0 else args.exit_with_parent,
+        parent_pid=os.getppid() if parent == 0 else parent,
     )
 
 
-def _with_option_name(error: InvalidValueError, args: argparse.Namespace) -> InvalidValueError:
-    """Returns an error with the name of the option instead of that of the setting."""
-    if error.name not in _OPTIONS and error.name not in vars(args):
+def _parsed(value: Any, parse: Callable[[str], Any]) -> Any:
+    """Returns a value of its type; from the command line it is a text."""
+    return parse(value) if isinstance(value, str) else value
+
+
+def _soft_limits(text: str, n: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    limits = parse_soft_limits(text, n)
+    return tuple(limits.lower), tuple(limits.upper)
+
+
+def _signals(text: str) -> tuple[int, ...]:
+    from rcilab.core.errors import InvalidValueError
+
+    numbers = [part.strip() for part in text.split(",")]
+    if not all(number.isascii() and number.isdigit() and len(number) < 10 for number in numbers):
+        raise InvalidValueError("--di", text, "needs numbers of digital inputs, such as 0,3")
+    return tuple(map(int, numbers))
+
+
+def _with_option_name(
+    error: InvalidValueError, given: Mapping[str, object], keys: Mapping[str, str]
+) -> InvalidValueError:
+    """Returns an error with the name of the option, or its place in the file, instead of that of the setting."""
+    setting, colon, rest = error.name.partition(": ")
+    option = _OPTIONS.get(setting, setting)
+    if option in keys and option not in given:
+        name = keys[option]
+    elif option in given or setting in _OPTIONS:
+        name = "--" + option.replace("_", "-")
+    else:
         return error
-    option = _OPTIONS.get(error.name, "--" + error.name.replace("_", "-"))
-    return type(error)(option, error.value, error.requirement)
+    return type(error)(name + colon + rest, error.value, error.requirement)
 
 
 def _client(text: str | None) -> tuple[str | None, int | None]:
@@ -224,18 +337,22 @@ def _client(text: str | None) -> tuple[str | None, int | None]:
     return host, int(port) if colon else None
 
 
-def _networks(args: argparse.Namespace) -> tuple[NetworkFaults, NetworkFaults]:
+def _networks(options: Mapping[str, Any]) -> tuple[NetworkFaults, NetworkFaults]:
     """Returns the network faults towards the controller, and towards the client."""
     from rcilab.core.errors import InvalidValueError
     from rcilab.sim.api import DIRECTIONS, NetworkFaults
 
-    if args.faults_on not in DIRECTIONS:
-        raise InvalidValueError("--faults-on", args.faults_on, f"is unknown; known: {', '.join(DIRECTIONS)}")
-    tcp = {"tcp_delay": args.tcp_delay, "tcp_split": args.tcp_split, "tcp_break": args.tcp_break, "seed": args.seed}
-    names = ("loss", "delay", "jitter", "reorder", "duplicate", "corrupt")
-    bad = NetworkFaults(**{name: getattr(args, name) for name in names}, **tcp)
+    direction = options.get("faults_on", "both")
+    if direction not in DIRECTIONS:
+        raise InvalidValueError("--faults-on", direction, f"is unknown; known: {', '.join(DIRECTIONS)}")
+
+    def given(*names: str) -> dict[str, Any]:
+        return {name: options[name] for name in names if name in options}
+
+    tcp = given("tcp_delay", "tcp_split", "tcp_break", "seed")
+    bad = NetworkFaults(**given("loss", "delay", "jitter", "reorder", "duplicate", "corrupt"), **tcp)
     good = NetworkFaults(**tcp)
-    return (good if args.faults_on == "states" else bad), (good if args.faults_on == "commands" else bad)
+    return (good if direction == "states" else bad), (good if direction == "commands" else bad)
 
 
 def parse_stall(text: str) -> Stall:

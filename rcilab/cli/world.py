@@ -14,15 +14,22 @@ EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
   rcilab world 127.0.0.2:40123 place_box box=wall size=[0.1,1,1] position=[0.9,0,0.5]
   rcilab world 127.0.0.2:40123 press button=estop
   rcilab world 127.0.0.2:40123 press button=none
+  rcilab world 127.0.0.2:40123 place_arm q=0,30,0,60,0,90,0deg
+  rcilab world 127.0.0.2:40123 set_tool position=[0,0,0.12]
+  rcilab world 127.0.0.2:40123 set_load mass=2 center_of_mass=[0,0,0.05]
   rcilab world 127.0.0.2:40123 status
-Contact (place_box, floor, walls) needs a controller with --plant mujoco."""
+Contact (place_box, floor, walls) needs a controller with --plant mujoco. place_arm, set_tool, set_load, set_box and
+set_soft_limits act as the teach pendant: on a stationary arm, and kept by a reboot."""
+
+_ANGLES = ("q", "lower", "upper")
+"""Fields whose text may be angles with a unit, as on the command line of the controller."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Adds the command."""
     parser = subparsers.add_parser(
         "world",
-        help="push a virtual robot, place an obstacle, press its emergency stop",
+        help="push or place a virtual robot, place an obstacle, press its emergency stop",
         description="Controls the simulated environment of a virtual robot through its simulation port.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -52,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _request(name: str, texts: list[str]) -> WorldRequest:
+    from rcilab.cli.arm_options import parse_angles
     from rcilab.core.errors import InvalidValueError, UsageError
     from rcilab.sim.api import Refused, decode_world_request
 
@@ -63,7 +71,7 @@ def _request(name: str, texts: list[str]) -> WorldRequest:
         try:
             content[field] = json.loads(value)
         except (ValueError, RecursionError):
-            content[field] = value
+            content[field] = parse_angles(value, field) if field in _ANGLES else value
     _, request = decode_world_request(json.dumps(content).encode())
     if isinstance(request, Refused):
         raise UsageError(request.reason)

@@ -14,11 +14,13 @@ import socket
 import threading
 import time
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError, plain_text
+from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api import (
@@ -33,6 +35,7 @@ from rcilab.sim.api import (
     Mount,
     Network,
     NetworkFaults,
+    PlaceArm,
     PlaceBox,
     Press,
     Push,
@@ -40,7 +43,11 @@ from rcilab.sim.api import (
     Release,
     RemoveBox,
     SafetyButton,
+    SetBox,
     SetInput,
+    SetLoad,
+    SetSoftLimits,
+    SetTool,
     StallClock,
     Walls,
     WorldAnswer,
@@ -171,6 +178,28 @@ class SimulationControl(Closeable):
         inertia = tuple(load.inertia.ravel().tolist())
         self.ask(Mount(load.mass, tuple(load.center_of_mass.tolist()), inertia))
 
+    def place_arm(self, q: ArrayLike) -> None:
+        """Places the stationary arm at other joint angles, shape (n,), [rad]; refused while it moves."""
+        self.ask(PlaceArm(_joints(q)))
+
+    def set_tool(self, tool: Pose) -> None:
+        """Sets the tool as on the teach pendant, by its pose in the flange frame; a session's model keeps its own."""
+        tool = as_pose(tool)
+        self.ask(SetTool(tuple(tool.position.tolist()), tuple(tool.wxyz.tolist())))
+
+    def set_load(self, load: Payload) -> None:
+        """Sets the load as on the teach pendant; a session's model keeps its own."""
+        self.ask(SetLoad(load.mass, tuple(load.center_of_mass.tolist()), tuple(load.inertia.ravel().tolist())))
+
+    def set_box(self, box: SafetyBox) -> None:
+        """Sets the safety box as on the teach pendant; an inactive one is not enforced."""
+        pose = box.T_base_box
+        self.ask(SetBox(box.size, tuple(pose.position.tolist()), tuple(pose.wxyz.tolist()), box.active))
+
+    def set_soft_limits(self, lower: ArrayLike, upper: ArrayLike) -> None:
+        """Sets the soft limits of the joints as on the teach pendant, shape (n,) each, [rad]."""
+        self.ask(SetSoftLimits(_joints(lower), _joints(upper)))
+
     def status(self) -> WorldStatus:
         """Returns the status of the simulation, which is not part of the robot's state."""
         answer = self.ask(GetStatus())
@@ -254,3 +283,7 @@ def _is_closed(connection: socket.socket) -> bool:
 
 def _numbers(value: ArrayLike, count: int, name: str, unit: str) -> tuple[float, ...]:
     return tuple(as_vector(value, count, name, unit).tolist())
+
+
+def _joints(value: ArrayLike) -> tuple[float, ...]:
+    return tuple(np.asarray(value).ravel().tolist())

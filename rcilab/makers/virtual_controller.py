@@ -25,6 +25,7 @@ def build_virtual_controller(
         log: Takes the entries of its log, and must not wait; None: a thread writes them to stderr.
 
     Raises:
+        InvalidValueError: The set-up of the arm is not valid.
         ModelError: The configuration names no known arm, or one without a virtual controller.
         UsageError: An address or port cannot be used.
     """
@@ -38,4 +39,10 @@ def build_virtual_controller(
         torque_prefill=config.prefill,
         lost_limit=config.lost_limit,
     )
-    return ArmServer(maker.build_server(arm, config), config, log=log)
+    server = maker.build_server(arm, config)
+    setup = config.setup(tuple(model.home.tolist()))
+    if setup is not None:
+        server.controller.set_up(setup)
+    for signal in config.inputs:
+        server.controller.set_input(signal, True)
+    return ArmServer(server, config, log=log)

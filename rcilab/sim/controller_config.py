@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api import NetworkFaults, Stall
+from rcilab.sim.arm_parameters import Floats
+from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
 from rcilab.sim.streamed_motion import PREFILL
 
@@ -76,6 +81,19 @@ class ControllerConfig:
     """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
     force_sign: ForceSign = "on-arm"
     """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`. That of a real arm is not verified: the manual does not say."""
+    start: Floats | None = None
+    """Joint angles at power-up, shape (n,), [rad]; None: the home pose of the arm."""
+    tool: Pose | None = None
+    """Pose of the tool in the flange frame, as set on the teach pendant; None: the flange."""
+    load: Payload | None = None
+    """Load at the flange, as set on the teach pendant; None: none."""
+    safety_box: SafetyBox | None = None
+    """Safety box, as set on the teach pendant; None: none."""
+    soft_limits: tuple[Floats, Floats] | None = None
+    """Lower and upper soft limits of the joints, as set on the teach pendant, shape (n,) each, [rad]; None: the arm's
+    own."""
+    inputs: tuple[int, ...] = ()
+    """Numbers of the digital inputs that are high, from 0."""
     network: NetworkFaults = field(default_factory=NetworkFaults)
     """Simulated network faults, from power-up on."""
     states_network: NetworkFaults | None = None
@@ -121,6 +139,21 @@ class ControllerConfig:
                 self.lost_limit,
                 f"needs {FEWEST_LOST} to {MOST_LOST} cycles; None, or 0 on the command line, is no limit",
             )
+
+    def setup(self, home: Floats) -> ArmSetup | None:
+        """Returns the set-up of the arm; None if it is that after delivery.
+
+        Args:
+            home: Joint angles for `start` of None, so that they are checked, too, shape (n,), [rad].
+        """
+        parts = ArmSetup(
+            q=self.start,
+            T_flange_tool=self.tool,
+            load=self.load,
+            safety_box=self.safety_box,
+            soft_limits=self.soft_limits,
+        )
+        return None if parts.is_empty else replace(parts, q=home if self.start is None else self.start)
 
     @property
     def mode_delay_cycles(self) -> int:

@@ -26,19 +26,25 @@ from rcilab.sim.api import (
     LoopBack,
     Mount,
     Network,
+    PlaceArm,
     PlaceBox,
     Press,
     Push,
     Refused,
     Release,
     RemoveBox,
+    SetBox,
     SetInput,
+    SetLoad,
+    SetSoftLimits,
+    SetTool,
     StallClock,
     Walls,
     WorldAnswer,
     WorldRequest,
     WorldStatus,
 )
+from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.force_profile import ForceProfile
@@ -143,7 +149,18 @@ class Environment:
                 self._plant.set_walls(self._active_box() if on else None)
                 self._has_walls, self._walls = on, self._active_box()
             case Mount():
-                self._plant.mount(_payload(request))
+                self._plant.mount(None if request.mass is None else _payload(request, request.mass))
+            case PlaceArm(q):
+                self._controller.set_up(ArmSetup(q=q))
+            case SetTool(position, wxyz):
+                self._controller.set_up(ArmSetup(T_flange_tool=Pose(position, wxyz)))
+            case SetLoad(mass):
+                self._controller.set_up(ArmSetup(load=_payload(request, mass)))
+            case SetBox(size, position, wxyz, active):
+                box = SafetyBox(size=size, T_base_box=Pose(position, wxyz), active=active)
+                self._controller.set_up(ArmSetup(safety_box=box))
+            case SetSoftLimits(lower, upper):
+                self._controller.set_up(ArmSetup(soft_limits=(lower, upper)))
             case GetStatus():
                 pass  # Answered before; it changes nothing.
 
@@ -179,11 +196,6 @@ class Environment:
         )
 
 
-def _payload(request: Mount) -> Payload | None:
-    if request.mass is None:
-        return None
-    return Payload(
-        mass=request.mass,
-        center_of_mass=np.array(request.center_of_mass),
-        inertia=np.array(request.inertia).reshape(3, 3),
-    )
+def _payload(request: Mount | SetLoad, mass: float) -> Payload:
+    inertia = np.array(request.inertia).reshape(3, 3)
+    return Payload(mass=mass, center_of_mass=np.array(request.center_of_mass), inertia=inertia)

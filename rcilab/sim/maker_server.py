@@ -14,6 +14,7 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.sim.api import SafetyButton
+from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.channels import Channel, ClientLink, Peer
 from rcilab.sim.virtual_arm import VirtualArm
 
@@ -90,6 +91,15 @@ class SimulatedController(Protocol):
 
     def press_button(self, button: SafetyButton) -> None:
         """Presses or releases an emergency stop."""
+        ...
+
+    def set_up(self, setup: ArmSetup) -> None:
+        """Sets the arm up as on its teach pendant; a reboot keeps it.
+
+        Raises:
+            InvalidValueError: A value is out of its bounds, or the arm cannot stand at the joint angles.
+            UsageError: The arm moves, follows commands or is guided.
+        """
         ...
 
     def set_input(self, signal: int, level: bool) -> None:

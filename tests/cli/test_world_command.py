@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from rcilab.cli import main
@@ -31,6 +32,14 @@ def test_a_box_is_placed_the_arm_is_pushed_and_the_status_is_printed(address, ca
     assert main(["world", address, "press", "button=none"]) == 0
 
 
+def test_the_arm_is_placed_at_angles_with_a_unit(address, capsys):
+    assert main(["world", address, "place_arm", "q=0,30,0,60,0,90,-20deg"]) == 0
+    assert main(["world", address, "set_tool", "position=[0,0,0.1]"]) == 0
+    capsys.readouterr()
+    assert main(["world", address, "status"]) == 0
+    assert json.loads(capsys.readouterr().out)["q"] == pytest.approx(np.radians([0, 30, 0, 60, 0, 90, -20]))
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -40,6 +49,9 @@ def test_a_box_is_placed_the_arm_is_pushed_and_the_status_is_printed(address, ca
         (["press", "estop"], "needs FIELD=VALUE"),
         (["press", "button=" + "[" * 10_000], "button"),
         (["remove_box", "box=chair"], "chair"),
+        (["place_arm", "q=0,130,0,60,0,90,0deg"], "joint 2 at 130 deg is outside its range of -120 to 120 deg"),
+        (["place_arm", "q=[0,1]"], "has shape (2,), needs (7,)"),
+        (["place_arm", "q=none"], "q: 'none' is not of the form"),
     ],
 )
 def test_what_cannot_happen_is_refused_in_one_sentence(address, capsys, words, said):

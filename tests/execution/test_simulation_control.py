@@ -84,6 +84,17 @@ def test_a_load_that_nobody_told_the_controller_of_is_carried(robot):
     assert np.allclose(tau[50], with_load, atol=1e-9)
 
 
+def test_the_arm_is_placed_and_a_motion_starts_there(robot):
+    home = np.array(robot.state.q)
+    robot.world.place_arm(home + 0.2)
+    robot.world.set_soft_limits(MODEL.limits.joint.lower, MODEL.limits.joint.upper)
+    hold(robot, lambda k: None)
+    assert np.array_equal(robot.state.q_c, home + 0.2)
+    with pytest.raises(UsageError, match="in phase moving"):
+        hold(robot, lambda k: robot.world.place_arm(home) if k == 20 else None)
+    robot.world.place_arm(home)
+
+
 def test_the_status_counts_and_names(robot):
     status = robot.world.status()
     assert (status.model, status.plant, status.button) == ("xMatePro7", "ideal", "none")

@@ -17,6 +17,7 @@ from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.realtime.cpu_affinity import one_core
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.log_entry import LogEntry
 from rcilab.sim.plants import build_plant
 from tests.peers.robot import PATIENCE, Robot
 
@@ -28,17 +29,17 @@ class Arena:
 
     Attributes:
         cycle: The controller without its sockets; touch it inside `between` only.
-        lines: What the controller logged.
+        entries: The log of the controller.
     """
 
     def __init__(self, *, wrap_plant: Callable[[Any], Any] | None = None, **options: Any) -> None:
-        self.lines: list[str] = []
+        self.entries: list[LogEntry] = []
         settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
         settings["patience"] = 1.0  # A client that falls silent is given up.
         config = ControllerConfig(**{**settings, **options})
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
-        self.server = build_virtual_controller(config, plant=self.plant, log=self.lines.append)
+        self.server = build_virtual_controller(config, plant=self.plant, log=self.entries.append)
         self.cycle: RciController = self.server.controller
         self.host, port = re.match(r"rci://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
         self.port = int(port)

@@ -10,6 +10,7 @@ import numpy as np
 from rcilab.core.errors import InvalidValueError
 
 _T = TypeVar("_T", bound=str)
+_MOST_JOINTS = 7
 
 
 def as_float(value: object, name: str, unit: str, low: float = -inf, high: float = inf) -> float:
@@ -43,6 +44,18 @@ def as_floats(value: object, count: int, name: str, unit: str) -> tuple[float, .
     if not isinstance(items, list | tuple) or len(items) != count:  # pyright: ignore[reportUnknownArgumentType]
         raise InvalidValueError(name, value, f"needs {count} numbers{_in(unit)}")
     return tuple(as_float(item, f"{name}[{k}]", unit) for k, item in enumerate(cast("list[object]", items)))
+
+
+def as_joints(value: object, name: str, unit: str) -> tuple[float, ...]:
+    """Returns a finite number for each joint; the arm determines how many.
+
+    Raises:
+        InvalidValueError: It is not a list of numbers.
+    """
+    items = _plain(value)
+    if not isinstance(items, list | tuple) or not 1 <= len(items) <= _MOST_JOINTS:  # pyright: ignore[reportUnknownArgumentType]
+        raise InvalidValueError(name, value, f"needs a number for each joint{_in(unit)}")
+    return as_floats(value, len(items), name, unit)  # pyright: ignore[reportUnknownArgumentType]
 
 
 def as_integer(value: object, name: str, low: int, high: int) -> int:

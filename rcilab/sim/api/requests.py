@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal, TypeAlias, get_args
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.sim.api.faults import DIRECTIONS, LONGEST_STALL, LONGEST_TIME, Direction, NetworkFaults, Stall
-from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_name, as_word
+from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_joints, as_name, as_word
 
 Floats: TypeAlias = tuple[float, ...]
 SafetyButton: TypeAlias = Literal["none", "estop", "gstop"]
@@ -182,13 +182,11 @@ class PlaceBox:
         _put(self, "box", as_name(self.box, "box"))
         _put(self, "size", as_floats(self.size, 3, "size", "m"))
         _put(self, "position", as_floats(self.position, 3, "position", "m"))
-        _put(self, "wxyz", as_floats(self.wxyz, 4, "wxyz", ""))
+        _put(self, "wxyz", _as_orientation(self.wxyz))
         for edge in self.size:
             as_float(edge, "size", "m", 0.001, _FARTHEST)
         for coordinate in self.position:
             as_float(coordinate, "position", "m", -_FARTHEST, _FARTHEST)
-        if not 1e-6 < sum(number * number for number in self.wxyz) < 1e6:
-            raise InvalidValueError("wxyz", self.wxyz, "has no direction; a unit quaternion is expected")
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,6 +246,92 @@ class Mount:
 
 
 @dataclass(frozen=True, slots=True)
+class PlaceArm:
+    """Places the stationary arm at other joint angles; refused while it moves or follows commands."""
+
+    name: ClassVar[str] = "place_arm"
+    q: Floats
+    """Joint angles, shape (n,), [rad]."""
+
+    def __post_init__(self) -> None:
+        """Checks the numbers; the controller checks count and range."""
+        _put(self, "q", as_joints(self.q, "q", "rad"))
+
+
+@dataclass(frozen=True, slots=True)
+class SetTool:
+    """Sets the tool as on the teach pendant: a reboot keeps it. Refused while the arm moves, like the next three."""
+
+    name: ClassVar[str] = "set_tool"
+    position: Floats
+    """Of the tool in the flange frame, shape (3,), [m]."""
+    wxyz: Floats = (1.0, 0.0, 0.0, 0.0)
+    """Its orientation in the flange frame, shape (4,)."""
+
+    def __post_init__(self) -> None:
+        """Checks the numbers; the controller checks their range."""
+        _put(self, "position", as_floats(self.position, 3, "position", "m"))
+        _put(self, "wxyz", _as_orientation(self.wxyz))
+
+
+@dataclass(frozen=True, slots=True)
+class SetLoad:
+    """Sets the load at the flange as on the teach pendant; see `Mount` for a physical load."""
+
+    name: ClassVar[str] = "set_load"
+    mass: float
+    """[kg]."""
+    center_of_mass: Floats = (0.0, 0.0, 0.0)
+    """In the flange frame, shape (3,), [m]."""
+    inertia: Floats = (0.0,) * 9
+    """About the centre of mass, row by row, shape (9,), [kg m^2]."""
+
+    def __post_init__(self) -> None:
+        """Checks the numbers; the controller checks their range."""
+        _put(self, "mass", as_float(self.mass, "mass", "kg", 0.0, 100.0))
+        _put(self, "center_of_mass", as_floats(self.center_of_mass, 3, "center_of_mass", "m"))
+        _put(self, "inertia", as_floats(self.inertia, 9, "inertia", "kg m^2"))
+
+
+@dataclass(frozen=True, slots=True)
+class SetBox:
+    """Sets the safety box as on the teach pendant."""
+
+    name: ClassVar[str] = "set_box"
+    size: Floats
+    """Edges along its own x, y and z, shape (3,), [m]."""
+    position: Floats
+    """Of its centre in base, shape (3,), [m]."""
+    wxyz: Floats = (1.0, 0.0, 0.0, 0.0)
+    """Its orientation in base, shape (4,)."""
+    active: bool = True
+    """Whether it is enforced."""
+
+    def __post_init__(self) -> None:
+        """Checks the numbers; the controller checks their range."""
+        _put(self, "size", as_floats(self.size, 3, "size", "m"))
+        _put(self, "position", as_floats(self.position, 3, "position", "m"))
+        _put(self, "wxyz", _as_orientation(self.wxyz))
+        _put(self, "active", as_flag(self.active, "active"))
+
+
+@dataclass(frozen=True, slots=True)
+class SetSoftLimits:
+    """Sets the soft limits of the joints as on the teach pendant."""
+
+    name: ClassVar[str] = "set_soft_limits"
+    lower: Floats
+    """Shape (n,), [rad]."""
+    upper: Floats
+    """Shape (n,), [rad]."""
+
+    def __post_init__(self) -> None:
+        """Checks the numbers; the controller checks count and range."""
+        _put(self, "lower", as_joints(self.lower, "lower", "rad"))
+        _put(self, "upper", as_joints(self.upper, "upper", "rad"))
+
+
+@dataclass(frozen=True, slots=True)
 class GetStatus:
     """Requests the status."""
 
@@ -269,6 +353,11 @@ WorldRequest: TypeAlias = (
     | Floor
     | Walls
     | Mount
+    | PlaceArm
+    | SetTool
+    | SetLoad
+    | SetBox
+    | SetSoftLimits
     | GetStatus
 )
 
@@ -284,6 +373,13 @@ def _network_faults(value: Any) -> NetworkFaults:
     except TypeError:
         known = ", ".join(NetworkFaults().as_dict())
         raise InvalidValueError("faults", value, f"are not faults of a network; known: {known}") from None
+
+
+def _as_orientation(value: object) -> Floats:
+    wxyz = as_floats(value, 4, "wxyz", "")
+    if not 1e-6 < sum(number * number for number in wxyz) < 1e6:
+        raise InvalidValueError("wxyz", wxyz, "has no direction; a unit quaternion is expected")
+    return wxyz
 
 
 def _put(owner: object, name: str, value: object) -> None:

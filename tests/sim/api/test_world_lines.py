@@ -60,6 +60,11 @@ REQUESTS = st.one_of(
     st.builds(world.Floor, st.booleans()),
     st.builds(world.Walls, st.booleans()),
     st.builds(world.Mount, st.none() | st.floats(0, 10), row(length, 3), row(length, 9)),
+    st.builds(world.PlaceArm, row(st.floats(-1, 1), 7)),
+    st.builds(world.SetTool, row(st.floats(-1, 1), 3), row(st.floats(0.1, 1), 4)),
+    st.builds(world.SetLoad, st.floats(0, 10), row(length, 3), row(length, 9)),
+    st.builds(world.SetBox, row(length, 3), row(length, 3), row(st.floats(0.1, 1), 4), st.booleans()),
+    st.builds(world.SetSoftLimits, row(length, 7), row(length, 7)),
     st.just(world.GetStatus()),
 )
 ANSWERS = st.one_of(

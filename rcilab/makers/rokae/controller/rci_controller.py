@@ -14,9 +14,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from rcilab.core.arrays import JointVector
+from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
@@ -33,7 +33,7 @@ from rcilab.makers.rokae.controller.request_handlers import (
     conclude,
     describe_refusal,
 )
-from rcilab.makers.rokae.controller.settings import Settings, apply_request, guided_freedom
+from rcilab.makers.rokae.controller.settings import Settings, apply_request, apply_setup, guided_freedom
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.rokae.limit_tables import cartesian_limits, require_table
@@ -41,6 +41,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.arm_setup import ArmSetup, require_stand
 from rcilab.sim.controller_config import MODE_DELAY, ForceSign
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
@@ -105,7 +106,7 @@ class RciController:
     ) -> None:
         model = arm.model
         self._limit_table = "manual"
-        self.settings = Settings.of(model.description)
+        self.settings = self._pendant = Settings.of(model.description)
         self.safety_stop: rci.SafetyStop = rci.SafetyStop.NONE
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
@@ -236,6 +237,27 @@ class RciController:
         """Moves the arm at standstill to another position (simulation only)."""
         self._is_still = False
         self.arm.reset(q)
+
+    def set_up(self, setup: ArmSetup) -> None:
+        """Sets the arm up as on its teach pendant; a reboot keeps it.
+
+        Raises:
+            InvalidValueError: A value is out of its bounds, or the arm cannot stand at the joint angles.
+            UsageError: The arm moves, follows commands or is guided.
+        """
+        if self.phase not in _STILL or not self.arm.is_standstill:
+            why = "while it still moves" if self.phase in _STILL else f"in phase {self.phase_name}"
+            raise UsageError(f"the arm cannot be set up or placed {why}; end its motion first")
+        description = self.model.description
+        settings = apply_setup(self.settings, setup, description)
+        if setup.q is not None:
+            require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings)
+        self.settings, self._pendant = settings, apply_setup(self._pendant, setup, description)
+        self.arm.configure(settings)
+        if setup.q is not None:
+            self.arm.reset(readonly_copy(setup.q))
+        self._reporter.configure(self.model, settings)
+        self._is_still = False
 
     def receive(self, packet: rci.CommandPacket) -> None:
         """Queues a command from the network while a motion is in progress; others are counted."""
@@ -402,7 +424,7 @@ class RciController:
                 assert isinstance(request, rci.StartDrag)
                 self.arm.begin_guiding(guided_freedom(request))
             case Action.REBOOT:
-                self.settings = self.settings.rebooted(self.model.description)
+                self.settings = self.settings.rebooted(self._pendant)
                 self.arm.configure(self.settings)
                 self._reporter.configure(self.model, self.settings)
             case Action.APPLY:

@@ -30,6 +30,7 @@ from rcilab.makers.rokae.bounds import (
 from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
 from rcilab.sim.arm_parameters import ArmParameters, Floats, ForceAxesKind
+from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.hand_guiding import GuidedFreedom
 
 _FORCE_AXES = {
@@ -70,10 +71,41 @@ class Settings(ArmParameters):
         """Returns the settings with every digital output wired to its input, or none."""
         return replace(self, loop_back=on, inputs=self.outputs if on else self.inputs)
 
-    def rebooted(self, arm: RobotDescription) -> Settings:
-        """Returns the settings after a reboot: the defaults, except for values set outside of the controller."""
-        kept = replace(Settings.of(arm), inputs=self.inputs, auto_limit=self.auto_limit)
+    def rebooted(self, pendant: Settings) -> Settings:
+        """Returns the settings after a reboot: those of the teach pendant, and values set outside of the controller."""
+        kept = replace(pendant, inputs=self.inputs, auto_limit=self.auto_limit)
         return kept.with_loop_back(self.loop_back)
+
+
+def apply_setup(settings: Settings, setup: ArmSetup, arm: RobotDescription) -> Settings:
+    """Returns the settings with those of a set-up, whose bounds are those of a client's requests.
+
+    Raises:
+        InvalidValueError: A value is out of its bounds; it names the part and the value.
+    """
+    for part, request in _setup_requests(setup, arm.n):
+        try:
+            settings = apply_request(settings, request, arm)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"{part}: {error.name}", error.value, error.requirement) from error
+    return settings
+
+
+def _setup_requests(setup: ArmSetup, n: int) -> Iterator[tuple[str, rci.Request]]:
+    tool, load, box = setup.T_flange_tool, setup.load, setup.safety_box
+    if tool is not None:
+        yield "tool", rci.SetCoor(tool.as_row_major())
+    if load is not None:
+        center, inertia = tuple(load.center_of_mass.tolist()), tuple(load.inertia.ravel().tolist())
+        yield "load", rci.SetLoad(load.mass, center, inertia)
+    if box is not None:
+        yield "safety box", rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active)
+    if setup.soft_limits is not None:
+        for bounds in setup.soft_limits:
+            if len(bounds) != n:
+                raise InvalidValueError("soft limits", bounds, f"must have {n} numbers each [rad]")
+        lower, upper = ((*bounds, *[0.0] * (7 - n)) for bounds in setup.soft_limits)
+        yield "soft limits", rci.SetJointLimit(upper, lower)
 
 
 def apply_request(settings: Settings, request: rci.Request, arm: RobotDescription) -> Settings:
