@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 from rcilab.core.errors import UsageError
@@ -21,21 +23,28 @@ def open_shared_memory(size: int, user: str) -> int:
         user: What needs it, for the error, such as "the control process".
 
     Raises:
+        OSError: The process has too many open files.
         UsageError: Neither directory has enough space.
     """
-    for directory in (_MEMORY, Path(tempfile.gettempdir())):
+    for directory in _directories():
         if not directory.is_dir():
             continue
         try:
             with tempfile.TemporaryFile(dir=directory) as file:
                 os.posix_fallocate(file.fileno(), 0, size)
                 return os.dup(file.fileno())
-        except OSError:  # Full or not writable: containers often limit /dev/shm to 64 MB.
-            continue
+        except OSError as error:  # Full or not writable: containers often limit /dev/shm to 64 MB.
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                raise
     raise UsageError(
         f"{user} needs {size / 1e6:.0f} MB of shared memory, and neither {_MEMORY} nor {tempfile.gettempdir()} has "
         "enough space; free some"
     ).coded("no_memory", size=f"{size / 1e6:.0f}")
+
+
+def _directories() -> Iterator[Path]:
+    yield _MEMORY
+    yield Path(tempfile.gettempdir())
 
 
 def whole_pages(size: int) -> int:
