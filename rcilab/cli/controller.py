@@ -32,6 +32,9 @@ DESCRIPTION = """\
 Runs the virtual controller of an arm. Any client of the maker's interface can connect to it: this package, or a C++
 program that uses the vendor's client library. It prints one line when it is ready, a second one with the address of its
 simulation port, and ends on Ctrl-C.
+
+--lockstep runs your unmodified program at the speed of the machine, several times real time, and loses no command at a
+breakpoint or on a busy machine. FILE, or the options below, start the arm where yours stands.
 """
 
 EPILOG = """A set-up file holds what the teach pendant of your arm holds, and options of this command; options on the
@@ -56,8 +59,6 @@ command line take precedence over it. Numbers are in SI units; a text is as on t
   [controller]
   plant = "mujoco"                  # every option of the first list, with _ for -
   mode_delay = 0.2
-
-With --lockstep an unmodified client runs as fast as this machine computes, and its results are the same in every run.
 """
 
 _OPTIONS = {

@@ -19,7 +19,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
-from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.diagnostics.bench.measure import Measurement, summarise, summarise_rate
 from rcilab.diagnostics.host import probe_realtime
 from rcilab.makers.driver import parse_address
 from rcilab.makers.rokae import wire as rci
@@ -33,6 +33,8 @@ _ROBOT = "xMatePro7"
 _DURATION = 5.0  # [s] of simulated motion.
 _DEPTH = 0.05  # [m] that the tool goes down and up.
 _TARGETS: dict[PlantKind, float] = {"ideal": 150.0, "mujoco": 250.0}  # [us]
+_RATE_TARGET = 2.0  # [times real time] In lock-step.
+_SPAN = 100  # [cycles] Of which the speed is measured.
 _JITTER_TARGET = 100.0  # [us] Largest deviation of 99.9 % of the periods.
 _TIMEOUT = 10.0  # [s]
 _RECOVERY_TIME = 0.005  # [s] After a stall of a core, for which it can still delay a period.
@@ -115,6 +117,30 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     if is_faulty:
         note += "; THE MOTION WAS STOPPED BY A FAULT"
     return replace(found, note=note, ok=p999 <= _JITTER_TARGET and not is_faulty if has_fifo else None)
+
+
+def bench_lockstep() -> Measurement:
+    """Speed of a whole motion in lock-step: a client over sockets, which answers each state at once."""
+    model = load_model(_ROBOT)
+    commands = joint_commands(model, _DURATION)
+    rates: list[Measurement] = []
+    for plant in PLANT_KINDS:
+        controller = start_controller(_ROBOT, plant, lockstep=True)
+        try:
+            assert controller.address is not None
+            address = parse_address(controller.address)
+            stamps, is_faulty = _stream(address.host, address.port, commands, round(_DURATION / CYCLE_TIME))
+        finally:
+            controller.end()
+        rates.append(summarise_rate("lockstep", np.diff(stamps[::_SPAN]) / _SPAN, _RATE_TARGET))
+        if is_faulty:
+            return replace(rates[-1], ok=False, note="THE MOTION WAS STOPPED BY A FAULT")
+    found, other = rates
+    return replace(
+        found,
+        note=f"{_ROBOT}, {_DURATION:g} s of motion and a client in Python; median of spans of {_SPAN} cycles, and what "
+        f"99 % of them exceed; in MuJoCo {other.median:.1f} times",
+    )
 
 
 def joint_commands(model: RobotModel, duration: float) -> Command:

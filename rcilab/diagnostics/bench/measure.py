@@ -10,8 +10,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-Unit = Literal["us", "ms", "s"]
-UNIT_SECONDS: dict[Unit, float] = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+from rcilab.core.clock import CYCLE_TIME
+
+Unit = Literal["us", "ms", "s", "times real time"]
+UNIT_SECONDS: dict[str, float] = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +25,7 @@ class Measurement:
     p99: float
     unit: Unit
     target: float | None
-    """Target, in `unit`; None without a target."""
+    """Target, in `unit`: the largest median, or the smallest of a rate; None without a target."""
     ok: bool | None
     """Whether the target is met; None without a target."""
     note: str = ""
@@ -64,6 +66,22 @@ def summarise(name: str, seconds: ArrayLike, unit: Unit, target: float | None, n
         name=name, median=median, p99=p99, unit=unit, target=target, ok=None if target is None else median <= target,
         note=note,
     )  # fmt: skip
+
+
+def summarise_rate(name: str, seconds: ArrayLike, target: float, note: str = "") -> Measurement:
+    """Returns how much faster than real time cycles are: the median, and what 99 % of the measurements exceed.
+
+    Args:
+        name: Name of the bench.
+        seconds: Mean duration of a cycle in each measurement, [s].
+        target: Smallest median.
+        note: Further facts.
+    """
+    rates = CYCLE_TIME / np.asarray(seconds, dtype=np.float64)
+    median, p99 = float(np.median(rates)), float(np.percentile(rates, 1))
+    return Measurement(
+        name=name, median=median, p99=p99, unit="times real time", target=target, ok=median >= target, note=note
+    )
 
 
 def time_calls(call: Callable[[Any], object], arguments: Sequence[object], *, warm_up: int = 5) -> list[float]:

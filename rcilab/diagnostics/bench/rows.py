@@ -36,6 +36,7 @@ ROWS = MappingProxyType(
         "controller_cartesian": "controller",
         "controller_impedance": "controller",
         "record": "record",
+        "lockstep": "controller",
         "client_answer": "client",
         "jog": "compute",
         "plan_line": "paths",

@@ -7,7 +7,7 @@ import pytest
 
 from rcilab.conformance.check import check
 from rcilab.diagnostics.bench.compute import motion_of
-from rcilab.diagnostics.bench.measure import cost_by_length, plain, summarise, time_calls
+from rcilab.diagnostics.bench.measure import cost_by_length, plain, summarise, summarise_rate, time_calls
 from rcilab.model.robot_model import load_model
 
 
@@ -34,6 +34,13 @@ def test_every_argument_is_timed_once_after_the_warm_up() -> None:
     assert called == [1, 2, 1, 2, 3]
     assert len(times) == 3
     assert min(times) > 0.0
+
+
+@pytest.mark.parametrize(("target", "ok"), [(4.0, True), (4.1, False)])
+def test_a_rate_is_how_much_faster_than_real_time_its_cycles_are(target: float, ok: bool) -> None:
+    found = summarise_rate("x", [250e-6] * 99 + [500e-6] * 2, target)
+    assert (found.median, found.p99, found.unit) == (pytest.approx(4.0), pytest.approx(2.0), "times real time")
+    assert found.ok is ok
 
 
 @pytest.mark.parametrize("duration", [0.8, 3.0, 10.0, 30.0])
