@@ -133,6 +133,7 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "prefill": _whole,
         "patience": _number,
         "lost_limit": _whole,
+        "on_loss": _text,
         "auto_limit": as_flag,
         "loop_back": as_flag,
         "limits": _text,

@@ -126,8 +126,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--lost-limit",
         type=int,
         metavar="N",
-        help="number of consecutive lost commands that stops a motion, 10 to 20; 0: none (20). Fewer stop it "
-        "if the next command could only be reached with a jump: --prefill helps there",
+        help="number of consecutive lost commands that stops a motion, 10 to 20; 0: none (20). With --on-loss "
+        "hold, a command is lost when it is more than 30 ms late; with bridge, fewer stop a motion if the next command "
+        "could only be reached with a jump: --prefill helps there",
+    )
+    parser.add_argument(
+        "--on-loss",
+        metavar="NAME",
+        help="while commands are missing: hold the last one, as a real arm does, or bridge the gap (hold)",
     )
     parser.add_argument(
         "--auto-limit",
@@ -272,6 +278,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         prefill=option("prefill"),
         patience=option("patience"),
         lost_limit=option("lost_limit", MOST_LOST) or None,  # 0 switches it off.
+        on_loss=option("on_loss", "hold"),
         auto_limit=option("auto_limit", False),
         loop_back=option("loop_back", False),
         limit_table=option("limits", "manual"),

@@ -38,6 +38,7 @@ def build_virtual_controller(
         prefill=config.prefill_cycles,
         torque_prefill=config.prefill,
         lost_limit=config.lost_limit,
+        on_loss=config.on_loss,
     )
     server = maker.build_server(arm, config)
     setup = config.setup(tuple(model.home.tolist()))

@@ -102,6 +102,16 @@ class Link:
         return f"<Link of {self.mass:.4g} kg, centre of mass at {centre} m: .inertia, .origin_height, .source>"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoFigures:
+    """The position servo of a joint, as a second-order system."""
+
+    bandwidth: float
+    """Natural frequency, [rad/s]."""
+    damping: float
+    """Damping ratio, [1]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotDescription:
     """An arm: the data that all computations use."""
@@ -130,6 +140,8 @@ class RobotDescription:
     """Returns the conditions of the maker's interface; None: the common ones, which raise no fault."""
     elbow_flip: float | None = None
     """Angle of joint 4 beyond which the elbow counts as flipped, [rad]; None if the maker defines no flip."""
+    servos: tuple[ServoFigures, ...] | None = None
+    """Response of the joints to commands that stop coming, one per joint; None: no figures."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
 

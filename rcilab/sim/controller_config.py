@@ -14,7 +14,7 @@ from rcilab.sim.api import NetworkFaults, Stall
 from rcilab.sim.arm_parameters import Floats
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
-from rcilab.sim.streamed_motion import PREFILL
+from rcilab.sim.streamed_motion import LOSS_BEHAVIOURS, PREFILL, LossBehaviour
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
@@ -72,7 +72,11 @@ class ControllerConfig:
     """Timeout of lock-step for a command before it counts as lost, [s]; None: 60, so that a client may be paused in a
     debugger; 0.05 while corruption is simulated."""
     lost_limit: int | None = MOST_LOST
-    """Lost cycles in a row that are an instability, 10 to 20; None: any number is bridged."""
+    """Lost commands in a row that are an instability, 10 to 20; None: no number is. While commands are held, one counts
+    as lost when it is more than 30 cycles late."""
+    on_loss: LossBehaviour = "hold"
+    """What the arm does while commands are missing: it holds the last one, with the response of its servo, as a real
+    xMatePro3 does; or the motion is bridged, with the acceleration of the last commands."""
     auto_limit: bool = False
     """Whether commanded joint angles are stopped inside the soft limits, instead of raising a fault beyond them."""
     loop_back: bool = False
@@ -127,6 +131,8 @@ class ControllerConfig:
             raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
+        if self.on_loss not in LOSS_BEHAVIOURS:
+            raise InvalidValueError("on_loss", self.on_loss, f"is unknown; known: {', '.join(LOSS_BEHAVIOURS)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.patience is not None and not 0.01 <= self.patience <= 3600.0:

@@ -202,7 +202,11 @@ class JitterBuffer:
         behind = self._last_id - command.number
         if command.number in self._passed_over:
             return False
-        return 0 <= behind <= LONGEST_GAP and (behind > 0 or self._is_last_lost) and self.is_playing
+        return (
+            0 <= behind <= max(LONGEST_GAP, self.consecutive_lost)
+            and (behind > 0 or self._is_last_lost)
+            and self.is_playing
+        )
 
     def _find_excess(self) -> None:
         queued = len(self._queue) - 1

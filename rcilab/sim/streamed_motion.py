@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias, get_args
+
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
@@ -14,7 +16,13 @@ PREFILL = 10  # [cycles] Pauses of client and network that are absorbed, and the
 # machine, even under SCHED_FIFO, occasional pauses of 5 to 10 ms were measured at both ends.
 TORQUE_PREFILL = 2  # [cycles] The same for torques: the client closes the loop, and delay makes it oscillate.
 LOST_LIMIT = 20  # [cycles] Consecutive lost commands that end a motion (RCI manual 4.6: usually 10 to 20).
+LATE_TOLERANCE = 30  # [cycles] Where commands are held, one that comes this late is late, not lost: on a real arm they
+# stopped coming for 22 cycles in a row, during a pause of some 30 ms, without a fault (docs/pauses.md).
 DRAIN_LIMIT = 300  # [cycles] How long queued commands are played after the end of the stream; longer than any queue.
+
+LossBehaviour: TypeAlias = Literal["hold", "bridge"]
+"""What the arm does while commands are missing: it holds the last one, or continues the motion."""
+LOSS_BEHAVIOURS: tuple[LossBehaviour, ...] = get_args(LossBehaviour)
 
 
 class StreamedMotion:
@@ -28,16 +36,21 @@ class StreamedMotion:
     Args:
         prefill: Cycles between the first command and its play-out.
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
-        lost_limit: Consecutive lost cycles that end the motion with a violation; None: no limit.
+        lost_limit: Consecutive lost commands that end the motion with a violation; None: no limit. Where commands are
+            held, those that are at most `LATE_TOLERANCE` late do not count.
+        on_loss: What the arm does without commands; torques are held in any case.
     """
 
-    def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
+    def __init__(
+        self, prefill: int, torque_prefill: int | None, lost_limit: int | None, on_loss: LossBehaviour
+    ) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.playback: Playback | None = None
         self.mode = MotionMode(ControlLaw.POSITION, False)
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
+        self._on_loss = on_loss
         self._generator: MotionGenerator | None = None
         self._drain: int | None = None  # Remaining cycles for the queue; None until the stream has ended.
 
@@ -46,6 +59,11 @@ class StreamedMotion:
         """The control law that follows the commands."""
         is_over = self.mode.law.is_force_driven and self.playout.is_finished  # No further command holds the arm.
         return ControlLaw.POSITION if is_over else self.mode.law
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Whether the reference still responds to commands that were missing."""
+        return self.is_followed and self._generator is not None and self._generator.is_off_commands
 
     def prepare(self, mode: MotionMode) -> None:
         """Resets everything for a motion in this mode."""
@@ -70,20 +88,29 @@ class StreamedMotion:
         """Plays the command that is due in this cycle; None without one. Do not follow an output with violations."""
         playout = self.playout
         self.playback = None
-        if self._drain is not None:
-            self._drain = self._drain - 1 if len(playout) else 0
-            if self._drain == 0:
-                self.is_followed = False
-                return None
         generator = self._generator
         assert generator is not None  # `begin` has set it.
+        if self._drain is not None:
+            self._drain -= 1
+            settled = None if len(playout) else generator.settle()
+            if self._drain <= 0 or not (len(playout) or settled):
+                self.is_followed = False
+                return None
+            if settled is not None:
+                return settled
         playback = self.playback = playout.take(generator.is_next)
         if playback.command is None and not playback.is_lost:
-            return None
+            return generator.settle()
         output = generator.step(playback)
-        if playback.is_lost and self._lost_limit is not None and playout.consecutive_lost >= self._lost_limit:
+        limit = self._longest_loss()
+        if playback.is_lost and limit is not None and playout.consecutive_lost >= limit:
             return GeneratorOutput(violations=(ArmViolation(ArmCondition.COMMANDS_ARRIVE, self._describe_loss()),))
         return output
+
+    def _longest_loss(self) -> int | None:
+        """Returns the number of consecutive cycles without a command that ends the motion; None: none does."""
+        is_held = self._on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE
+        return self._lost_limit + LATE_TOLERANCE if self._lost_limit is not None and is_held else self._lost_limit
 
     def _describe_loss(self) -> Remark:
         if not self.playout.is_playing:

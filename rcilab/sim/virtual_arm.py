@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.limits import Limits
@@ -24,16 +25,18 @@ from rcilab.sim.actuator import Actuator, ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.generators import build_generator
+from rcilab.sim.generators.generator import blame_lost_commands
 from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
 from rcilab.sim.generators.start import start_tolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
+from rcilab.sim.hold_response import servo_figures
 from rcilab.sim.jitter_buffer import JitterBuffer, Playback
 from rcilab.sim.measured_state import MeasuredStateMonitor
 from rcilab.sim.plant import Measurement, Plant, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
-from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, StreamedMotion
+from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, LossBehaviour, StreamedMotion
 from rcilab.sim.tool_kinematics import ToolKinematics
-from rcilab.sim.violations import Violations
+from rcilab.sim.violations import CycleViolation, Violations
 
 STANDSTILL = 1e-4  # [rad/s] Below it a joint is stationary; 0.006 deg/s is far below what a tool resolves.
 SETTLE_LIMIT = 300  # [cycles] Timeout for an arm that an obstacle keeps off its reference.
@@ -68,6 +71,12 @@ class StepResult(NamedTuple):
 _CLEAN = StepResult()
 
 
+def _blame_pause(violation: CycleViolation) -> CycleViolation:
+    """Returns the violation of a measurement while the servo responds to a pause, which explains an acceleration."""
+    is_acceleration = isinstance(violation, LimitViolation) and violation.condition.order == 2
+    return blame_lost_commands(violation.remark) if is_acceleration else violation
+
+
 class VirtualArm:
     """One arm. Owned by the loop that calls `step` once per cycle.
 
@@ -88,7 +97,8 @@ class VirtualArm:
         parameters: The configuration; None: that after power-up.
         prefill: Cycles between the first command of a motion and its play-out.
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
-        lost_limit: Consecutive lost cycles that end a motion; None: no limit.
+        lost_limit: Consecutive lost commands that end a motion; None: no limit. See `StreamedMotion`.
+        on_loss: What the arm does while commands are missing.
     """
 
     def __init__(
@@ -100,6 +110,7 @@ class VirtualArm:
         prefill: int = PREFILL,
         torque_prefill: int | None = None,
         lost_limit: int | None = LOST_LIMIT,
+        on_loss: LossBehaviour = "hold",
     ) -> None:
         self.model = model
         self.plant = plant
@@ -113,7 +124,8 @@ class VirtualArm:
         self.playback: Playback | None = None
         self.on_command: Callable[[ArmCommand], None] = lambda command: None
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
-        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
+        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit, on_loss)
+        self._servos = servo_figures(model.description) if on_loss == "hold" else None
         self._actuator = Actuator(model, parameters)
         self._tau_c: list[float] | None = None
         self._tool_version = self.commanded.version
@@ -213,7 +225,7 @@ class VirtualArm:
             tolerance = tolerance.widened(start_tolerance(self._last_compliance, parameters))
         starts = (sensors.measured.q, np.array(self.commanded.q))
         tools = (sensors.tool.pose, self.tool_c.pose)
-        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance)
+        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance, self._servos)
         self._motion.begin(build_generator(mode, bounds, list(self.commanded.q)))
         sensors.begin(
             bounds.limits,
@@ -274,6 +286,8 @@ class VirtualArm:
             # The arm's own stop is a motion of the joints: the tool has no commanded motion.
             violations = self.measured_state.check(is_commanded=self._motion.is_followed)
             if violations:
+                if self._motion.is_off_commands:
+                    violations = tuple(map(_blame_pause, violations))
                 result = StepResult(measured_violations=violations)
                 self._react()
         return result

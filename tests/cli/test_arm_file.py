@@ -42,6 +42,7 @@ plant = "mujoco"
 mode_delay = 0.2
 prefill = 20
 lost_limit = 0
+on_loss = "bridge"
 auto_limit = true
 log_format = "json"
 no_world = true
@@ -87,6 +88,7 @@ def test_a_file_holds_the_set_up_and_the_options(file: Path, monkeypatch: pytest
     assert config.inputs == (0, 3)
     assert (config.host, config.port, config.plant, config.mode_delay) == ("127.0.0.9", 0, "mujoco", 0.2)
     assert (config.prefill, config.lost_limit, config.auto_limit) == (20, None, True)
+    assert config.on_loss == "bridge"
     assert (config.log_format, config.world_port) == ("json", None)
 
 

@@ -49,12 +49,12 @@ def test_a_joint_may_be_a_tenth_faster_than_commanded(part, expected):
     )
 
 
-@pytest.mark.parametrize("size", [2.9, 3.1])
-def test_a_steady_acceleration_of_three_times_the_bound_is_too_much(size):
+@pytest.mark.parametrize("size", [3.4, 3.6])
+def test_a_steady_acceleration_of_three_and_a_half_times_the_bound_is_too_much(size):
     judge, faults = monitor(), ()
     for cycle in range(60):
         faults = faults_of(judge.step(HOME, with_one(STILL, 1, size * 7.5 * CYCLE_TIME * cycle), CENTRE, None, None))
-    assert faults == ((Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION,) if size > 3.0 else ())
+    assert faults == ((Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION,) if size > 3.5 else ())
 
 
 def test_noise_of_the_sensors_is_no_acceleration():

@@ -86,7 +86,7 @@ def test_a_push_on_an_arm_that_stands_is_not_blamed_on_the_plan():
         said = fault_of(robot, stand_while(robot, push))
         assert "kActualJointAccelerationLimitsViolation" in said
         assert "joint 6: measured acceleration" in said
-        assert "rad/s^2 passes -45 rad/s^2" in said
+        assert "rad/s^2 passes -52.5 rad/s^2" in said
         assert "a push" in said
         assert PLANNED not in said
 

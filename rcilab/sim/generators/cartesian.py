@@ -1,7 +1,8 @@
 """Tool poses commanded one by one: Cartesian position and Cartesian impedance.
 
 A commanded pose passes the pose filter and the conditions of the tool, then the inverse kinematics on the present
-branch, then the soft-limit governor if enabled, and finally the conditions of the joint angles.
+branch, then the soft-limit governor if enabled, and finally the conditions of the joint angles. A lost cycle continues
+with the acceleration of the last poses, or holds the joint angles of the last one.
 
 The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is held: from the start of the motion,
 or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
@@ -103,6 +104,8 @@ class CartesianGenerator:
             if violations:
                 return GeneratorOutput(violations=with_jump(self._jump, violations))
             self._jump = None
+        elif self._bounds.servos is not None:  # The servo continues from the last joint angles.
+            return self._reference.hold()
         try:
             q = self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
@@ -116,6 +119,15 @@ class CartesianGenerator:
         if step.q is not None:
             self._q = q
         return step
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Whether the joints still respond to commands that were missing."""
+        return self._reference.is_off_commands
+
+    def settle(self) -> GeneratorOutput | None:
+        """Continues the response to a pause after the last command; None without one."""
+        return self._reference.settle()
 
     def _begin(self, values: list[float]) -> None:
         """Processes the first command: the start of the motion at standstill, or its first step from the reference."""

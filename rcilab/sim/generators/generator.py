@@ -13,6 +13,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.start import StartMonitor, StartOffset, StartTolerance, find_joint_jump
+from rcilab.sim.hold_response import HoldResponse
 from rcilab.sim.jitter_buffer import Playback
 from rcilab.sim.reference_trajectory import JOIN_SHARE
 from rcilab.sim.soft_limit_governor import SoftLimitGovernor
@@ -45,6 +46,15 @@ class MotionGenerator(Protocol):
         """Processes the command of this cycle, or bridges a cycle without one."""
         ...
 
+    @property
+    def is_off_commands(self) -> bool:
+        """Whether the reference still responds to commands that were missing."""
+        ...
+
+    def settle(self) -> GeneratorOutput | None:
+        """Returns the reference of a cycle after the last command; None: it does not move any more because of it."""
+        ...
+
 
 class MissedCycles:
     """Counts the cycles between two commands. Owned by a motion generator."""
@@ -64,8 +74,13 @@ class MissedCycles:
 
 def lost_motion(reason: Remark) -> GeneratorOutput:
     """Returns the output of a motion that cannot continue without the lost commands."""
+    return GeneratorOutput(violations=(blame_lost_commands(reason),))
+
+
+def blame_lost_commands(reason: Remark) -> ArmViolation:
+    """Returns the violation of a motion that lost commands have ended."""
     remark = Remark(f"lost commands broke the motion: {reason}", "lost_motion", reason=reason)
-    return GeneratorOutput(violations=(ArmViolation(ArmCondition.COMMANDS_ARRIVE, remark),))
+    return ArmViolation(ArmCondition.COMMANDS_ARRIVE, remark)
 
 
 def with_jump(jump: Remark | None, violations: Sequence[LimitViolation]) -> Violations:
@@ -76,8 +91,10 @@ def with_jump(jump: Remark | None, violations: Sequence[LimitViolation]) -> Viol
 class JointReference:
     """The last stage of every motion of joint angles: the soft-limit governor, if enabled, then the joint conditions.
 
-    The conditions apply to the client's commands. The replacement of a lost command is checked only for an acceleration
-    above `JOIN_SHARE` times the limit and for the range of the joint.
+    The conditions apply to the client's commands, over the cycles between them. The replacement of a lost command is
+    checked only for an acceleration above `JOIN_SHARE` times the limit and for the range of the joint. Where the last
+    command is held instead, the reference is the response of the servo (`HoldResponse`), which only the measured
+    conditions check.
 
     Args:
         bounds: Filters and limits of the motion.
@@ -99,6 +116,7 @@ class JointReference:
         self._max_acceleration: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
         self._last = self._before = q
         self._cycles_to_check = 0
+        self._servo = None if bounds.servos is None else HoldResponse(bounds.servos, q)
 
     def begin(self, q: list[float], tolerance: StartTolerance | None) -> bool:
         """Processes the first commanded angles, before `step`; returns whether the motion starts there, at standstill.
@@ -139,6 +157,8 @@ class JointReference:
             reference = self._offset.step(q)
             if self._offset.is_absorbed:
                 self._offset, self._cycles_to_check = None, 0
+        if self._servo is not None:
+            return self._step_servo(self._servo, q, reference, cycles)
         excess = (
             None if cycles == 1 and self._cycles_to_check == 0 else self._find_excess_acceleration(reference, cycles)
         )
@@ -149,6 +169,28 @@ class JointReference:
             return GeneratorOutput(reference)
         output = self._check(q, cycles)
         return output if reference is q or output.violations else GeneratorOutput(reference)
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Whether the servo still responds to commands that were missing."""
+        return self._servo is not None and self._servo.is_active
+
+    def hold(self) -> GeneratorOutput:
+        """Processes a cycle without a command, and without joint angles that replace it."""
+        return self.step([2.0 * x - y for x, y in zip(self._last, self._before, strict=True)], 0)
+
+    def settle(self) -> GeneratorOutput | None:
+        """Continues the response to a pause after the last command; None without one."""
+        q = None if self._servo is None else self._servo.settle()
+        return None if q is None else GeneratorOutput(q)
+
+    def _step_servo(self, servo: HoldResponse, q: list[float], reference: list[float], cycles: int) -> GeneratorOutput:
+        self._last, self._before = reference, self._last
+        if cycles == 0:
+            return GeneratorOutput(servo.hold())
+        output = self._check(q, cycles)
+        followed = servo.follow(reference, cycles)
+        return output if followed is q or output.violations else GeneratorOutput(followed)
 
     def _monitor_from(self, q: list[float]) -> JointMonitor:
         monitor = JointMonitor(self._limits)

@@ -2,7 +2,8 @@
 
 The commanded angles pass the joint filter, then the soft-limit governor if enabled, and then the conditions of joint
 angles. A lost cycle continues with the acceleration of the last commands, or, if a later command is already known, on
-the cubic to it. The conditions apply to the received commands, over the cycles between them.
+the cubic to it; where the last command is held, this only continues filter and governor. The conditions apply to the
+received commands, over the cycles between them.
 """
 
 from __future__ import annotations
@@ -57,6 +58,15 @@ class JointGenerator:
             self._begin(q)
         self._stream.take(q)
         return self._reference.step(self._filter.step(q), cycles)
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Whether the joints still respond to commands that were missing."""
+        return self._reference.is_off_commands
+
+    def settle(self) -> GeneratorOutput | None:
+        """Continues the response to a pause after the last command; None without one."""
+        return self._reference.settle()
 
     def _begin(self, q: list[float]) -> None:
         """Processes the first command; filter and prediction start there if the motion does."""

@@ -11,6 +11,7 @@ from rcilab.core.safety_box import EntryBox, SafetyBox, active_box, box_for_star
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import range_from
+from rcilab.robots.description import ServoFigures
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.generators.start import StartTolerance
@@ -41,6 +42,8 @@ class MotionLimits:
     """Largest difference of the first command from the reference."""
     starts: tuple[Pose, ...]
     """Poses of the tool in base where the motion begins: measured and commanded."""
+    servos: tuple[ServoFigures, ...] | None
+    """The servos that respond to a held command, one per joint; None: lost commands are bridged instead."""
 
     def entry_box(self) -> SafetyBox | EntryBox | None:
         """Returns the bounds of the tool; if it starts outside the box, it may only move inwards."""
@@ -55,6 +58,7 @@ def build_motion_limits(
     starts: tuple[JointVector, ...],
     tools: tuple[Pose, ...],
     tolerance: StartTolerance,
+    servos: tuple[ServoFigures, ...] | None,
 ) -> MotionLimits:
     """Returns filters and bounds of a motion.
 
@@ -70,6 +74,7 @@ def build_motion_limits(
         starts: Measured and commanded joint angles at the start: the farther one extends a range.
         tools: Measured and commanded pose of the tool in base.
         tolerance: Largest difference of the first command from the reference.
+        servos: The servos that respond to a held command; None: lost commands are bridged.
     """
     joint = parameters.soft_limits(limits.joint)
     for q in starts:
@@ -82,4 +87,5 @@ def build_motion_limits(
         box=active_box(None if has_walls else parameters.safety_box),
         tolerance=tolerance,
         starts=tools,
+        servos=servos,
     )

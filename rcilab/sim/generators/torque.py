@@ -60,3 +60,12 @@ class TorqueGenerator:
         if cycles > 0 and (violations := self._monitor.step(tau, cycles)):
             return GeneratorOutput(violations=tuple(violations))
         return GeneratorOutput(tau=tau)
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Returns False: torques have no reference."""
+        return False
+
+    def settle(self) -> GeneratorOutput | None:
+        """Returns None: torques end with the last command."""
+        return None

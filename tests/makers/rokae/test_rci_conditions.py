@@ -104,7 +104,7 @@ def test_measured_bounds_leave_a_servo_room_over_the_commanded_ones_and_say_so()
         commanded = row.id.removeprefix("measured.")
         if row.order > 0:
             factor = row.bounds(ARM)[1] / RCI_CONDITIONS.find(commanded).bounds(ARM)[1]
-            assert factor.tolist() == pytest.approx([(1.1, 3.0)[row.order - 1]] * len(factor)), row.id
+            assert factor.tolist() == pytest.approx([(1.1, 3.5)[row.order - 1]] * len(factor)), row.id
 
 
 def test_conditions_on_the_tool_need_all_limits():

@@ -14,7 +14,7 @@ import numpy as np
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
-from rcilab.robots.description import Link
+from rcilab.robots.description import Link, ServoFigures
 
 MANUAL = "RCI user manual V1.3.1"
 ROS2 = "vendor's public ROS 2 description package"
@@ -89,6 +89,16 @@ def xmate_limits(n: int) -> Limits:
         arm_angle=ArmAngleLimits(velocity=pi, acceleration=10.0, jerk=5000.0) if n == 7 else None,
         sources=MappingProxyType(sources),
     )
+
+
+def xmate_servos(n: int) -> tuple[ServoFigures, ...]:
+    """Returns the servos of an arm with 7 or 6 joints, fitted to 20 s of joint velocities of a real xMatePro3.
+
+    Its commands stopped coming three times, for 12, 12 and 22 cycles (public identification data; docs/pauses.md has
+    the figures). The other arms have drives of the same two sizes; there is no recording of one.
+    """
+    large, small = ServoFigures(bandwidth=110.0, damping=0.9), ServoFigures(bandwidth=190.0, damping=1.2)
+    return (*(large,) * (n - 3), *(small,) * 3)
 
 
 def pro_heights(d1: float, d3: float, d5: float, d7: float) -> tuple[float, ...]:

@@ -7,7 +7,15 @@ from math import pi, radians
 from rcilab.core.arrays import readonly_copy
 from rcilab.makers.rokae.conditions import rci_conditions
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, pro_heights, solid_link, tabled_link, xmate_limits
+from rcilab.makers.rokae.robots.xmate import (
+    MANUAL,
+    ROS2,
+    pro_heights,
+    solid_link,
+    tabled_link,
+    xmate_limits,
+    xmate_servos,
+)
 from rcilab.robots.description import DhRow, RobotDescription
 
 _HEIGHTS = pro_heights(d1=0.3415, d3=0.3940, d5=0.3660, d7=0.2503)
@@ -41,4 +49,5 @@ DESCRIPTION = RobotDescription(
     maker="rokae",
     faults=Fault,
     conditions=rci_conditions,
+    servos=xmate_servos(7),
 )

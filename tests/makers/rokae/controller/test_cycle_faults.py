@@ -14,6 +14,7 @@ from rcilab.makers.rokae.controller import fault_stop
 from rcilab.makers.rokae.controller.state_machine import Phase
 from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
+from rcilab.sim.streamed_motion import LATE_TOLERANCE, LOST_LIMIT
 from tests.makers.rokae.controller.conftest import Hand
 
 F = Fault
@@ -142,7 +143,7 @@ def no_torque(hand: Hand) -> RobotState:
 def lost(hand: Hand) -> RobotState:
     hand.start()
     hand.play(hand.swing(1, 0.5, 0.3))
-    return hand.step(20)
+    return hand.step(LATE_TOLERANCE + LOST_LIMIT)
 
 
 def collision(hand: Hand) -> RobotState:

@@ -9,9 +9,11 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.faults import Fault
 from rcilab.motion.joint import plan_joint
 from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT
+from rcilab.sim.streamed_motion import LOSS_BEHAVIOURS
 from tests.makers.rokae.controller.conftest import smooth
 
 F = Fault
+both = pytest.mark.parametrize("on_loss", LOSS_BEHAVIOURS)
 
 
 def test_queued_commands_are_played_before_stop_move_is_answered(make_hand) -> None:
@@ -26,7 +28,7 @@ def test_queued_commands_are_played_before_stop_move_is_answered(make_hand) -> N
 
 @pytest.mark.parametrize("limit", [10, 20])
 def test_n_lost_cycles_in_a_row_are_an_instability_and_one_stop(make_hand, limit: int) -> None:
-    hand = make_hand(lost_limit=limit)
+    hand = make_hand(lost_limit=limit, on_loss="bridge")
     hand.start()
     hand.play(hand.swing(1, 1.0, 0.4))
     assert hand.step(limit - 1).faults == ()
@@ -47,7 +49,8 @@ def test_commands_that_never_begin_are_lost_commands(make_hand) -> None:
     assert hand.state.success_rate == 0.0
 
 
-def test_lost_cycles_are_bridged_with_the_acceleration_of_the_last_ones(hand) -> None:
+def test_lost_cycles_are_bridged_with_the_acceleration_of_the_last_ones(make_hand) -> None:
+    hand = make_hand(on_loss="bridge")
     hand.start()
     hand.play(hand.swing(1, 1.0, 0.4)[:200])
     ddq = hand.state.ddq_c[0]
@@ -71,8 +74,9 @@ def test_a_pause_of_the_client_is_survived_by_the_prefill(make_hand) -> None:
     assert hand.cycle.playout.lost == 0
 
 
-def test_a_lost_datagram_is_bridged_when_the_next_ones_are_known(make_hand) -> None:
-    hand = make_hand(prefill=4)
+@both
+def test_a_lost_datagram_does_not_stop_a_motion(make_hand, on_loss) -> None:
+    hand = make_hand(prefill=4, on_loss=on_loss)
     hand.start()
     for k, row in enumerate(hand.swing(1, 2.0, 0.5)):
         if k % 37 != 5:
@@ -114,9 +118,10 @@ def test_after_the_last_command_nothing_is_lost(hand) -> None:
     [(0.01, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2), (0.05, 0.05, 0.05)],
 )
 @pytest.mark.parametrize("speed", [0.3, 1.0])
-def test_a_bad_network_does_not_stop_a_good_motion(make_hand, lost, copied, overtaken, speed) -> None:
+@both
+def test_a_bad_network_does_not_stop_a_good_motion(make_hand, lost, copied, overtaken, speed, on_loss) -> None:
     """At full speed accelerations and jerks are at their limits: what stands in for a lost command cannot keep them."""
-    hand = make_hand(prefill=10)
+    hand = make_hand(prefill=10, on_loss=on_loss)
     hand.start()
     goal = hand.model.home + [0.5, -0.4, 0.3, 0.4, -0.3, 0.2, 0.6]
     rows = np.vstack([plan_joint(hand.model, hand.model.home, goal, speed=speed).q, np.tile(goal, (15, 1))])
@@ -127,8 +132,9 @@ def test_a_bad_network_does_not_stop_a_good_motion(make_hand, lost, copied, over
 
 
 @pytest.mark.parametrize("plant", ["ideal", "mujoco"])
-def test_a_bad_network_does_not_stop_a_good_line(make_hand, plant) -> None:
-    hand = make_hand(plant=plant, prefill=10)
+@both
+def test_a_bad_network_does_not_stop_a_good_line(make_hand, plant, on_loss) -> None:
+    hand = make_hand(plant=plant, prefill=10, on_loss=on_loss)
     hand.start(1, 2)
     T = hand.state.T_base_tool_c.matrix
     commands = []
@@ -160,8 +166,9 @@ def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
     assert (hand.cycle.playout.lost, hand.state.success_rate) == (0, 1.0)
 
 
-def test_a_client_that_jumps_behind_a_gap_is_told_so(make_hand) -> None:
-    hand = make_hand(prefill=4)
+@both
+def test_a_client_that_jumps_behind_a_gap_is_told_so(make_hand, on_loss) -> None:
+    hand = make_hand(prefill=4, on_loss=on_loss)
     hand.start()
     rows = hand.swing(1, 1.0, 0.4)
     rows[300:, 0] += 0.01
@@ -213,8 +220,9 @@ def test_answers_to_states_that_overtook_each_other_are_played_as_they_came(make
     assert (hand.cycle.playout.lost, hand.cycle.playout.late) == (0, 0)
 
 
-def test_a_command_lost_long_after_an_id_was_repeated_is_bridged(make_hand) -> None:
-    hand = make_hand(prefill=4)
+@both
+def test_a_command_lost_long_after_an_id_was_repeated_is_one_loss(make_hand, on_loss) -> None:
+    hand = make_hand(prefill=4, on_loss=on_loss)
     hand.start()
     for k, row in enumerate(hand.swing(1, 2.0, 0.5)):
         if k != 250:

@@ -384,7 +384,7 @@ def test_connect_tells_the_controller_another_port(lockstep: Running) -> None:
 
 
 def test_a_client_that_falls_silent_is_an_instability_and_one_stop() -> None:
-    with running(lockstep=True, lost_limit=10, patience=0.2) as found, Peer(found) as peer:
+    with running(lockstep=True, lost_limit=10, on_loss="bridge", patience=0.2) as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
         while not peer.receive_state().faults:
             pass
@@ -617,6 +617,7 @@ def test_an_unknown_arm_lists_the_known_ones() -> None:
         ({"host": ""}, "host"),
         ({"plant": "rubber"}, "known: ideal, mujoco"),
         ({"lost_limit": 9}, "needs 10 to 20 cycles"),
+        ({"on_loss": "panic"}, "known: hold, bridge"),
         ({"mode_delay": math.nan}, "needs 0 to 5 s"),
         ({"prefill": -1}, "needs 0 to 100 cycles"),
     ],
