@@ -22,6 +22,7 @@ from rcilab.core.clock import CYCLE_TIME, SystemClock
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
 from rcilab.core.fault import FaultCode, name_faults
+from rcilab.i18n.translator import Remark
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
 from rcilab.sim.arrivals import (
@@ -56,6 +57,7 @@ COMMAND_TIMEOUT = (
 )
 CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
 SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
+_MOST_VIOLATIONS = 3  # That the text of a fault names; the others are in its facts.
 GRACE = 2.0  # [s] For the arm to stop before the controller ends.
 _parts_log = logging.getLogger("rcilab.sim")
 _STDERR = 2
@@ -385,7 +387,7 @@ class ArmServer:
         self._logged_faults = faults
         if faults:
             controller, names = self.controller, [fault.manual_name for fault in faults]
-            text = f"{name_faults(faults)}: {controller.reason}; the arm stops"
+            text = f"{name_faults(faults)}: {_shortened(controller.reason)}; the arm stops"
             self._log.write("fault", text, faults=names, reason=str(controller.reason), phase=controller.phase_name)
             if controller.lacks_commands and controller.arm.playout.lost:
                 text = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
@@ -446,3 +448,10 @@ class ArmServer:
         else:
             text, kind = f"client {peer.address} {reason}", "client_dropped"
         self._log.write(kind, text, client=peer.address, reason=reason, phase=phase)
+
+
+def _shortened(reason: Remark) -> str:
+    """Returns the first violations of a cycle and the number of the others: a jump violates limits of every joint."""
+    parts = reason.parts
+    shown = "; ".join(parts[:_MOST_VIOLATIONS])
+    return shown if len(parts) <= _MOST_VIOLATIONS else f"{shown}; and {len(parts) - _MOST_VIOLATIONS} more violations"

@@ -102,6 +102,8 @@ def test_a_program_can_be_followed_by_its_log() -> None:
     fault, stopped, refused = found.entries[5:8]
     assert "kCommandJointVelocityLimitsViolation" in fault.text
     assert "kCommandJointVelocityLimitsViolation" in fault.facts["faults"]
+    assert re.search(r"; and \d+ more violations; the arm stops$", fault.text)
+    assert "joint 7: commanded jerk" in fault.facts["reason"], "every violation is in the facts"
     assert stopped.text.startswith("motion stopped after ")
     assert refused.facts == {"request": "StartMove", "status": "REFLEX", "phase": "reflex"}
     assert found.entries[8].text.startswith("faults cleared: k")
