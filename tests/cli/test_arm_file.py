@@ -11,7 +11,7 @@ import pytest
 
 from rcilab.cli import controller as command
 from rcilab.cli import main
-from rcilab.cli.arm_file import read_arm_file
+from rcilab.cli.arm_file import _SECTIONS, read_arm_file
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.spatial import Pose
 from rcilab.sim.api import NetworkFaults
@@ -119,6 +119,31 @@ def test_the_example_of_the_help_is_a_valid_file(tmp_path: Path, monkeypatch: py
     path.write_text("\n".join(line for line in command.EPILOG.splitlines() if line.startswith("  ")), encoding="utf-8")
     config = config_of(str(path), monkeypatch=monkeypatch)
     assert (config.plant, config.inputs) == ("mujoco", (0, 3))
+
+
+PAGE = Path(__file__).parents[2] / "docs" / "controller.md"
+NOT_IN_A_FILE = {
+    "help", "file", "record", "exit_with_parent", "loss", "reorder", "duplicate", "corrupt", "delay", "jitter",
+    "faults_on", "tcp_delay", "tcp_split", "tcp_break", "seed", "stall",
+}  # fmt: skip
+"""Options of one experiment, not of an arm or its controller."""
+
+
+def test_the_example_of_the_documentation_is_a_valid_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(PAGE.read_text(encoding="utf-8").partition("```toml\n")[2].partition("```")[0], encoding="utf-8")
+    config = config_of(str(path), monkeypatch=monkeypatch)
+    assert (config.plant, config.inputs) == ("mujoco", (0, 3))
+
+
+def test_every_option_of_an_arm_and_its_controller_can_be_in_the_file_and_is_documented() -> None:
+    subparsers = argparse.ArgumentParser().add_subparsers()
+    command.add_parser(subparsers)
+    options = {action.dest for action in subparsers.choices["controller"]._actions} - NOT_IN_A_FILE
+    keys = {key for section in ("arm", "controller") for key in _SECTIONS[section]} | (_SECTIONS.keys() - {"arm"})
+    assert options == keys - {"controller"}
+    page = PAGE.read_text(encoding="utf-8")
+    assert {key for section in _SECTIONS.values() for key in section if f"`{key}`" not in page} == set()
 
 
 @pytest.mark.parametrize(

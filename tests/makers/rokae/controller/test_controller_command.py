@@ -14,7 +14,9 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import datetime
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rcilab.cli import controller as command
@@ -91,6 +93,15 @@ def test_the_faults_of_the_command_line_are_in_force() -> None:
         tcp_delay=0.01, tcp_split=1, tcp_break=5000, seed=9,
     )  # fmt: skip
     assert status.stalls == 1
+
+
+def test_the_arm_starts_where_the_command_line_and_the_file_say(tmp_path: Path) -> None:
+    file = tmp_path / "my_arm.toml"
+    file.write_text('[arm]\nmodel = "xMate3"\nstart = "0,30,60,0,90,10deg"\n[controller]\nport = 0\n', encoding="utf-8")
+    with controller(str(file)) as process:
+        assert status_of(process).q == pytest.approx(np.radians([0, 30, 60, 0, 90, 10]))
+    with controller(str(file), "--start", "0,0.5,1,0,1.5,0.1") as process:
+        assert status_of(process).q == (0.0, 0.5, 1.0, 0.0, 1.5, 0.1)
 
 
 def test_with_json_each_line_of_the_log_is_an_object_and_stdout_stays_as_it_is() -> None:

@@ -7,6 +7,7 @@ import re
 import socket
 import struct
 from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.rokae import wire as rci
 from rcilab.sim import local_delivery
 from rcilab.sim.log_entry import LogEntry
+from rcilab.sim.log_lines import KINDS
 from tests.makers.rokae.controller.test_server import MODEL, MOTION, Peer, Running, bind_udp, running
 from tests.waiting import wait_for
 
@@ -108,6 +110,12 @@ def test_a_program_can_be_followed_by_its_log() -> None:
     assert refused.facts == {"request": "StartMove", "status": "REFLEX", "phase": "reflex"}
     assert found.entries[8].text.startswith("faults cleared: k")
     assert [entry.cycle for entry in found.entries] == sorted(entry.cycle for entry in found.entries)
+
+
+def test_the_documentation_lists_every_kind_of_entry() -> None:
+    page = (Path(__file__).parents[4] / "docs" / "controller.md").read_text(encoding="utf-8")
+    table = page.partition("| kind | facts |")[2].partition("\n\n")[0]
+    assert {kind for kind in KINDS if f"`{kind}`" not in table} == set()
 
 
 def test_cycles_without_events_write_nothing() -> None:
