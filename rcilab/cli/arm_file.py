@@ -134,7 +134,6 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "patience": _number,
         "lost_limit": _whole,
         "on_loss": _text,
-        "on_loss": _text,
         "auto_limit": as_flag,
         "loop_back": as_flag,
         "limits": _text,
