@@ -18,6 +18,7 @@ from rcilab.core.errors import InvalidValueError, KinematicsError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.model.arm_file import ENDING, load_arm
 from rcilab.model.dynamics.friction import JointFriction, simulated_friction
 from rcilab.model.dynamics.payload import NO_LOAD, Payload
 from rcilab.model.kinematics.frames import Frame
@@ -39,15 +40,21 @@ def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = No
     """Returns the model of a robot by name, in any case; `rcilab.robots.ROBOT_NAMES` lists the names.
 
     Args:
-        name: Name of the robot.
+        name: Name of the robot, or the file of one arm, "my_arm.json", as written by `save` of
+            `robot.rci.load_robot_model()`.
         tool: Pose of the tool in the flange frame (RCI setCoor); the flange itself when absent.
         load: The load at the flange (RCI setLoad); none when absent.
 
     Raises:
         ModelError: No robot has this name; the message lists those that exist.
-        InvalidValueError: The tool is not a `Pose`, the load not a `Payload`, or it exceeds the rated payload.
+        InvalidValueError: The file does not exist or is not that of an arm, the tool is not a `Pose`, the load not a
+            `Payload`, or it exceeds the rated payload.
     """
-    return RobotModel(describe_robot(name), IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
+    if isinstance(name, str) and name.lower().endswith(ENDING):
+        description = load_arm(name)
+    else:
+        description = describe_robot(name)
+    return RobotModel(description, IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
 
 
 def require_model(model: object) -> RobotModel:
@@ -221,8 +228,8 @@ class RobotModel(ReachingArm):
             q: Joint angles, shape (n,) or (N, n), [rad].
             dq: Joint velocities, of q's shape, [rad/s]; zero when absent.
             ddq: Joint accelerations, of q's shape, [rad/s^2]; zero when absent.
-            friction: Whether `.full` includes joint friction. True uses that of the MuJoCo plant; pass coefficients
-                identified on a real arm as a `rcilab.model.dynamics.friction.JointFriction`.
+            friction: Whether `.full` includes joint friction. True uses that of the arm's file, or else that of the
+                MuJoCo plant; other coefficients are a `rcilab.model.dynamics.friction.JointFriction`.
 
         Returns:
             Terms of q's shape, [N m].
@@ -237,10 +244,19 @@ class RobotModel(ReachingArm):
         terms = (self.rigid_body.torque if angles.ndim == 1 else self.rigid_body.torque_path)(angles, speeds, rates)
         if friction is False:
             return terms
-        law = simulated_friction(self.limits.joint) if friction is True else friction
+        law = self.friction if friction is True else friction
         if not isinstance(law, JointFriction):
             raise InvalidValueError("friction", described(friction), "must be True, False or a JointFriction")
         return terms.with_friction(law.torque(speeds))
+
+    @property
+    def friction(self) -> JointFriction:
+        """The joint friction of the arm's file, or else that of the MuJoCo plant."""
+        own = self.description.friction
+        if own is None:
+            return simulated_friction(self.limits.joint)
+        viscous, coulomb, offset = own
+        return JointFriction(viscous=viscous, coulomb=coulomb, offset=offset)
 
     def clearance(self, q: ArrayLike, distance: ClearanceLimit = STANDARD_DISTANCE) -> Clearance:
         """Returns the smallest distance between links, or to the floor, and the two links, from their capsules.

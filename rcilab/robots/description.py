@@ -144,6 +144,11 @@ class RobotDescription:
     """Response of the joints to commands that stop coming, one per joint; None: no figures."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
+    friction: tuple[JointVector, JointVector, JointVector] | None = None
+    """Identified joint friction: viscous [N m s/rad], Coulomb [N m] and offset [N m], each of shape (n,); None if it is
+    not known."""
+    nominal: RobotDescription | None = None
+    """The arm of the maker's table if this one is calibrated: its shapes, and the frames of its links."""
 
     @property
     def n(self) -> int:

@@ -32,9 +32,12 @@ class UprightJoint:
 def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
     """Returns the joints between upright link frames, base to flange; the last origin is the flange's.
 
+    Of a calibrated arm they are those of the maker's table, for drawing and collisions.
+
     Raises:
         ModelError: The arm is not upright at zero, as with the manual's 6-axis table taken literally.
     """
+    description = description.nominal or description
     T = np.eye(4)
     joints: list[UprightJoint] = []
     below = np.zeros(3)
@@ -58,11 +61,23 @@ def upright_joints(description: RobotDescription) -> tuple[UprightJoint, ...]:
 def upright_flange(description: RobotDescription) -> Pose:
     """Returns the pose of the flange in the last link's frame; rotated if it does not face up at zero pose."""
     T = np.eye(4)
-    for row in description.dh:
+    for row in (description.nominal or description).dh:
         T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
     turned = np.eye(4)
     turned[:3, :3] = np.round(T[:3, :3]) + 0.0
     return Pose.from_matrix(turned)
+
+
+def link_frames(description: RobotDescription) -> tuple[Pose, ...]:
+    """Returns the pose of each link's frame in the Denavit-Hartenberg frame after its joint."""
+    T, frames = np.eye(4), []
+    nominal = description.nominal or description
+    for row, link in zip(nominal.dh, nominal.links, strict=True):
+        T = T @ _dh_matrix(row.a, row.alpha, row.d, row.theta_offset)
+        upright = np.eye(4)
+        upright[:3, 3] = link.origin
+        frames.append(Pose.from_matrix(np.linalg.inv(T) @ upright))
+    return tuple(frames)
 
 
 def _is_square(R: np.ndarray) -> bool:

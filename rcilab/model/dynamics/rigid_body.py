@@ -16,7 +16,7 @@ from rcilab.core.spatial import IDENTITY, Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.dynamics.symmetric_solver import SymmetricSolver
 from rcilab.robots.description import Link, RobotDescription
-from rcilab.robots.upright import upright_flange, upright_joints
+from rcilab.robots.upright import link_frames, upright_flange, upright_joints
 
 GRAVITY = 9.81  # [m/s^2] along -z of the base; the value of the vendor's dynamics library.
 
@@ -126,12 +126,11 @@ class RigidBody:
     def __init__(self, description: RobotDescription, load: Payload, tool: Pose = IDENTITY) -> None:
         model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
-        parent = 0
-        for number, (joint, link) in enumerate(zip(upright_joints(description), description.links, strict=True), 1):
-            joint_type = _joint_type(joint.axis)
-            parent = model.addJoint(parent, joint_type, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
-            model.appendBodyToJoint(parent, _inertia(link), pin.SE3.Identity())
-        T_link_flange = upright_flange(description)
+        self._link_frames: list[pin.SE3] | None = None
+        if description.nominal is None:
+            parent, T_link_flange = _add_upright_links(model, description)
+        else:
+            parent, T_link_flange, self._link_frames = _add_calibrated_links(model, description)
         if load.mass > 0.0:
             body = pin.Inertia(load.mass, load.center_of_mass.copy(), load.inertia.copy())
             model.appendBodyToJoint(parent, body, pin.SE3(T_link_flange.rotation, T_link_flange.position))
@@ -222,6 +221,8 @@ class RigidBody:
             point: In the link's frame, shape (3,), [m].
         """
         model, data = self._model, self._data
+        if self._link_frames is not None:
+            point = self._link_frames[link - 1].act(point)
         pin.computeJointJacobians(model, data, q)
         J = pin.getJointJacobian(model, data, link, pin.LOCAL_WORLD_ALIGNED)
         x, y, z = (data.oMi[link].rotation @ point).tolist()
@@ -236,7 +237,8 @@ class RigidBody:
             link: Number of the link, from 1.
         """
         pin.forwardKinematics(self._model, self._data, q)
-        return Pose.from_matrix(self._data.oMi[link].homogeneous)
+        T = self._data.oMi[link]
+        return Pose.from_matrix((T if self._link_frames is None else T * self._link_frames[link - 1]).homogeneous)
 
     def tool_jacobian(self, q: JointVector) -> Matrix:
         """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
@@ -259,6 +261,39 @@ class RigidBody:
         if terms is None or not terms.is_at(q, dq):
             terms = self._tool_terms = self.tool_motion(q, dq)
         return terms
+
+
+def _add_upright_links(model: pin.Model, description: RobotDescription) -> tuple[int, Pose]:
+    """Adds joints and links in upright frames; returns the last joint and the flange in its frame."""
+    parent = 0
+    for number, (joint, link) in enumerate(zip(upright_joints(description), description.links, strict=True), 1):
+        joint_type = _joint_type(joint.axis)
+        parent = model.addJoint(parent, joint_type, pin.SE3(np.eye(3), joint.origin.copy()), f"joint{number}")
+        model.appendBodyToJoint(parent, _inertia(link), pin.SE3.Identity())
+    return parent, upright_flange(description)
+
+
+def _add_calibrated_links(model: pin.Model, description: RobotDescription) -> tuple[int, Pose, list[pin.SE3]]:
+    """Adds joints by Denavit-Hartenberg rows; returns the last joint, flange and links in the frames of their joints.
+
+    Inertias identified on an arm need not be those of a possible body, which pinocchio requires of a link by itself.
+    """
+    parent, T_joint_dh, frames = 0, pin.SE3.Identity(), []
+    rows = zip(description.dh, description.links, link_frames(description), strict=True)
+    for number, (row, link, T_dh_link) in enumerate(rows, 1):
+        turned = pin.SE3(pin.utils.rotate("z", row.theta_offset), np.zeros(3))
+        parent = model.addJoint(parent, pin.JointModelRZ(), T_joint_dh * turned, f"joint{number}")
+        T_joint_dh = pin.SE3(pin.utils.rotate("x", row.alpha), np.array((row.a, 0.0, row.d)))
+        frames.append(T_joint_dh * pin.SE3(T_dh_link.rotation, T_dh_link.position))
+        model.appendBodyToJoint(parent, pin.Inertia.FromDynamicParameters(_parameters(link)), frames[-1])
+    return parent, Pose.from_matrix(T_joint_dh.homogeneous), frames
+
+
+def _parameters(link: Link) -> Array:
+    """Returns mass, first moments and moments of inertia about the origin of a link's frame, as pinocchio has them."""
+    moment, c = link.mass * link.center_of_mass, link.center_of_mass
+    inertia = link.inertia + link.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.array((link.mass, *moment, *inertia[np.tril_indices(3)]))
 
 
 def _pose(matrix: Matrix) -> Pose:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.makers.rokae.controller.model_download import regressor
+from rcilab.makers.rokae.base_parameters import regressor
 from rcilab.model.dynamics.friction import JointFriction
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel, load_model

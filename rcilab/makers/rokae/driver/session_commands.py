@@ -14,11 +14,12 @@ from rcilab.makers.driver import ConfiguredArm, RequestLock
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.configuration import send_configuration
 from rcilab.makers.rokae.driver.connection import RciConnection
+from rcilab.makers.rokae.driver.loaded_arm import LoadedArm, build_loaded_arm
 from rcilab.makers.rokae.driver.settings import load_center
 from rcilab.makers.rokae.wire import Request, SetMotorPower
 from rcilab.makers.rokae.wire.statuses import WHILE_MOVING
 from rcilab.model.dynamics.payload import Payload
-from rcilab.robots import RobotDescription
+from rcilab.robots import RobotDescription, describe_robot
 
 
 class RciSessionCommands(RciCommands):
@@ -42,6 +43,19 @@ class RciSessionCommands(RciCommands):
         super().__init__(connection, description)
         self._arm = arm
         self._lock = lock
+
+    def load_robot_model(self) -> LoadedArm:
+        """Returns what the controller says of its arm (LoadRobotModel), as a model that can be saved, and compared.
+
+        The model has the session's tool and load; limits and names are those of the table. It is for your computations
+        and for `connect(address, model)`; this session keeps its own model.
+
+        Raises:
+            CommandRejectedError: The controller has no model.
+            ModelError: Its lengths are not those of the session's arm.
+        """
+        response, model = self.load_model(), self._arm.model
+        return build_loaded_arm(response, describe_robot(model.name), self._link.name, model)
 
     def configure(self, configuration: RobotConfiguration) -> None:
         """Sends a configuration; after a refusal, earlier parts are in force."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from rcilab.core.errors import ModelError
+from rcilab.model.kinematics.solvers.calibrated import CalibratedSolver
 from rcilab.model.kinematics.solvers.numeric.solver import NumericSolver
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry
 from rcilab.model.kinematics.solvers.offset7.solver import OffsetSeven
@@ -19,9 +20,13 @@ from rcilab.robots.description import RobotDescription
 def build_solver(description: RobotDescription) -> KinematicsSolver:
     """Returns the closed-form solver for the geometry of an arm, or the numeric one if no closed form applies.
 
+    A calibrated arm is solved by iteration around the solver of its table.
+
     Raises:
         ModelError: The arm has more than 7 joints.
     """
+    if description.nominal is not None:
+        return CalibratedSolver(build_solver(description.nominal), description.nominal.dh, description.dh)
     try:
         geometry = build_geometry(description)
         return SphericalSeven(geometry) if geometry.n == 7 else SphericalSix(geometry)

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rcilab.makers.rokae.controller.model_download import base_parameters, model_response, regressor
+from rcilab.makers.rokae.base_parameters import base_parameters, regressor
+from rcilab.makers.rokae.controller.model_download import model_response
 from rcilab.model.robot_model import load_model
 from rcilab.robots import describe_robot
 

@@ -1,0 +1,142 @@
+"""The file of one arm: what its controller says of it, in JSON, for `load_model("my_arm.json")`.
+
+    {"format": "rcilab arm", "version": 1, "model": "xMatePro7", "source": "LoadRobotModel of rci://...",
+     "dh": [[a, alpha, d, theta], ...], "links": [{"mass", "center_of_mass", "inertia"}, ...],
+     "friction": {"viscous", "coulomb", "offset"} or null}
+
+One row and one link for each joint; SI units; standard Denavit-Hartenberg rows. Frames of the links and all limits are
+those of the named model.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rcilab.core.arrays import Array, as_vector, readonly_copy
+from rcilab.core.atomic_file import read_limited, replacing
+from rcilab.core.errors import InvalidValueError, VersionMismatchError
+from rcilab.robots import DhRow, RobotDescription, describe_robot
+
+FORMAT, VERSION = "rcilab arm", 1
+ENDING = ".json"
+_LARGEST = 100_000  # [bytes] An arm has 3000.
+
+
+def save_arm(arm: RobotDescription, file: str | Path, source: str = "") -> None:
+    """Writes an arm to a file.
+
+    Args:
+        arm: The arm.
+        file: Its name ends in .json; an existing file is replaced.
+        source: Where the numbers come from.
+
+    Raises:
+        InvalidValueError: The name does not end in .json, or the file cannot be written.
+    """
+    path = Path(file)
+    if path.suffix.lower() != ENDING:
+        raise InvalidValueError("arm file", str(file), "must end in .json")
+    links = [
+        {"mass": link.mass, "center_of_mass": link.center_of_mass.tolist(), "inertia": link.inertia.tolist()}
+        for link in arm.links
+    ]
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "model": arm.name,
+        "source": source or arm.dh_source,
+        "dh": [[row.a, row.alpha, row.d, row.theta_offset] for row in arm.dh],
+        "links": links,
+        "friction": None
+        if arm.friction is None
+        else dict(zip(_FRICTION, (values.tolist() for values in arm.friction), strict=True)),
+    }
+    try:
+        with replacing(path) as stream:
+            stream.write((json.dumps(content, indent=1) + "\n").encode())
+    except OSError as error:
+        raise InvalidValueError("arm file", str(file), f"cannot be written: {error.strerror}") from error
+
+
+def load_arm(file: str | Path) -> RobotDescription:
+    """Returns the arm in a file.
+
+    Raises:
+        InvalidValueError: The file does not exist, or is not that of an arm; the message names the part.
+        ModelError: Its model is unknown.
+        VersionMismatchError: It has another version of this format.
+    """
+    path = Path(file)
+    text = read_limited(path, "arm file", lambda size: _require_size(size, path))
+    try:
+        content: Any = json.loads(text)
+    except ValueError as error:
+        raise InvalidValueError("arm file", path.name, f"is not valid JSON: {error}") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InvalidValueError("arm file", path.name, f'has no "format": "{FORMAT}"')
+    if content.get("version") != VERSION:
+        raise VersionMismatchError(f"{path.name}, version", content.get("version"), VERSION, "save the arm again")
+    nominal = describe_robot(content.get("model", ""))
+    try:
+        return _build_arm(nominal, content, path.name)
+    except (LookupError, TypeError, ValueError) as error:
+        if isinstance(error, InvalidValueError):
+            raise
+        raise InvalidValueError("arm file", path.name, f"lacks or has a wrong {error}") from error
+
+
+_FRICTION = ("viscous", "coulomb", "offset")
+
+
+def _build_arm(nominal: RobotDescription, content: dict[str, Any], name: str) -> RobotDescription:
+    n, source = nominal.n, str(content.get("source", name))
+    rows, links = _list(content, "dh", n, name), _list(content, "links", n, name)
+    numbers = [as_vector(row, 4, f"{name}, dh row {i}", "m, rad").tolist() for i, row in enumerate(rows, 1)]
+    friction = content.get("friction")
+    return replace(
+        nominal,
+        dh=tuple(DhRow(a=a, alpha=alpha, d=d, theta_offset=theta) for a, alpha, d, theta in numbers),
+        dh_source=source,
+        links=tuple(
+            replace(
+                own,
+                mass=float(link["mass"]),
+                center_of_mass=as_vector(link["center_of_mass"], 3, f"{name}, link {i}, center_of_mass", "m"),
+                inertia=_tensor(link["inertia"], f"{name}, link {i}, inertia"),
+                source=source,
+            )
+            for i, (own, link) in enumerate(zip(nominal.links, links, strict=True), 1)
+        ),
+        friction=None
+        if friction is None
+        else (
+            as_vector(friction["viscous"], n, f"{name}, friction, viscous", "N m s/rad"),
+            as_vector(friction["coulomb"], n, f"{name}, friction, coulomb", "N m"),
+            as_vector(friction["offset"], n, f"{name}, friction, offset", "N m"),
+        ),
+        nominal=nominal,
+    )
+
+
+def _list(content: dict[str, Any], key: str, count: int, name: str) -> list[Any]:
+    found = content[key]
+    if not isinstance(found, list) or len(found) != count:
+        raise InvalidValueError(f"{name}, {key}", found, f"must be a list of {count} entries, one for each joint")
+    return found
+
+
+def _tensor(value: Any, name: str) -> Array:
+    inertia = as_vector(np.ravel(value), 9, name, "kg m^2").reshape(3, 3)
+    if np.abs(inertia - inertia.T).max() > 1e-12 * max(1.0, float(np.abs(inertia).max())):
+        raise InvalidValueError(name, inertia.tolist(), "must be symmetric")
+    return readonly_copy(inertia)
+
+
+def _require_size(size: int, path: Path) -> None:
+    if size > _LARGEST:
+        raise InvalidValueError("arm file", path.name, f"has {size} bytes, an arm at most {_LARGEST}")
