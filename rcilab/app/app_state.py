@@ -44,6 +44,8 @@ class AppState:
     model: RobotModel
     target: str = "virtual"
     """"virtual" or an address, rci://HOST:PORT."""
+    watched: str = ""
+    """Address of the controller whose foreign client the page only watches; "" for a robot of its own."""
     plant: PlantKind = "ideal"
     """What the virtual controller drives."""
     world: WorldState = field(default_factory=WorldState)

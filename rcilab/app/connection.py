@@ -9,9 +9,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rcilab.conformance.certificate import Certificate
-    from rcilab.control_process import PendingRequest, SupervisorStatus
+    from rcilab.control_process import PendingRequest, Supervisor, SupervisorStatus
     from rcilab.core.state import Mode
     from rcilab.makers.configuration import RobotConfiguration
+    from rcilab.model.robot_model import RobotModel
     from rcilab.motion.motion import Motion
     from rcilab.motion.speed_scaling import SpeedScaledMotion
     from rcilab.recording.run import Run
@@ -95,4 +96,56 @@ class Connection(Protocol):
 
     def take_run(self) -> Run | None:
         """Returns the last run of `execute` if the robot recorded it itself; None: it is built from drained cycles."""
+        ...
+
+
+class PageConnection(Protocol):
+    """The robot of the page: one that its own control process drives, or one that it only watches."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether `robot` returns one."""
+        ...
+
+    @property
+    def stops(self) -> int:
+        """Number of stops so far."""
+        ...
+
+    def open(
+        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+    ) -> None:
+        """Closes the present robot and connects to this one; returns at once."""
+        ...
+
+    def disconnect(self) -> None:
+        """Closes the present robot; returns at once."""
+        ...
+
+    def status(self) -> SupervisorStatus:
+        """Returns its status."""
+        ...
+
+    def robot(self) -> Supervisor:
+        """Returns the object that takes requests.
+
+        Raises:
+            UsageError: There is none.
+        """
+        ...
+
+    def take_run(self) -> None:
+        """Returns None: a run is built from cycles."""
+        ...
+
+    def stop(self) -> None:
+        """Stops a motion of this page; never waits."""
+        ...
+
+    def heartbeat(self) -> None:
+        """Reports an operator at the page."""
+        ...
+
+    def close(self) -> None:
+        """Ends everything."""
         ...

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
 from rcilab.control_process.layout import OPERATOR_TIMEOUT
@@ -64,7 +64,7 @@ class ControlLockActions:
         presence: When each page last sent a heartbeat.
     """
 
-    def __init__(self, store: Store, connection: RobotConnection, presence: ClientHeartbeat) -> None:
+    def __init__(self, store: Store, connection: PageConnection, presence: ClientHeartbeat) -> None:
         self._store, self._connection, self._presence = store, connection, presence
 
     @property

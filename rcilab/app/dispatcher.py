@@ -11,6 +11,7 @@ from typing import Generic, TypeVar
 
 from rcilab.app.autosave import Autosave, SavedState
 from rcilab.app.check.check_actions import CheckActions
+from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import ControlLockActions, Refuse
 from rcilab.app.failures import Failures
@@ -20,7 +21,6 @@ from rcilab.app.jog.jog_actions import JogActions
 from rcilab.app.learn.learn_actions import LearnActions
 from rcilab.app.program.program_actions import ProgramActions
 from rcilab.app.request import Moving, Request, TypeField
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.export_actions import Deliver, ExportActions
 from rcilab.app.run.folder_actions import FolderActions
 from rcilab.app.run.mode_actions import ModeActions
@@ -29,6 +29,7 @@ from rcilab.app.run.push_actions import PushActions
 from rcilab.app.run.run_actions import RobotCommand, RunActions
 from rcilab.app.run.signal_actions import SignalActions
 from rcilab.app.run.target_robot_actions import TargetRobotActions
+from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.world_actions import WorldActions
 from rcilab.app.scene.scene_actions import SceneActions
 from rcilab.app.setup.configuration_state import name_parts
@@ -87,15 +88,17 @@ class Dispatcher:
         deliver: Sends a file to a page.
         autosave: Saves goal and program for a restart after a crash; None: nothing is saved.
         presence: When each page last sent a heartbeat.
+        watch: Shows the motions of a foreign client; None for a robot of the page's own.
     """
 
     def __init__(
         self,
         store: Store,
-        connection: RobotConnection,
+        connection: PageConnection,
         deliver: Deliver = lambda page, name, stream, is_cancelled: True,
         autosave: Autosave | None = None,
         presence: ClientHeartbeat | None = None,
+        watch: WatchActions | None = None,
     ) -> None:
         self._store, self._connection = store, connection
         self._autosave = autosave or Autosave(None)
@@ -117,6 +120,7 @@ class Dispatcher:
         self._scene = SceneActions(store, self._goal)
         self._export = ExportActions(store, deliver)
         self._folder = FolderActions(store)
+        self._watch = watch
         self._requests: CoalescingQueue[Request] = CoalescingQueue()
         self._thread: threading.Thread | None = None
         self._ending = threading.Event()
@@ -195,6 +199,8 @@ class Dispatcher:
         self._control_lock.tick()
         if self._store.state.control_lock.holder != self._refused_for:
             self._store.clear_notices("control_lock")
+        if self._watch is not None:
+            self._watch.tick()
         event = self.run.watch()
         # The plan may already exist when the status arrives.
         if event == "arm_known" and self._store.state.plan is None:

@@ -13,7 +13,20 @@ from rcilab.cli.output import drop_output, drop_unread_output, is_unwritable, on
 from rcilab.core.errors import RcilabError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
-COMMANDS = ("workbench", "controller", "world", "run", "replay", "check", "urdf", "mjcf", "lab", "doctor", "bench")
+COMMANDS = (
+    "workbench",
+    "controller",
+    "world",
+    "watch",
+    "run",
+    "replay",
+    "check",
+    "urdf",
+    "mjcf",
+    "lab",
+    "doctor",
+    "bench",
+)
 """Each command is a module of this package with `add_parser(subparsers)` and `run(args) -> int`."""
 
 _USAGE = 2  # Exit status for a usage error, as in argparse.

@@ -18,21 +18,24 @@ def playout_delay(cycles: NDArray[np.void]) -> int:
     return max(int(np.median(rows - sources)), 1) if rows.size else 1
 
 
-def played_joints(cycles: NDArray[np.void]) -> JointPath:
+def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> JointPath:
     """Returns the joint angles of the played commands, from the first one to the last row, shape (M, n), [rad].
 
     In cycles without a command, in those of the controller's own stop, and where poses or torques were commanded, they
-    are those that the controller reports as commanded. A command that it refused is not among them.
+    are those that the controller reports as commanded.
 
     Args:
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+        with_refused: Whether a command that the controller refused is included.
     """
     rows, sources = _played(cycles)
     if not rows.size:
         return cycles["q_c"][:1].copy()
     q = cycles["q_c"].copy()
     sent = cycles["command"][sources]
-    has_angles = np.isfinite(sent).all(axis=1) & (cycles["faults"][rows] == 0)
+    has_angles = np.isfinite(sent).all(axis=1)
+    if not with_refused:
+        has_angles &= cycles["faults"][rows] == 0
     q[rows[has_angles]] = sent[has_angles]
     return q[rows[0] :]
 

@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from rcilab.app.autosave import Autosave, autosave_file
 from rcilab.app.check.check_actions import PressCheck
+from rcilab.app.connection import PageConnection
 from rcilab.app.control_lock import ClientHeartbeat
 from rcilab.app.control_lock_actions import AnswerControls, PageClosed, PageOpened, Refuse, TakeControls
 from rcilab.app.dispatcher import Dispatcher
@@ -22,6 +23,8 @@ from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.request import Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
+from rcilab.app.run.watch_actions import WatchActions
+from rcilab.app.run.watched_controller import WatchedController
 from rcilab.app.scene.scene_actions import HighlightBranch
 from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import explain_error
@@ -67,6 +70,8 @@ class WorkbenchConfig:
     """Folder for recordings of every motion, cycle by cycle; None keeps only the last run, in memory."""
     replay: Run | None = None
     """A run to show; nothing is connected then until the operator does."""
+    watch: str | None = None
+    """Simulation port of a virtual controller, HOST:PORT, whose foreign client the page watches."""
 
 
 class Workbench:
@@ -77,7 +82,8 @@ class Workbench:
 
     Raises:
         ModelError: No robot has this name, or it cannot be driven at an address.
-        UsageError: The port is in use, or the address needs a token.
+        UsageError: The port is in use, the address needs a token, or the controller cannot be watched.
+        ConnectionLostError: There is no controller to watch.
     """
 
     def __init__(self, config: WorkbenchConfig) -> None:
@@ -85,6 +91,9 @@ class Workbench:
         replay = config.replay
         if replay is not None:
             model = require_replayable(replay)
+        watched = None if config.watch is None else WatchedController(config.watch)
+        target = config.target if watched is None else watched.name
+        model = model if watched is None else watched.model
         self._config = config
         self._bound = security.bind(config.host, config.port, config.token)
         self.port: int = self._bound.getsockname()[1]
@@ -92,7 +101,8 @@ class Workbench:
         goal = goal_at(model, model.home)
         state = UiState(
             model=model,
-            target=config.target,
+            target=target,
+            watched="" if watched is None else watched.name,
             goal=goal,
             language=config.language or "en",
             quality=config.quality or "full",
@@ -101,11 +111,13 @@ class Workbench:
         if replay is not None:
             state = replayed(state, replay)
         self.store = Store(replace(state, runs=config.runs))
-        self.session = RobotConnection(self._report_failure)
-        is_own = config.port and replay is None  # No autosave on a free port, which is not reused, nor for a replay.
+        self.session: PageConnection = RobotConnection(self._report_failure) if watched is None else watched
+        # No autosave on a free port, which is not reused, nor for a page that only shows something.
+        is_own = config.port and replay is None and watched is None
         autosave = Autosave(autosave_file(self.port) if is_own else None)
         self._presence = ClientHeartbeat()
-        self.dispatcher = Dispatcher(self.store, self.session, self._deliver, autosave, self._presence)
+        watch = None if watched is None else WatchActions(self.store, watched)
+        self.dispatcher = Dispatcher(self.store, self.session, self._deliver, autosave, self._presence, watch)
         self.server: viser.ViserServer
         self._stopped = threading.Event()
         self._opened = False
@@ -140,12 +152,13 @@ class Workbench:
         self.server = self._guarded_server.viser
         self._opened = True
         self._follow_pages()
-        if self._config.replay is None:
+        has_robot = self._config.replay is None and self._config.watch is None
+        if has_robot:
             self.dispatcher.resume(language=self._config.language)
         self.renderer = Renderer(self.server, self.store, self.session, self.live, ask)
         self.renderer.start()
         self.dispatcher.start()
-        if self._config.replay is None:
+        if has_robot:
             self.dispatcher.run.open(self._config.model, self._config.target)
         threading.Thread(target=self._beat, name="operator", daemon=True).start()
 

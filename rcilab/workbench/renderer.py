@@ -7,9 +7,9 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.failures import Failures
 from rcilab.app.learn.learn_state import displayed_state
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.played_motion import moment_played
 from rcilab.app.store import Store
 from rcilab.app.text import Text
@@ -105,7 +105,7 @@ class Renderer:
     """
 
     def __init__(
-        self, server: viser.ViserServer, store: Store, session: RobotConnection, live: LiveChannel, ask: Ask
+        self, server: viser.ViserServer, store: Store, session: PageConnection, live: LiveChannel, ask: Ask
     ) -> None:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rcilab.app.check.check_state import CheckState, Explained, Slowed
 from rcilab.app.check.slowdown_job import SlowdownJob, slow_program, slow_to_goal
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions, PlanGoal
 from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.program.program_actions import CancelProgram, PlanProgram, ProgramActions
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
@@ -38,7 +38,7 @@ class PressCheck(Request):
 class CheckActions:
     """Shows a row's worst moment, slows the plan down, explains the report, repeats the check."""
 
-    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions, program: ProgramActions) -> None:
+    def __init__(self, store: Store, connection: PageConnection, goal: GoalActions, program: ProgramActions) -> None:
         self._store, self._connection, self._goal, self._program = store, connection, goal, program
         self._work: BackgroundJob[Plan, SlowdownJob | Explained] = BackgroundJob("check")
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.jog.jog_state import (
     FRAMES,
@@ -28,7 +29,6 @@ from rcilab.app.jog.jog_state import (
 from rcilab.app.jog.jog_step import take_step
 from rcilab.app.jog.robot_jog import RobotJog
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
 from rcilab.control_process.jog_record import HOLD_TIMEOUT
 from rcilab.core.clock import CYCLE_TIME
@@ -80,7 +80,7 @@ class JogActions:
         goal: Sets the goal.
     """
 
-    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
+    def __init__(self, store: Store, connection: PageConnection, goal: GoalActions) -> None:
         self._store, self._goal = store, goal
         self._robot = RobotJog(store, connection, goal)
         self._press: _Press | None = None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal import Goal
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.jog.jog_state import (
@@ -28,7 +29,6 @@ from rcilab.app.jog.jog_state import (
 )
 from rcilab.app.jog.jog_step import take_step
 from rcilab.app.planning import Plan, make_plan
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store
@@ -50,7 +50,7 @@ class RobotJog:
         goal: Sets the goal.
     """
 
-    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
+    def __init__(self, store: Store, connection: PageConnection, goal: GoalActions) -> None:
         self._store, self._connection, self._goal = store, connection, goal
         self._request: PendingRequest | None = None  # In progress, until the arm stands still.
         self._followed: Goal | None = None  # The goal that was set to the jogged position.

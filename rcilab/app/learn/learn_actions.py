@@ -8,13 +8,13 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.displayed_motion import display_fault
 from rcilab.app.fault_lab import FaultDemo, FaultTable
 from rcilab.app.fault_lab.private_arm import PrivateArm
 from rcilab.app.learn.learn_state import FaultDisplay, LearnState, LessonState
 from rcilab.app.learn.lessons import LESSONS, Watcher, lessons_of
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.recording import Recording
 from rcilab.app.status_text import explain_error
@@ -39,7 +39,7 @@ class PressLearn(Request):
 class LearnActions:
     """The fault lab never touches the robot of the page; lessons only watch."""
 
-    def __init__(self, store: Store, connection: RobotConnection) -> None:
+    def __init__(self, store: Store, connection: PageConnection) -> None:
         self._store, self._connection = store, connection
         self._arm = PrivateArm()
         self._work: BackgroundJob[FaultCode, FaultDemo] = BackgroundJob("fault lab")

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.program.program_draft import MOST_ROUNDS, TYPES, Draft, target_of, time_at
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.waypoint_fields import default_via, proposed
 from rcilab.app.request import Handlers, Request, TypeField
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.store import Store
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.i18n.number_parsing import parse_number
@@ -48,7 +48,7 @@ class EditActions:
         history: The programs.
     """
 
-    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions, history: ProgramHistory) -> None:
+    def __init__(self, store: Store, connection: PageConnection, goal: GoalActions, history: ProgramHistory) -> None:
         self._store, self._connection, self._goal, self._history = store, connection, goal, history
         self._edits: dict[str, Callable[[EditProgram, int], None]] = {
             "select": self._select, "teach": self._teach, "via": self._via, "type": self._retype,

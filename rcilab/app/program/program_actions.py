@@ -8,6 +8,7 @@ from functools import partial, reduce
 import numpy as np
 
 from rcilab.app.arm_features import start_of_plans
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal_actions import GoalActions
 from rcilab.app.planning import Plan
 from rcilab.app.program.edit_actions import LONGEST_NAME, EditActions
@@ -15,7 +16,6 @@ from rcilab.app.program.program_draft import FILE_FIELD, Draft, draft_of, is_led
 from rcilab.app.program.program_history import ProgramHistory
 from rcilab.app.program.program_planning import Job, plan_job
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.store import Store
 from rcilab.core.arrays import readonly_copy
@@ -56,7 +56,7 @@ class ProgramActions:
         editing: The edits of the program.
     """
 
-    def __init__(self, store: Store, connection: RobotConnection, goal: GoalActions) -> None:
+    def __init__(self, store: Store, connection: PageConnection, goal: GoalActions) -> None:
         self._store, self._connection = store, connection
         self._planner: BackgroundJob[Job, Plan] = BackgroundJob("program")
         # Model and safety box with which planning failed.

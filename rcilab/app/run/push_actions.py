@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import (
     DIRECTIONS,
     GUIDING_KINDS,
@@ -87,7 +87,7 @@ class _Grip:
 class PushActions:
     """The push button and the mouse in the scene; both press on the arm only while they are held."""
 
-    def __init__(self, store: Store, connection: RobotConnection) -> None:
+    def __init__(self, store: Store, connection: PageConnection) -> None:
         self._store, self._connection = store, connection
         self._grip: _Grip | None = None
         self._button: tuple[int | None, float] | None = None  # Page that holds it, and time of its last message, [s].

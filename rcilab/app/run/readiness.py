@@ -22,6 +22,8 @@ _OF_PROGRAMS = {"ready.done": "ready.done_program", "ready.elsewhere": "ready.el
 
 def obstacle(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns what prevents Execute, or None if it may be pressed."""
+    if state.watched:
+        return message("ready.watched", address=state.watched)
     if state.busy is not None:
         return message("ready.busy")
     missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
@@ -102,6 +104,8 @@ def is_plan_current(state: UiState, status: SupervisorStatus) -> bool:
 
 def connection_note(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns the message next to the destination, at the top of Run: why no motion can run there; None: none."""
+    if state.watched:
+        return message("ready.watched", address=state.watched)
     missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
     if status.phase in ("fault", "lost", "crashed"):
         return _describe_arm(state, status)

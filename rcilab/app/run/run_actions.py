@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal import Goal, Tone, goal_at
 from rcilab.app.request import Handlers, Moving, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.active_force import GUIDING_KINDS, TOOL, is_guided
 from rcilab.app.run.mode_parameters import CONFIRM_TIMEOUT
 from rcilab.app.run.plan_readiness import is_moving
@@ -67,7 +67,7 @@ class ChooseRobot(Request):
 class RunActions:
     """Execute, stop, power, recover, connect; and the recording of the run."""
 
-    def __init__(self, store: Store, connection: RobotConnection) -> None:
+    def __init__(self, store: Store, connection: PageConnection) -> None:
         self._store, self._connection = store, connection
         self.requests = RobotRequests(store, connection)
         self._is_stop_said = False  # The safety stop that ended the last motion was reported with its error.
@@ -101,6 +101,8 @@ class RunActions:
             return
         if request.what == "stop":
             self._connection.stop()
+            if self._store.state.watched:
+                self._store.notify("warn", message("watch.stop"))
             return
         if request.what == "disconnect":
             if is_moving(self._connection.status()):

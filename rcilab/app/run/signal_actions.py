@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Literal
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.robot_requests import RobotRequests
 from rcilab.app.store import Store
 from rcilab.makers.maker import capabilities_of
@@ -42,7 +42,7 @@ def signal_rows(model: RobotModel, status: SupervisorStatus) -> list[tuple[str, 
 class SignalActions:
     """Owned by the dispatcher's thread; it never waits for the controller."""
 
-    def __init__(self, store: Store, connection: RobotConnection, requests: RobotRequests) -> None:
+    def __init__(self, store: Store, connection: PageConnection, requests: RobotRequests) -> None:
         self._store, self._connection, self._requests = store, connection, requests
 
     @property

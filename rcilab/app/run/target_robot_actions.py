@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, cast
 
+from rcilab.app.connection import PageConnection
 from rcilab.app.request import Handlers, Request
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.drive_state import DESTINATIONS
 from rcilab.app.run.plan_readiness import is_moving
 from rcilab.app.run.run_actions import RunActions
@@ -34,7 +34,7 @@ class ChooseDestination(Request):
 class TargetRobotActions:
     """Preview, the virtual controller with one of its arms, or a controller at an address."""
 
-    def __init__(self, store: Store, connection: RobotConnection, robot: RunActions) -> None:
+    def __init__(self, store: Store, connection: PageConnection, robot: RunActions) -> None:
         self._store, self._connection, self._robot = store, connection, robot
 
     @property

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, cast
 import numpy as np
 
 from rcilab.app.arm_features import explain_missing_part
+from rcilab.app.connection import PageConnection
 from rcilab.app.goal.goal import Goal, evaluate_joints, evaluate_pose, reevaluated
 from rcilab.app.planning import Plan, tool_path
 from rcilab.app.request import Handlers, Request, TypeField
-from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.setup.configuration_sender import ConfigurationSender
 from rcilab.app.setup.configuration_state import (
     FORCE_AXES,
@@ -116,7 +116,7 @@ class PressSetup(Request):
 class SetupActions:
     """Handles in the scene, typed numbers, switches; each edit is sent to a virtual controller at once."""
 
-    def __init__(self, store: Store, connection: RobotConnection) -> None:
+    def __init__(self, store: Store, connection: PageConnection) -> None:
         self._store, self._connection = store, connection
         self._past: list[
             tuple[RobotConfiguration, frozenset[SetupPart]]

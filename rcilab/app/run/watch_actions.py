@@ -1,0 +1,133 @@
+"""Shows the motions of a foreign client on a page that watches its controller: commands as the plan, and the run."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.app.goal.goal import goal_at
+from rcilab.app.planning import Plan, build_plan_view
+from rcilab.app.run.run_recorder import whole_recording
+from rcilab.app.run.watched_controller import WatchedController
+from rcilab.conformance.check import check
+from rcilab.conformance.start import StartState
+from rcilab.core.arrays import JointPath
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.state import require_mode
+from rcilab.i18n.error_messages import describe_note
+from rcilab.i18n.translator import message
+from rcilab.makers.configuration import RobotConfiguration
+from rcilab.model.robot_model import RobotModel
+from rcilab.motion import Motion
+from rcilab.recording.client_motions import ClientMotion, MotionPart
+from rcilab.recording.playout import played_joints
+from rcilab.recording.run import Run, build_run
+
+if TYPE_CHECKING:
+    from rcilab.app.store import Store
+
+_PERIOD = 0.4  # [s] Between two drawings of a motion in progress; drawing and check of 10 s take a third of it.
+_WINDOW = 10_000  # [cycles] Of a motion in progress.
+_LONGEST = 60_000  # [cycles] Of a finished motion; its record in a file is complete.
+_FEWEST = 8  # [cycles]
+_FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm.
+
+
+class WatchActions:
+    """Owned by the dispatcher's thread.
+
+    Args:
+        store: The state.
+        controller: The watched controller.
+    """
+
+    def __init__(self, store: Store, controller: WatchedController) -> None:
+        self._store, self._controller = store, controller
+        self._rows: list[NDArray[np.void]] = []
+        self._count = 0
+        self._motion: ClientMotion | None = None
+        self._shown = float("-inf")
+
+    def tick(self) -> None:
+        """Shows what is new."""
+        for part in self._controller.poll():
+            self._add(part)
+        if self._motion is not None and self._count >= _FEWEST and time.monotonic() - self._shown > _PERIOD:
+            self._show(_WINDOW)
+            self._shown = time.monotonic()
+
+    def _add(self, part: MotionPart) -> None:
+        if self._motion is not part.motion:
+            self._motion, self._rows, self._count = part.motion, [], 0
+        if len(part.cycles):
+            self._rows.append(part.cycles)
+            self._count += len(part.cycles)
+        while len(self._rows) > 1 and self._count - len(self._rows[0]) > _LONGEST:
+            self._count -= len(self._rows.pop(0))
+        if part.end is not None:
+            if self._count >= _FEWEST:
+                self._show(_LONGEST, part.end.stopped, has_ended=True)
+            self._report(part)
+            self._motion = None
+
+    def _show(self, longest: int, stopped: str | None = None, *, has_ended: bool = False) -> None:
+        assert self._motion is not None
+        self._rows = [np.concatenate(self._rows)]
+        cycles = self._rows[0][-longest:]
+        is_whole = len(cycles) == self._count
+        if not is_whole:
+            cycles = cycles.copy()
+            cycles["t"] -= cycles["t"][0]
+        model, setup = self._motion.model, self._motion.setup
+        run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
+        plan, recording = _draw(run, model, has_ended=has_ended), whole_recording(run)
+        wanted = self._store.state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
+        setup = replace(self._store.state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
+        self._store.update(
+            model=model, setup=setup, plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0
+        )
+        if has_ended:
+            self._store.update(goal=goal_at(model, plan.motion.goal))
+
+    def _report(self, part: MotionPart) -> None:
+        end, motion = part.end, part.motion
+        assert end is not None
+        facts = {"number": motion.number, "client": motion.client, "lost": end.lost, "late": end.late}
+        if end.stopped is None:
+            self._store.notify("good", message("watch.ended", **facts))
+            return
+        first, *more = end.stopped.parts
+        code = "watch.stopped_more" if more else "watch.stopped"
+        self._store.notify("bad", message(code, **facts, reason=describe_note(first), more=len(more)))
+
+
+def _draw(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
+    """Returns the commands of a run as scene, timeline and curves draw a plan.
+
+    A motion in progress is continued until standstill: without that, its end would look like a violation.
+    """
+    q = played_joints(run.cycles, with_refused=True)
+    checked = q
+    faulty = np.flatnonzero(run.cycles["faults"])
+    if faulty.size:
+        checked = q[: max(len(q) - len(run.cycles) + int(faulty[0]) + 1, 1)]
+    elif not has_ended and len(q) > 2:
+        checked = q = np.concatenate([q, _fade_out(q)])
+    row = run.cycles[len(run.cycles) - len(q)] if len(q) <= len(run.cycles) else run.cycles[0]
+    start = StartState(q[0], row["dq_c"], row["ddq_c"])
+    report = check(Motion.from_cycles(checked), model, start=start, distance=None, mode=require_mode(run.setup.mode))
+    return replace(build_plan_view(model, Motion.from_cycles(q), report), complete=True)
+
+
+def _fade_out(q: JointPath) -> JointPath:
+    """Returns rows after the last one until standstill; velocity and acceleration continue and vanish smoothly."""
+    dq = (q[-1] - q[-2]) / CYCLE_TIME
+    ddq = (q[-1] - 2.0 * q[-2] + q[-3]) / CYCLE_TIME**2
+    s = CYCLE_TIME * np.arange(1, round(_FADE_TIME / CYCLE_TIME) + 1)[:, np.newaxis]
+    u = s / _FADE_TIME
+    velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3
+    return q[-1] + CYCLE_TIME * np.cumsum(velocity, axis=0)

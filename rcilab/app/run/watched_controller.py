@@ -1,0 +1,207 @@
+"""A virtual controller that a foreign client drives, as a page watches it: everything to read, nothing to send."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.control_process.status import Lateness, Phase, SupervisorStatus
+from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.state import ControllerMode, Mode, RobotMode, require_mode
+from rcilab.execution.simulation_control import SimulationControl
+from rcilab.model.robot_model import RobotModel
+from rcilab.recording.client_motions import ClientMotions, MotionPart
+
+if TYPE_CHECKING:
+    from rcilab.core.fault import FaultCode
+    from rcilab.makers.configuration import RobotConfiguration
+
+_DISPLAY_LAG = 5  # [cycles] The command for a row this old has arrived, or it is drawn without.
+_SILENCE = 0.5  # [s] Without a new cycle, after which the process is looked for.
+_RATE_WINDOW = 1.0  # [s]
+_RESPONSES = 4096  # Newest ones, for the percentiles.
+
+
+def parse_simulation_port(address: str) -> tuple[str, int]:
+    """Returns host and port of a simulation port, HOST:PORT.
+
+    Raises:
+        InvalidValueError: It is not an address.
+    """
+    host, colon, port = address.rpartition(":")
+    if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise InvalidValueError("address", address, "needs HOST:PORT, such as 127.0.0.2:40123")
+    return host, int(port)
+
+
+class WatchedController:
+    """The connection of a page that watches; it reads the controller's record and costs it nothing.
+
+    `status` may be called from any thread; `poll` is called from one.
+
+    Args:
+        address: Simulation port of the controller, HOST:PORT, as it prints it.
+
+    Raises:
+        InvalidValueError: It is not an address.
+        ConnectionLostError: No controller is there.
+        UsageError: It keeps no record, or that of another user.
+    """
+
+    is_ready = False
+    """A page that watches has no robot for requests."""
+    stops = 0
+
+    def __init__(self, address: str) -> None:
+        host, port = parse_simulation_port(address)
+        with SimulationControl(host, port) as world:
+            found = world.status()
+        if found.record < 0:
+            raise UsageError(
+                f"the controller at {address} keeps no record to watch: start it with `rcilab controller`, not by "
+                "the page or a session"
+            )
+        self._ring = CycleRing.attach(found.pid, found.record)
+        self._pid, self._world_address = found.pid, address
+        self._facts: dict[str, Any] = self._ring.facts
+        self._motions = ClientMotions(self._ring, _DISPLAY_LAG)
+        self._reader = self._ring.open_reader()
+        self.model: RobotModel = self._motions.model
+        """The arm, without tool and load."""
+        self.name: str = self._facts["url"]
+        """Address of the controller."""
+        self._lock = threading.Lock()  # Guards what `poll` writes and `status` reads.
+        self._mode: Mode = "joint_position"
+        self._motion_time: float | None = None
+        self._responses: deque[float] = deque(maxlen=_RESPONSES)
+        self._late = self._lost = 0
+        self._seen = (0, time.monotonic())  # Rows written, and when that number was new.
+        self._rate: deque[tuple[float, int]] = deque()
+
+    def poll(self) -> list[MotionPart]:
+        """Returns the new parts of the client's motions."""
+        parts = self._motions.poll()
+        with self._lock:
+            for part in parts:
+                self._count(part)
+        return parts
+
+    def status(self) -> SupervisorStatus:
+        """Returns what the newest cycle shows."""
+        row = self._reader.newest()
+        if row is None:
+            return SupervisorStatus(phase="connecting", code="connecting", target=self.name, address=self.name)
+        state, phase = row[0], self._find_phase(row)
+        code = {"lost": "lost.silent", "fault": "fault"}.get(phase, f"watched.{phase}")
+        with self._lock:
+            return SupervisorStatus(
+                phase=phase,
+                code=code,
+                message=f"{self.name} is watched.",
+                target=self.name,
+                address=self.name,
+                world_address=self._world_address,
+                q=state["q"].copy(),
+                q_c=state["q_c"].copy(),
+                dq=state["dq"].copy(),
+                tau_ext=state["tau_ext_in_base"].copy(),
+                robot_mode=RobotMode(int(state["robot_mode"])),
+                controller_mode=ControllerMode(int(state["controller_mode"])),
+                faults=self._faults(int(state["faults"])),
+                powered=int(state["robot_mode"]) != RobotMode.OTHER,
+                success_rate=float(state["success_rate"]),
+                rate_hz=self._measure_rate(),
+                message_id=int(state["message_id"]),
+                late_cycles=self._late,
+                lost_cycles=self._lost,
+                lateness=self._lateness(),
+                motion_time=self._motion_time,
+                motion_duration=self._motion_time,
+                motion_plan_time=self._motion_time,
+                mode=self._mode,
+                controller_pid=self._pid,
+            )
+
+    def robot(self) -> NoReturn:
+        """Raises an error: a page that watches sends nothing.
+
+        Raises:
+            UsageError: Always.
+        """
+        raise UsageError(
+            f"this page only watches {self.name}; its own client drives it. Start `rcilab` for an arm of your own"
+        ).coded("only_watched", address=self.name)
+
+    def open(
+        self, model: RobotModel, target: str, plant: str = "ideal", setup: RobotConfiguration | None = None
+    ) -> None:
+        """Raises an error, see `robot`."""
+        self.robot()
+
+    def disconnect(self) -> None:
+        """Raises an error, see `robot`."""
+        self.robot()
+
+    def stop(self) -> None:
+        """Does nothing: the motion belongs to the client. The emergency stop of the Run tab stops the arm."""
+
+    def heartbeat(self) -> None:
+        """Does nothing: no motion depends on this page."""
+
+    def take_run(self) -> None:
+        """Returns None: runs are built from `poll`."""
+
+    def close(self) -> None:
+        """Ends watching; the controller does not notice."""
+        self._ring.close()
+
+    def _find_phase(self, row: NDArray[np.void]) -> Phase:
+        count, since = self._seen
+        now = time.monotonic()
+        if self._reader.count != count:
+            self._seen = self._reader.count, now
+        elif now - since > _SILENCE and (self._facts["realtime"] or not Path(f"/proc/{self._pid}").exists()):
+            return "lost"
+        if int(row["faults"][0]):
+            return "fault"
+        return "moving" if int(row["motion"][0]) else "idle"
+
+    def _count(self, part: MotionPart) -> None:
+        self._mode = require_mode(part.motion.setup.mode)
+        if not len(part.cycles):
+            return
+        self._motion_time = float(part.cycles["t"][-1])
+        times = part.cycles["lateness"]
+        times = times[np.isfinite(times)]
+        self._responses.extend(times.tolist())
+        self._late += int((times > 1e-3).sum())
+        self._lost += int(part.cycles["missed"].sum())
+
+    def _lateness(self) -> Lateness:
+        if not self._responses:
+            return Lateness()
+        times = 1e6 * np.array(self._responses)
+        p50, p99, p999 = (float(value) for value in np.percentile(times, (50.0, 99.0, 99.9)))
+        edges = np.geomspace(10.0, 1e5, 41)
+        histogram = np.histogram(times, edges)[0]
+        return Lateness(
+            p50=p50, p99=p99, p999=p999, max=float(times.max()), cycles=len(times), edges=edges, histogram=histogram
+        )
+
+    def _measure_rate(self) -> float:
+        now, count = time.monotonic(), self._reader.count
+        self._rate.append((now, count))
+        while now - self._rate[0][0] > _RATE_WINDOW and len(self._rate) > 2:
+            self._rate.popleft()
+        (before, first), (after, last) = self._rate[0], self._rate[-1]
+        return (last - first) / (after - before) if after - before > 0.1 else 0.0
+
+    def _faults(self, bits: int) -> tuple[FaultCode, ...]:
+        return tuple(fault for fault in self.model.description.faults if bits >> fault & 1) if bits else ()
