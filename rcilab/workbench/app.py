@@ -23,6 +23,7 @@ from rcilab.app.program.edit_actions import EditProgram
 from rcilab.app.request import Request
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.replay import replayed, require_replayable
+from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.watched_controller import WatchedController
 from rcilab.app.scene.scene_actions import HighlightBranch
@@ -137,9 +138,9 @@ class Workbench:
         """Serves the page, then connects to the robot in the background."""
         sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL))
         ask = self.dispatcher.ask
-        self.live = live.LiveChannel(
-            self.session.stop, self._receive, lambda: self._guarded_server.guard.count_malformed()
-        )
+        # A page that watches cannot stop the motion, and says so; otherwise Stop takes the direct path.
+        stop = self.session.stop if self._config.watch is None else lambda: ask(RobotCommand(what="stop"))
+        self.live = live.LiveChannel(stop, self._receive, lambda: self._guarded_server.guard.count_malformed())
         gate = AccessPolicy(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")
         self._guarded_server = GuardedServer(
             self._bound,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _PERIOD = 0.4  # [s] Between two drawings of a motion in progress; drawing and check of 10 s take a third of it.
 _WINDOW = 10_000  # [cycles] Of a motion in progress.
 _LONGEST = 60_000  # [cycles] Of a finished motion; its record in a file is complete.
-_FEWEST = 8  # [cycles]
+_FEWEST = 2  # [cycles]
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm.
 
 
@@ -84,7 +84,7 @@ class WatchActions:
             cycles["t"] -= cycles["t"][0]
         model, setup = self._motion.model, self._motion.setup
         run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
-        plan, recording = _draw(run, model, has_ended=has_ended), whole_recording(run)
+        plan, recording = draw_plan(run, model, has_ended=has_ended), whole_recording(run)
         wanted = self._store.state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
         setup = replace(self._store.state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
         self._store.update(
@@ -105,7 +105,7 @@ class WatchActions:
         self._store.notify("bad", message(code, **facts, reason=describe_note(first), more=len(more)))
 
 
-def _draw(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
+def draw_plan(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
     """Returns the commands of a run as scene, timeline and curves draw a plan.
 
     A motion in progress is continued until standstill: without that, its end would look like a violation.
