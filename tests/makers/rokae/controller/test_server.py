@@ -447,7 +447,7 @@ def test_in_lock_step_answers_to_repeated_states_do_not_stay_in_stock(lockstep: 
 
 
 def test_ended_in_mid_motion_it_informs_the_client_with_an_error_bit() -> None:
-    with running(lockstep=True) as found, Peer(found) as peer:
+    with running(lockstep=True, on_loss="bridge") as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
         found.server.request_stop()
         while not peer.receive_state().faults:
