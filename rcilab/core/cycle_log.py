@@ -24,7 +24,7 @@ OTHER_STATE_FIELDS = (
     "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
 )  # fmt: skip
 """Further fields of a complete row: the rest of the state, plain numbers last."""
-PLAYOUT_FIELDS = ("motion", "played", "queued", "missed", "late")
+PLAYOUT_FIELDS = ("motion", "played", "age", "queued", "missed", "late")
 """Further fields of a row that a virtual controller records: what it did with the commands of its client."""
 
 _POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
@@ -68,7 +68,8 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
 
     ======================  ==================================================================================
     motion                  number of the motion of its client, from 1; 0 outside
-    played                  message_id of the row with the command that was played in this cycle; 0: none
+    played                  1: a command was played in this cycle
+    age                     number of rows from the one with that command to this one; 0: it was not recorded
     queued                  commands left in the queue
     missed                  1: the motion was in progress and no command was there for this cycle
     late                    commands of this motion so far that came after their cycle and were dropped

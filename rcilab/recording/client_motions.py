@@ -100,8 +100,8 @@ class ClientMotions:
         """Returns the new parts of motions, oldest first."""
         events = self._ring.events(self._next_event)
         self._next_event += len(events)
-        has_ended = any(event["event"] == "end" for event in events)
-        rows = self._reader.drain(self._reader.count - (0 if has_ended else self._lag))
+        ended = max((event["rows"] for event in events if event["event"] == "end"), default=0)
+        rows = self._reader.drain(max(self._reader.count - self._lag, ended))
         self._waiting = np.concatenate([self._waiting, rows])
         parts: list[MotionPart] = []
         for event in events:
@@ -127,12 +127,12 @@ class ClientMotions:
             return rows[:0]
         start, end = int(of_motion[0]), int(of_motion[-1]) + 1
         if self._cycle < 0:
-            played = rows["played"][start:end]
-            played = played[played > 0]
+            played = np.flatnonzero(rows["played"][:end])
+            played = played[played >= start]
             if not played.size:
                 return rows[:0]
-            origin = np.flatnonzero(rows["message_id"][:end] == played[0])
-            start, self._cycle = (int(origin[0]) if origin.size else start), 0
+            first = int(played[0])
+            start, self._cycle = max(first - int(rows["age"][first]), 0), 0
         taken = rows[start:end].copy()
         taken["t"] = CYCLE_TIME * (self._cycle + np.arange(len(taken)))
         self._cycle += len(taken)

@@ -40,11 +40,21 @@ def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> Jo
     return q[rows[0] :]
 
 
+def judged_joints(cycles: NDArray[np.void]) -> JointPath:
+    """Returns the joint angles of the played commands up to a refused one, shape (M, n), [rad]: what a check judges.
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+    """
+    q = played_joints(cycles, with_refused=True)
+    faulty = np.flatnonzero(cycles["faults"])
+    after = len(cycles) - 1 - int(faulty[0]) if faulty.size else 0  # Rows of the controller's own stop.
+    return q[: max(len(q) - after, 1)]
+
+
 def _played(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Returns the rows in which a command was played, and the rows whose states those commands answer."""
+    """Returns the rows in which a command was played, and the rows with those commands."""
     rows = np.flatnonzero(cycles["played"])
-    numbers, first = np.unique(cycles["message_id"], return_index=True)
-    wanted = cycles["played"][rows]
-    at = np.minimum(np.searchsorted(numbers, wanted), len(numbers) - 1)
-    is_known = numbers[at] == wanted
-    return rows[is_known], first[at][is_known]
+    sources = rows - cycles["age"][rows].astype(np.intp)
+    is_known = (sources >= 0) & (sources < rows)
+    return rows[is_known], sources[is_known]

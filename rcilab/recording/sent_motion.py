@@ -13,6 +13,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import UsageError
 from rcilab.motion.motion import Motion
+from rcilab.recording.playout import judged_joints
 
 if TYPE_CHECKING:
     from rcilab.recording.run import Run
@@ -22,7 +23,8 @@ def sent_motion(run: Run) -> Motion:
     """Returns the motion that a client commanded, on the grid of the controller's cycles.
 
     It has the joint angles as they were sent; if poses of the tool were sent, the joint angles that the controller
-    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them.
+    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them. Where a virtual
+    controller recorded which commands it played, it has these, up to one that was refused.
 
     Raises:
         UsageError: Nothing was commanded, or torques were.
@@ -30,6 +32,8 @@ def sent_motion(run: Run) -> Motion:
     rows = run.cycles
     if np.isfinite(rows["command_pose"]).any():
         return run.commanded()
+    if "played" in (rows.dtype.names or ()) and np.isfinite(rows["command"]).any():
+        return Motion.from_cycles(judged_joints(rows))
     sent = rows[np.isfinite(rows["command"]).all(axis=1)]
     if not len(sent):
         what = "torques were sent, which have no path" if np.isfinite(rows["command_tau"]).any() else "nothing was sent"

@@ -1,7 +1,8 @@
 """The record of a virtual controller: every cycle, with the command of its client, in a ring that others read.
 
 A row is written when the state of its cycle is sent; the command that answers it is added when it arrives. A client
-that received no state in time repeats a number (see `jitter_buffer`): its command is added to the next row without one.
+that received no state in time, or old ones again, repeats numbers (see `jitter_buffer`): such a command is added to the
+next row without one, also to one that is yet to come.
 The rows of a motion have its number; two events, `begin` and `end`, say whose motion it was, with which settings, and
 how it ended.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 import struct
 import time
+from collections import deque
 from collections.abc import Callable
 from operator import attrgetter
 from typing import Any
@@ -29,11 +31,11 @@ from rcilab.sim.maker_server import SimulatedController
 
 _HEAD = struct.Struct("<Qdqqdd")
 _FAULTS = struct.Struct("<QIBBBB")
-_STAMPS = struct.Struct("<qq")
+_STAMP = struct.Struct("<q")
 _ANSWERED = struct.Struct("<qd")
 _NUMBERS = struct.Struct("<4d")
 _PLAYOUT = struct.Struct(f"<{len(PLAYOUT_FIELDS)}Q")
-_FARTHEST = 256  # [rows] A command that answers an older state is not recorded: the queue is not longer.
+_FARTHEST = 256  # [rows] A command for a state before or after so many others is not recorded: no queue is longer.
 
 
 class CycleCapture:
@@ -61,9 +63,9 @@ class CycleCapture:
         self._is_moving = False
         self._client = ""
         self._lost_client = ""
-        self._number = 0  # Message id of the newest row.
         self._rows: dict[int, int] = {}  # Row of each recent message id.
-        self._commands: dict[int, int] = {}  # Message id of the row of each queued command, by its identity.
+        self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
+        self._waiting: deque[tuple[int, ArmCommand]] = deque()  # Time of arrival, [ns]; for rows to come.
         self._arrays_of = attrgetter(*STATE_FIELDS, *OTHER_STATE_FIELDS[:-4])
         self._numbers_of = attrgetter(*OTHER_STATE_FIELDS[-4:])
         nothing = np.full(n, math.nan).tobytes()
@@ -89,38 +91,46 @@ class CycleCapture:
         state, arm = controller.state, controller.arm
         self._follow_motion(state)
         playback, playout = arm.playback, arm.playout
-        played = missed = 0
+        played = age = missed = 0
         if playback is not None:
             missed = int(playback.is_lost)
             if not missed and playback.command is not None:
-                played = self._commands.pop(id(playback.command), playback.command.number)
+                played = 1
+                age = self._count - self._commands.pop(id(playback.command), self._count)
         motion = self._motion if self._is_moving else 0
-        row = self._pack(state, (motion, played, len(playout), missed, playout.late))
+        row = self._pack(state, (motion, played, age, len(playout), missed, playout.late))
         start = self._count % CAPACITY * self._size
         self._memory[start : start + self._size] = row
-        number = state.message_id
-        if number != self._number:
-            self._rows[number] = self._count
-            self._rows.pop(number - _FARTHEST, None)
-            self._number = number
+        self._rows.setdefault(state.message_id, self._count)
+        self._rows.pop(state.message_id - _FARTHEST, None)
         self._count += 1
+        if self._waiting:
+            self._add(self._count - 1, *self._waiting.popleft())
         self._ring.counters[RingCounter.ROWS] = self._count
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = time.monotonic_ns()
         self._received += 1
-        for number in range(command.number, self._number + 1):
-            row = self._rows.get(number)
-            if row is None:
-                return
-            start = row % CAPACITY * self._size
-            received, sent = _STAMPS.unpack_from(self._memory, start + self._offsets["received_ns"])
-            if sent == 0:
-                break
-        else:
+        row = self._rows.get(command.number)
+        if row is None:
             return
-        _ANSWERED.pack_into(self._memory, start + self._offsets["sent_ns"], now, 1e-9 * (now - received))
+        while row < self._count and self._is_answered(row):
+            row += 1
+        if row < self._count and not self._waiting:
+            self._add(row, now, command)
+        elif len(self._waiting) < _FARTHEST:
+            self._waiting.append((now, command))
+
+    def _is_answered(self, row: int) -> bool:
+        offset = row % CAPACITY * self._size + self._offsets["sent_ns"]
+        return _STAMP.unpack_from(self._memory, offset)[0] != 0
+
+    def _add(self, row: int, arrived: int, command: ArmCommand) -> None:
+        start = row % CAPACITY * self._size
+        delay = arrived - _STAMP.unpack_from(self._memory, start + self._offsets["received_ns"])[0]
+        lateness = 1e-9 * delay if delay >= 0 else math.nan  # It was there before this state: it had no deadline.
+        _ANSWERED.pack_into(self._memory, start + self._offsets["sent_ns"], arrived, lateness)
         mode = self._controller.arm.mode
         if mode.law is ControlLaw.TORQUE:
             self._joints(self._memory, start + self._offsets["command_tau"], *command.tau)
@@ -129,7 +139,7 @@ class CycleCapture:
             self._pose(self._memory, start + self._offsets["command_pose"], *command.T_base_tool, psi)
         else:
             self._joints(self._memory, start + self._offsets["command"], *command.q)
-        self._commands[id(command)] = number
+        self._commands[id(command)] = row
 
     def _follow_motion(self, state: RobotState) -> None:
         """Writes the events of a motion that begins or has ended."""
@@ -144,6 +154,7 @@ class CycleCapture:
             self._motion += 1
             self._lost_client, self._received = "", 0
             self._commands.clear()
+            self._waiting.clear()
             load = arm.model.load
             self._ring.add_event(
                 {
@@ -164,6 +175,7 @@ class CycleCapture:
             {
                 "event": "end",
                 "motion": self._motion,
+                "rows": self._count,
                 "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
                 "lost": playout.lost,

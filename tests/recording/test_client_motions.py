@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rcilab.conformance.check import check
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError, VersionMismatchError
 from rcilab.recording.client_motions import ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import Run, build_run, load_run
+from rcilab.recording.sent_motion import sent_motion
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
@@ -93,8 +95,9 @@ def test_every_command_of_a_client_is_recorded_bit_for_bit(mode: str) -> None:
     assert [int.from_bytes(data[:8], "big") for data in sent] == answered["message_id"].tolist()
     assert end is not None
     assert (end.stopped, end.received, end.lost) == (None, len(sent), 0)
-    played = run.cycles["played"]
-    assert played[played != 0].tolist() == answered["message_id"].tolist()
+    played = np.flatnonzero(run.cycles["played"])
+    sources = played - run.cycles["age"][played].astype(int)
+    assert run.cycles["message_id"][sources].tolist() == answered["message_id"].tolist()
 
 
 def test_a_recorded_motion_sent_again_moves_the_arm_alike(tmp_path: Path) -> None:
@@ -134,11 +137,48 @@ def test_a_refused_command_is_recorded_with_its_fault() -> None:
     assert end.stopped is not None
     assert "jerk" in end.stopped
     assert run.faults
-    faulty = run.cycles[run.cycles["faults"] != 0][0]
-    assert faulty["played"] == run.cycles["message_id"][run.cycles["sent_ns"] != 0][-1]
+    faulty = int(np.flatnonzero(run.cycles["faults"])[0])
+    assert run.cycles["sent_ns"][faulty - int(run.cycles["age"][faulty])] == run.cycles["sent_ns"].max()
     found = report_on_client(run, end)
     assert "stopped: joint 1: commanded" in found.line
     assert all(part in found.text for part in end.stopped.parts)
+
+
+def test_a_motion_right_after_another_keeps_its_first_command() -> None:
+    """The end of a motion is read before the client has answered the first state of the next one."""
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+        state = robot.receive_fresh_state()
+        while state.robot_mode != wire.ROBOT_MOVE:
+            state = robot.receive_fresh_state()
+        (first,) = collect(motions, 1)
+        assert first[-1].end is not None
+        for _ in range(20):
+            robot.answer(state, Output(q=state.q_c[:7]))
+            state = robot.next_state(state.message_id)
+        robot.stop_move()
+        run = as_run(collect(motions, 1)[0])
+    answered = run.cycles["sent_ns"] != 0
+    assert int(answered.sum()) == 20
+    assert answered[0]
+
+
+def test_commands_that_answer_one_state_again_are_all_recorded() -> None:
+    """The vendor's client sleeps after StartMove and then answers every copy of a state that it finds."""
+    with watched(mode_delay=0.005) as (place, motions), place.connect(start_sleep=0.5) as robot:
+        sent = sent_commands(robot)
+        programs.prepare(robot, NEAR, factor=1.0)
+        (parts,) = collect(motions, 1)
+    run = as_run(parts)
+    numbers = [int.from_bytes(data[:8], "big") for data in sent]
+    assert len(set(numbers)) < len(numbers) - 5
+    played = np.flatnonzero(run.cycles["played"])
+    sources = played - run.cycles["age"][played].astype(int)
+    assert (sources < played).all()
+    assert [row.tobytes() for row in run.command[sources]] == [data[8:64] for data in sent]
+    assert sent_motion(run).notes == ()
+    assert check(sent_motion(run), parts[0].motion.model, distance=None).ok
 
 
 def test_tool_load_and_settings_in_force_are_recorded() -> None:

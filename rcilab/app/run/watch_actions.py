@@ -24,7 +24,7 @@ from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion import Motion
 from rcilab.recording.client_motions import ClientMotion, MotionPart
-from rcilab.recording.playout import played_joints
+from rcilab.recording.playout import judged_joints, played_joints
 from rcilab.recording.run import Run, build_run
 
 if TYPE_CHECKING:
@@ -111,11 +111,8 @@ def draw_plan(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
     A motion in progress is continued until standstill: without that, its end would look like a violation.
     """
     q = played_joints(run.cycles, with_refused=True)
-    checked = q
-    faulty = np.flatnonzero(run.cycles["faults"])
-    if faulty.size:
-        checked = q[: max(len(q) - len(run.cycles) + int(faulty[0]) + 1, 1)]
-    elif not has_ended and len(q) > 2:
+    checked = judged_joints(run.cycles)
+    if not (run.faults or has_ended) and len(q) > 2:
         checked = q = np.concatenate([q, _fade_out(q)])
     row = run.cycles[len(run.cycles) - len(q)] if len(q) <= len(run.cycles) else run.cycles[0]
     start = StartState(q[0], row["dq_c"], row["ddq_c"])
