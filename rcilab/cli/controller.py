@@ -100,6 +100,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--plant", metavar="KIND", help="simulated arm: ideal or mujoco (ideal)")
     parser.add_argument(
+        "--realism",
+        metavar="KIND",
+        help="real: friction, noise and steps of the torque readings as measured on a real arm (off; mujoco only)",
+    )
+    parser.add_argument(
         "--lockstep",
         action="store_true",
         help="advance a motion only when its commands arrive: your unmodified client runs as fast as this machine",
@@ -273,6 +278,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         client_host=client_host,
         client_port=client_port,
         plant=option("plant", "ideal"),
+        realism=option("realism", "off"),
         lockstep=is_lockstep,
         mode_delay=option("mode_delay", None if is_lockstep else VENDOR_MODE_DELAY),
         prefill=option("prefill"),

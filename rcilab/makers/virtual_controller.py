@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rcilab.makers.maker import maker_of, require_simulator
-from rcilab.model.robot_model import load_model
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.sim.arm_server import ArmServer
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.friction_watch import FrictionWatch
 from rcilab.sim.log_entry import LogEntry
 from rcilab.sim.plant import Plant
 from rcilab.sim.plants import build_plant
@@ -34,11 +35,12 @@ def build_virtual_controller(
     assert maker is not None  # A simulated arm has one.
     arm = VirtualArm(
         model,
-        build_plant(config.plant, model) if plant is None else plant,
+        build_plant(config.plant, model, config.realism) if plant is None else plant,
         prefill=config.prefill_cycles,
         torque_prefill=config.prefill,
         lost_limit=config.lost_limit,
         on_loss=config.on_loss,
+        friction_watch=_friction_watch(model) if config.realism == "real" else None,
     )
     server = maker.build_server(arm, config)
     setup = config.setup(tuple(model.home.tolist()))
@@ -47,3 +49,8 @@ def build_virtual_controller(
     for signal in config.inputs:
         server.controller.set_input(signal, True)
     return ArmServer(server, config, log=log)
+
+
+def _friction_watch(model: RobotModel) -> FrictionWatch | None:
+    joints = model.description.imperfections
+    return None if joints is None else FrictionWatch([joint.friction for joint in joints])

@@ -112,6 +112,18 @@ class ServoFigures:
     """Damping ratio, [1]."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointImperfection:
+    """What a real joint has and its model has not."""
+
+    friction: float
+    """Coulomb friction, [N m]."""
+    torque_step: float
+    """Resolution of the torque reading, [N m]."""
+    torque_noise: float
+    """Standard deviation of its noise from one cycle to the next, [N m]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RobotDescription:
     """An arm: the data that all computations use."""
@@ -142,6 +154,8 @@ class RobotDescription:
     """Angle of joint 4 beyond which the elbow counts as flipped, [rad]; None if the maker defines no flip."""
     servos: tuple[ServoFigures, ...] | None = None
     """Response of the joints to commands that stop coming, one per joint; None: no figures."""
+    imperfections: tuple[JointImperfection, ...] | None = None
+    """Friction and torque sensors of real joints, one per joint; None: no figures."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
     friction: tuple[JointVector, JointVector, JointVector] | None = None

@@ -378,6 +378,13 @@ class ArmServer:
         self._server.step(is_sent=is_sent)
         self._environment.step()
         self._log_new_faults()
+        if self.controller.arm.warnings:
+            self._log_warnings(self.controller.arm.warnings)
+
+    def _log_warnings(self, warnings: list[str]) -> None:
+        for text in warnings:
+            self._log.write("warning", text)
+        warnings.clear()
 
     def _log_new_faults(self) -> None:
         """Logs the reason for new error bits."""

@@ -14,6 +14,7 @@ from rcilab.sim.api import NetworkFaults, Stall
 from rcilab.sim.arm_parameters import Floats
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
+from rcilab.sim.plants import REALISMS, Realism
 from rcilab.sim.streamed_motion import LOSS_BEHAVIOURS, PREFILL, LossBehaviour
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
@@ -61,6 +62,8 @@ class ControllerConfig:
     """UDP port for states; None: the number of the TCP port, as the vendor's client expects it."""
     plant: PlantKind = "ideal"
     """Kind of plant: an arm that follows exactly, or a simulated one."""
+    realism: Realism = "off"
+    """"real": the joints of the MuJoCo plant have the friction and torque sensors of real ones."""
     lockstep: bool = False
     """Whether a motion advances only when the command for the current state has arrived, instead of at 1 kHz."""
     mode_delay: float | None = None
@@ -131,6 +134,10 @@ class ControllerConfig:
             raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
+        if self.realism not in REALISMS:
+            raise InvalidValueError("realism", self.realism, f"is unknown; known: {', '.join(REALISMS)}")
+        if self.realism != "off" and self.plant != "mujoco":
+            raise InvalidValueError("realism", self.realism, "needs the plant mujoco: the ideal one has no friction")
         if self.on_loss not in LOSS_BEHAVIOURS:
             raise InvalidValueError("on_loss", self.on_loss, f"is unknown; known: {', '.join(LOSS_BEHAVIOURS)}")
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:

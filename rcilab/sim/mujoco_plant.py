@@ -14,6 +14,10 @@ torque acts at the output of the gear; in POSITION the rotors are accelerated wi
 The torque of a drive in addition to the compensation is limited. The manual's torque limit is that of a torque command;
 a drive needs more: with the rated load, gravity of the stretched arm alone exceeds it, and the manual's accelerations
 need up to 3.9 times that limit. Self-collision is not simulated: the controller checks positions.
+
+With the imperfections of real joints, Coulomb friction acts in TORQUE, where nothing compensates it, and the torque
+sensors have noise and steps. In POSITION the servo rejects friction, like one with integral action; it is in the torque
+readings alone.
 """
 
 from __future__ import annotations
@@ -31,10 +35,12 @@ from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
+from rcilab.robots.description import JointImperfection
 from rcilab.robots.mjcf import ARMATURE_PER_TORQUE, DAMPING_PER_TORQUE, TIMESTEP, build_mjcf
 from rcilab.sim.mujoco_obstacles import Obstacles
 from rcilab.sim.plant import Drive, Measurement, Setpoint
 from rcilab.sim.push import Push
+from rcilab.sim.torque_sensors import TorqueSensors
 
 BANDWIDTH = 80.0  # [rad/s] of the position servo, critically damped, about 13 Hz; a tuning value
 KP, KD = BANDWIDTH**2, 2.0 * BANDWIDTH  # [1/s^2], [1/s]
@@ -45,6 +51,7 @@ BRAKE_TIME = 0.02  # [s] time constant of the brakes; a tuning value
 
 _KP, _KD, _STEP = scalar(KP), scalar(KD), scalar(TIMESTEP)
 _BACK, _AHEAD = scalar(KP * TIMESTEP), scalar(1.0 - KD * TIMESTEP)  # [1/s], [1]
+_STICTION = (0.999, 0.9999)  # Impedance of MuJoCo's friction constraint: at its default a stuck joint creeps.
 _BRAKED_SPEED = 1e-4  # [rad/s] Below this, engaged brakes hold the arm.
 _STILL_SPEED = 1e-7  # [rad/s] Below this, a joint counts as stationary.
 _STILL_ERROR = 1e-9  # [rad] A stationary joint nearer to its setpoint counts as being there.
@@ -58,13 +65,22 @@ class MuJoCoPlant:
 
     Args:
         model: The arm with its tool and load.
-        friction: Scale of the joint friction; 0: none.
+        friction: Scale of the viscous joint friction; 0: none.
+        imperfections: Coulomb friction and torque sensors of the joints, n of them; None: neither.
     """
 
     kind = "mujoco"
 
-    def __init__(self, model: RobotModel, *, friction: float = 1.0) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        *,
+        friction: float = 1.0,
+        imperfections: Sequence[JointImperfection] | None = None,
+    ) -> None:
         self._friction_scale = friction
+        self._coulomb = None if imperfections is None else np.array([joint.friction for joint in imperfections])
+        self._sensors = None if imperfections is None else TorqueSensors(imperfections)
         self._mounted: Payload | None = None
         self._obstacles = Obstacles()
         self._build(model)
@@ -119,6 +135,12 @@ class MuJoCoPlant:
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Advances by one cycle with torques towards the setpoint at its end."""
+        measured = self._step(setpoint)
+        if self._sensors is None:
+            return measured
+        return self._sensors.read(measured, is_friction_simulated=setpoint.drive is Drive.TORQUE)
+
+    def _step(self, setpoint: Setpoint) -> Measurement:
         if self._is_stationary and self._remains_stationary(setpoint):
             return self._measurement
         self._is_stationary = False
@@ -201,6 +223,8 @@ class MuJoCoPlant:
         if on is not self._has_rotor_inertia:
             self._has_rotor_inertia = on
             self._armature[:] = self._rotors if on else 0.0
+            if self._coulomb is not None:
+                self._model.dof_frictionloss[:] = 0.0 if on else self._coulomb
             self._mj.mj_step1(self._model, self._data)
 
     def _times_inertia(self, ddq: Array) -> Array:
@@ -219,6 +243,7 @@ class MuJoCoPlant:
         self._model: Any = spec.compile()
         self._obstacles.install(self._model, mj)
         self._model.dof_damping *= self._friction_scale
+        self._model.dof_solimp[:, :2] = _STICTION
         self._model.jnt_range[: self._n] += [-END_STOP, END_STOP]
         self._data: Any = mj.MjData(self._model)
         self._q: Array = self._data.qpos  # Views of MuJoCo's memory, not copies.

@@ -24,6 +24,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import Actuator, ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.friction_watch import FrictionWatch
 from rcilab.sim.generators import build_generator
 from rcilab.sim.generators.generator import blame_lost_commands
 from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
@@ -88,6 +89,7 @@ class VirtualArm:
         measured_state: The sensors.
         resting_law: The control law while no command is followed. BRAKED engages the brakes at standstill.
         is_monitored: Whether measurements are checked.
+        warnings: Sentences about the motions so far; the reader clears them.
         playback: The output of the queue in the last cycle; None while no commands are followed.
         on_command: Called with every command that is queued.
 
@@ -99,6 +101,7 @@ class VirtualArm:
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
         lost_limit: Consecutive lost commands that end a motion; None: no limit. See `StreamedMotion`.
         on_loss: What the arm does while commands are missing.
+        friction_watch: Observes the effect of friction; None: nothing does.
     """
 
     def __init__(
@@ -111,6 +114,7 @@ class VirtualArm:
         torque_prefill: int | None = None,
         lost_limit: int | None = LOST_LIMIT,
         on_loss: LossBehaviour = "hold",
+        friction_watch: FrictionWatch | None = None,
     ) -> None:
         self.model = model
         self.plant = plant
@@ -125,6 +129,8 @@ class VirtualArm:
         self.on_command: Callable[[ArmCommand], None] = lambda command: None
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
         self._motion = StreamedMotion(prefill, torque_prefill, lost_limit, on_loss)
+        self.warnings: list[str] = []
+        self._friction_watch = friction_watch
         self._servos = servo_figures(model.description) if on_loss == "hold" else None
         self._actuator = Actuator(model, parameters)
         self._tau_c: list[float] | None = None
@@ -337,6 +343,16 @@ class VirtualArm:
             self._move_tool()
         self._setpoint = self._actuator.setpoint(law, commanded, self.tool_c, last, self._tau_c)
         self._take(law, self.plant.step(self._setpoint))
+        if self._friction_watch is not None:
+            self._watch_friction(self._friction_watch)
+
+    def _watch_friction(self, watch: FrictionWatch) -> None:
+        assert self._setpoint is not None
+        sensors = self.measured_state
+        if self._motion.is_followed and self._law.is_compliant:
+            watch.observe(self._law, self._setpoint, sensors.measured, self.tool_c, sensors.tool)
+        else:
+            self.warnings += watch.conclude(self._parameters)
 
     def _take(self, law: ControlLaw, measured: Measurement) -> None:
         """Processes the measurement of this cycle."""

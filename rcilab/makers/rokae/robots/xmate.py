@@ -14,7 +14,7 @@ import numpy as np
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
-from rcilab.robots.description import Link, ServoFigures
+from rcilab.robots.description import JointImperfection, Link, ServoFigures
 
 MANUAL = "RCI user manual V1.3.1"
 ROS2 = "vendor's public ROS 2 description package"
@@ -99,6 +99,25 @@ def xmate_servos(n: int) -> tuple[ServoFigures, ...]:
     """
     large, small = ServoFigures(bandwidth=110.0, damping=0.9), ServoFigures(bandwidth=190.0, damping=1.2)
     return (*(large,) * (n - 3), *(small,) * 3)
+
+
+_FRICTION = (0.55, 0.59, 0.59, 0.59, 0.47, 0.44, 0.33)  # [N m]
+_TORQUE_STEP = (0.0488,) * 4 + (0.0266,) * 3  # [N m]
+_TORQUE_NOISE = (0.08, 0.12, 0.07, 0.15, 0.035, 0.07, 0.011)  # [N m]
+
+
+def xmate_imperfections(n: int) -> tuple[JointImperfection, ...]:
+    """Returns friction and torque sensors of an arm with 7 or 6 joints, from the recording of `xmate_servos`.
+
+    The friction is that of a regression of its torques on those of a rigid arm and the sign of the velocity (0.33 to
+    0.59 N m); the step is the smallest difference of two readings; the noise is their content above 20 Hz, pauses left
+    out. The 6-axis arms have no joint 3.
+    """
+    joints = [
+        JointImperfection(friction=friction, torque_step=step, torque_noise=noise)
+        for friction, step, noise in zip(_FRICTION, _TORQUE_STEP, _TORQUE_NOISE, strict=True)
+    ]
+    return tuple(joints if n == 7 else (*joints[:2], *joints[3:]))
 
 
 def pro_heights(d1: float, d3: float, d5: float, d7: float) -> tuple[float, ...]:

@@ -7,7 +7,7 @@ from math import pi, radians
 from rcilab.core.arrays import readonly_copy
 from rcilab.makers.rokae.conditions import rci_conditions
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, tabled_link, xmate_limits, xmate_servos
+from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, tabled_link, xmate_imperfections, xmate_limits, xmate_servos
 from rcilab.robots.description import DhRow, RobotDescription
 
 _SHOULDER = 0.3415  # [m] d1
@@ -46,4 +46,5 @@ DESCRIPTION = RobotDescription(
     faults=Fault,
     conditions=rci_conditions,
     servos=xmate_servos(6),
+    imperfections=xmate_imperfections(6),
 )

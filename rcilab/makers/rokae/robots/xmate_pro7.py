@@ -13,6 +13,7 @@ from rcilab.makers.rokae.robots.xmate import (
     pro_heights,
     solid_link,
     tabled_link,
+    xmate_imperfections,
     xmate_limits,
     xmate_servos,
 )
@@ -50,4 +51,5 @@ DESCRIPTION = RobotDescription(
     faults=Fault,
     conditions=rci_conditions,
     servos=xmate_servos(7),
+    imperfections=xmate_imperfections(7),
 )
