@@ -27,14 +27,16 @@ from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.generators.motion_limits import MotionMode
 from rcilab.sim.maker_server import SimulatedController
 
 _HEAD = struct.Struct("<Qdqqdd")
 _FAULTS = struct.Struct("<QIBBBB")
-_STAMP = struct.Struct("<q")
+_STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
-_NUMBERS = struct.Struct("<4d")
-_PLAYOUT = struct.Struct(f"<{len(PLAYOUT_FIELDS)}Q")
+_TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
+_REST = STATE_FIELDS + OTHER_STATE_FIELDS
+_POSES = tuple(index for index, name in enumerate(_REST) if name.startswith("T_"))
 _FARTHEST = 256  # [rows] A command for a state before or after so many others is not recorded: no queue is longer.
 
 
@@ -56,8 +58,7 @@ class CycleCapture:
         assert dtype.fields is not None
         self._memory, self._size = ring.memory, dtype.itemsize
         self._offsets = {name: int(field[1]) for name, field in dtype.fields.items()}
-        self._joints = struct.Struct(f"<{n}d").pack_into
-        self._pose = struct.Struct("<17d").pack_into
+        self._stamps = self._offsets["received_ns"]
         self._count = 0
         self._motion = 0  # Number of the last motion.
         self._is_moving = False
@@ -66,11 +67,10 @@ class CycleCapture:
         self._rows: dict[int, int] = {}  # Row of each recent message id.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
         self._waiting: deque[tuple[int, ArmCommand]] = deque()  # Time of arrival, [ns]; for rows to come.
-        self._arrays_of = attrgetter(*STATE_FIELDS, *OTHER_STATE_FIELDS[:-4])
-        self._numbers_of = attrgetter(*OTHER_STATE_FIELDS[-4:])
-        nothing = np.full(n, math.nan).tobytes()
-        self._no_command = nothing
-        self._no_pose = np.full(17, math.nan).tobytes()
+        self._rest_of = attrgetter(*_REST)
+        self._no_joints = np.full(n, math.nan).tobytes()
+        self._no_answer = np.full(17 + n, math.nan).tobytes()
+        self._answer = self._find_answer(controller.arm.mode)
         self._faults: tuple[FaultCode, ...] = ()
         self._bits = 0
         self._received = self._duplicates = 0
@@ -115,31 +115,34 @@ class CycleCapture:
         row = self._rows.get(command.number)
         if row is None:
             return
-        while row < self._count and self._is_answered(row):
-            row += 1
-        if row < self._count and not self._waiting:
-            self._add(row, now, command)
-        elif len(self._waiting) < _FARTHEST:
+        if not self._waiting:
+            for free in range(row, self._count):
+                if self._add(free, now, command):
+                    return
+        if len(self._waiting) < _FARTHEST:
             self._waiting.append((now, command))
 
-    def _is_answered(self, row: int) -> bool:
-        offset = row % CAPACITY * self._size + self._offsets["sent_ns"]
-        return _STAMP.unpack_from(self._memory, offset)[0] != 0
-
-    def _add(self, row: int, arrived: int, command: ArmCommand) -> None:
-        start = row % CAPACITY * self._size
-        delay = arrived - _STAMP.unpack_from(self._memory, start + self._offsets["received_ns"])[0]
-        lateness = 1e-9 * delay if delay >= 0 else math.nan  # It was there before this state: it had no deadline.
-        _ANSWERED.pack_into(self._memory, start + self._offsets["sent_ns"], arrived, lateness)
-        mode = self._controller.arm.mode
-        if mode.law is ControlLaw.TORQUE:
-            self._joints(self._memory, start + self._offsets["command_tau"], *command.tau)
-        elif mode.is_cartesian:
-            psi = command.psi if command.has_psi else math.nan
-            self._pose(self._memory, start + self._offsets["command_pose"], *command.T_base_tool, psi)
-        else:
-            self._joints(self._memory, start + self._offsets["command"], *command.q)
+    def _add(self, row: int, arrived: int, command: ArmCommand) -> bool:
+        """Adds a command to a row unless it has one; returns whether it was added."""
+        memory, start = self._memory, row % CAPACITY * self._size
+        received, answered = _STAMPS.unpack_from(memory, start + self._stamps)
+        if answered:
+            return False
+        lateness = 1e-9 * (arrived - received) if arrived >= received else math.nan  # NaN: it was there before.
+        _ANSWERED.pack_into(memory, start + self._stamps + 8, arrived, lateness)
+        pack, offset, numbers_of = self._answer
+        pack(memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
+        return True
+
+    def _find_answer(self, mode: MotionMode) -> tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]:
+        """Returns how a command of this mode is stored: the packer, its place in a row, and its numbers."""
+        joints = struct.Struct(f"<{self._ring.n}d").pack_into
+        if mode.law is ControlLaw.TORQUE:
+            return joints, self._offsets["command_tau"], attrgetter("tau")
+        if mode.is_cartesian:
+            return struct.Struct("<17d").pack_into, self._offsets["command_pose"], _pose_of
+        return joints, self._offsets["command"], attrgetter("q")
 
     def _follow_motion(self, state: RobotState) -> None:
         """Writes the events of a motion that begins or has ended."""
@@ -152,6 +155,7 @@ class CycleCapture:
         arm = controller.arm
         if is_moving:
             self._motion += 1
+            self._answer = self._find_answer(arm.mode)
             self._lost_client, self._received = "", 0
             self._commands.clear()
             self._waiting.clear()
@@ -189,23 +193,23 @@ class CycleCapture:
     def _pack(self, state: RobotState, playout: tuple[int, ...]) -> bytes:
         if state.faults is not self._faults:
             self._faults, self._bits = state.faults, sum(1 << fault for fault in state.faults)
-        modes = state.robot_mode, state.controller_mode, state.motion_generator_mode, 0
-        return b"".join(
-            (
-                _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
-                state.q.tobytes(),
-                state.q_c.tobytes(),
-                state.dq.tobytes(),
-                self._no_command,
-                _FAULTS.pack(self._bits, 0, *modes),
-                state.tau.tobytes(),
-                self._no_pose,
-                self._no_command,
-                *[values.tobytes() for values in self._arrays_of(state)],
-                _NUMBERS.pack(*self._numbers_of(state)),
-                _PLAYOUT.pack(*playout),
-            )
+        rest: list[Any] = list(self._rest_of(state))
+        for index in _POSES:
+            rest[index] = rest[index].tobytes()
+        *rest, psi, psi_c, dpsi_c, ddpsi_c = rest
+        parts: tuple[Any, ...] = (
+            _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
+            state.q,
+            state.q_c,
+            state.dq,
+            self._no_joints,
+            _FAULTS.pack(self._bits, 0, state.robot_mode, state.controller_mode, state.motion_generator_mode, 0),
+            state.tau,
+            self._no_answer,
+            *rest,
+            _TAIL.pack(psi, psi_c, dpsi_c, ddpsi_c, *playout),
         )
+        return b"".join(parts)
 
 
 def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
@@ -229,3 +233,7 @@ def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
         if box is None
         else {"size": box.size, "pose": box.T_base_box.as_row_major(), "active": box.active},
     }
+
+
+def _pose_of(command: ArmCommand) -> tuple[float, ...]:
+    return (*command.T_base_tool, command.psi if command.has_psi else math.nan)
