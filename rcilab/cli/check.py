@@ -147,7 +147,7 @@ def _read_run(args: Namespace) -> _Subject:
     from rcilab.core.state import MODES
     from rcilab.model.robot_model import load_model
     from rcilab.recording.run import load_run
-    from rcilab.recording.sent_motion import sent_motion
+    from rcilab.recording.sent_motion import sent_motion, with_stop
 
     run = load_run(args.file, max_rows=args.max_rows)
     tool, load, box = _arm_options(args)
@@ -162,7 +162,13 @@ def _read_run(args: Namespace) -> _Subject:
     motion = sent_motion(run)
     recorded = run.setup.mode if run.setup.mode in MODES else "joint_position"
     ended = str(run.stopped or name_faults(run.faults))
-    notes = [f"the run was ended early: {ended}"] if ended else []
+    notes = []
+    if ended:
+        notes.append(f"the run ended early: {ended}")
+        continued = with_stop(motion, model)
+        if continued is not motion:
+            notes.append(f"after its last command at t = {motion.duration:.3f} s a stop is added")
+            motion = continued
     if run.truncated:
         notes.append("the beginning of the run is missing, so that the motion begins with a jump")
     return _Subject(

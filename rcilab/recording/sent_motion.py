@@ -12,10 +12,13 @@ from rcilab.core.arrays import Array, JointPath
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import UsageError
+from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.motion import Motion
+from rcilab.motion.stop import plan_stop
 from rcilab.recording.playout import judged_joints
 
 if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
 
 
@@ -44,6 +47,23 @@ def sent_motion(run: Run) -> Motion:
     motion = Motion.from_cycles(_fill_gaps(index, sent["command"][first]), period)
     lost = int(index[-1]) + 1 - len(index)
     return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
+
+
+def with_stop(motion: Motion, model: RobotModel) -> Motion:
+    """Returns a motion whose last row still moves, continued by the fastest stop; one that ends at rest as it is.
+
+    For the commands of a run that ended early: held at its last row, the arm would stop with a jump that nobody
+    commanded.
+
+    Raises:
+        PlanningError: The last rows are farther apart than any robot's.
+    """
+    q = motion.q
+    if len(q) < 3 or not (np.diff(q[-3:], axis=0)).any():
+        return motion
+    dq, ddq = (q[-1] - q[-2]) / CYCLE_TIME, (q[-1] - 2.0 * q[-2] + q[-3]) / CYCLE_TIME**2
+    stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq))
+    return replace(Motion.from_cycles(np.concatenate((q, stop.q[1:]))), notes=motion.notes)
 
 
 def _fill_gaps(index: NDArray[np.intp], q: JointPath) -> JointPath:

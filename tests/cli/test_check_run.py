@@ -96,7 +96,7 @@ def test_a_run_of_torques_is_refused_in_one_sentence(tmp_path, capsys):
 def test_why_a_run_ended_early_is_told_with_its_report(tmp_path, capsys):
     some_run(stopped="on request").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun")]) == 0
-    assert "the run was ended early: on request" in capsys.readouterr().out
+    assert "the run ended early: on request" in capsys.readouterr().out
 
 
 def test_options_take_the_place_of_the_tool_the_load_and_the_box_of_a_file(tmp_path, capsys):
@@ -137,3 +137,17 @@ def test_a_program_file_is_checked_with_its_own_load_and_box(tmp_path, capsys):
     replace(program, box=box_numbers(narrow)).save(tmp_path / "a.json")
     assert main(["check", str(tmp_path / "a.json")]) == 1
     assert main(["check", str(tmp_path / "a.json"), "--box", "2,2,2@0,0,0.5"]) == 0
+
+
+def test_a_run_that_ended_in_the_middle_is_not_blamed_for_a_jump_at_its_end(tmp_path, capsys):
+    run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
+    assert main(["check", str(tmp_path / "a.rcirun")]) == 0
+    said = capsys.readouterr().out
+    assert "the run ended early: an emergency stop was pressed; after its last command at t = 0.299 s a stop is" in said
+    spoiled = some_cycles()[:300].copy()
+    spoiled["command"][150, 1] += 1e-4
+    run_of(spoiled, stopped="joint 2: jump").save(tmp_path / "b.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "b.rcirun"))
+    assert code == 1
+    assert {violation["place"] for violation in report["violations"]} == {"joint 2"}
+    assert all(0.149 < violation["worst_time"] < 0.154 for violation in report["violations"])
