@@ -16,6 +16,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.arm_parameters import ArmParameters, Floats
+from rcilab.sim.plant import Plant
 
 JOINT_ANGLES = "joint angles"
 """Name of `ArmSetup.q` in errors."""
@@ -41,17 +42,18 @@ class ArmSetup:
         return all(part is None for part in parts)
 
 
-def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParameters) -> None:
+def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParameters, plant: Plant) -> None:
     """Requires joint angles at which an arm can stand.
 
     Args:
         model: The arm with its tool.
         q: Joint angles, shape (n,), [rad].
         parameters: With soft limits and safety box.
+        plant: With obstacles.
 
     Raises:
-        InvalidValueError: Not n finite numbers; a joint is outside its range; links touch; or the tool is below the
-            lower face of the active safety box.
+        InvalidValueError: Not n finite numbers; a joint is outside its range; links overlap each other or a box of the
+            plant; or the tool is below the lower face of the active safety box.
     """
     angles = as_vector(q, model.n, JOINT_ANGLES, "rad")
     shown = [round(angle, 2) for angle in np.degrees(angles).tolist()]
@@ -66,6 +68,9 @@ def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParamete
     if clearance.distance <= 0.0:
         pair, depth = LinkPair(*clearance.links.tolist()), -1e3 * float(clearance.distance)
         raise InvalidValueError(JOINT_ANGLES, shown, f"deg: {pair} overlap by {depth:.3g} mm; they must not touch")
+    overlap = plant.find_overlap(angles)
+    if overlap is not None:
+        raise InvalidValueError(JOINT_ANGLES, shown, f"deg: {overlap}; remove the box or choose other angles")
     box = parameters.safety_box
     if box is not None and box.active:
         tool = box.T_base_box.inverse() @ Pose(model.forward(angles).position)

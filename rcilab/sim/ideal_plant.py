@@ -77,6 +77,9 @@ class IdealPlant:
             "no_contact"
         )
 
+    def find_overlap(self, q: JointVector) -> str | None:
+        """Returns None: there are no boxes."""
+
     def set_floor(self, on: bool) -> None:
         """Refuses a floor."""
         if on:

@@ -87,6 +87,14 @@ class Obstacles:
             self._apply()
             raise
 
+    def find_overlap(self, data: Any) -> str | None:
+        """Returns which link of the arm overlaps which box, as text; None if none does."""
+        for slot, name in zip(_BOXES, self._boxes, strict=False):
+            depth, link = self._deepest(int(self._model.geom(slot).id), data)
+            if depth > 0.0:
+                return f"{link} overlaps the box {name!r} by {1e3 * depth:.3g} mm"
+        return None
+
     def _require_free(self, name: str, data: Any) -> None:
         """Refuses a box that overlaps the arm: MuJoCo would push the arm out."""
         index = int(self._model.geom(_BOXES[list(self._boxes).index(name)]).id)

@@ -123,6 +123,16 @@ class MuJoCoPlant:
         self._obstacles.remove_box(name)
         self._is_stationary = False
 
+    def find_overlap(self, q: JointVector) -> str | None:
+        """Returns which link would overlap which box with the arm at `q`; see `Plant.find_overlap`."""
+        before = self._q.copy()
+        self._q[:] = q
+        try:
+            return self._obstacles.find_overlap(self._data)
+        finally:
+            self._q[:] = before
+            self._mj.mj_kinematics(self._model, self._data)
+
     def set_floor(self, on: bool) -> None:
         """Adds or removes a solid floor, the plane z = 0 of the base frame."""
         self._obstacles.set_floor(on)

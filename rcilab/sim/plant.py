@@ -134,6 +134,10 @@ class Plant(Protocol):
         """
         ...
 
+    def find_overlap(self, q: JointVector) -> str | None:
+        """Returns which link would overlap which box with the arm at `q`, shape (n,), [rad]; None if it is free."""
+        ...
+
     def set_floor(self, on: bool) -> None:
         """Adds or removes a solid floor, the plane z = 0 of the base frame.
 

@@ -251,7 +251,7 @@ class RciController:
         description = self.model.description
         settings = apply_setup(self.settings, setup, description)
         if setup.q is not None:
-            require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings)
+            require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings, self.plant)
         self.settings, self._pendant = settings, apply_setup(self._pendant, setup, description)
         self.arm.configure(settings)
         if setup.q is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from rcilab.makers.rokae import wire as rci
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
-from rcilab.sim.api import PlaceArm
+from rcilab.sim.api import Done, PlaceArm, PlaceBox, Refused
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.controller_config import ControllerConfig
 from tests.makers.rokae.controller.test_environment import Place
@@ -139,6 +140,25 @@ def test_an_arm_that_moves_or_follows_is_not_placed() -> None:
         assert peer.ask(rci.StopMove()) == 0
         assert np.array_equal(peer.receive_live_state().q_c, MOTION.goal)
         assert guest.ask(request="place_arm", q=list(Q))["ok"]
+
+
+def test_an_arm_is_not_placed_inside_an_obstacle() -> None:
+    place = Place("mujoco")
+    try:
+        there = MODEL.forward(Q).position.tolist()
+        wall = PlaceBox("wall", (0.05, 0.05, 0.05), tuple(there))
+        assert place.handle(PlaceArm(tuple((MODEL.home - 0.3).tolist()))) == Done()
+        assert place.handle(wall) == Done()
+        before = place.cycle.step().q
+        refused = place.handle(PlaceArm(Q))
+        assert isinstance(refused, Refused)
+        assert re.search(
+            r"link\d overlaps the box 'wall' by \S+ mm; remove the box or choose other angles", refused.reason
+        )
+        place.step(5)
+        assert np.array_equal(place.cycle.state.q, before)
+    finally:
+        place.endpoint.close()
 
 
 @pytest.mark.parametrize("phase", ["starting", "guiding"])
