@@ -37,6 +37,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "client_refused": Kind("clients were refused", 1),
         "states_elsewhere": Kind("connected", 1),
         "unknown_sender": Kind("were ignored", 1),
+        "bad_datagram": Kind("datagrams of another size were ignored", 1),
         "power_on": Kind("times the motors were switched on"),
         "power_off": Kind("times the motors were switched off"),
         "motion_started": Kind("motions started"),

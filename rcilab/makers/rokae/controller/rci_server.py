@@ -30,6 +30,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 SHUTDOWN_NOTICE = 20  # [cycles] For which states are still sent after the end of a motion, with the error bit.
 _PROTOCOL = "RCI"
+_OTHER_VERSION = "the client may have another version"
 _QUIET = (Phase.OFF, Phase.IDLE)
 _ACTIVE = (Phase.MOVING, Phase.GUIDING)
 """Not STOPPING: its motion was ended by StopMove, after which the vendor's client may close the connection at once."""
@@ -101,7 +102,11 @@ class RciServer:
 
     def receive_datagram(self, datagram: bytes) -> bool:
         """Passes a command on; returns whether it has the correct size."""
-        if len(datagram) != COMMAND_SIZE:
+        size = len(datagram)
+        if size != COMMAND_SIZE:
+            expected = f"a command of this {_PROTOCOL} has {COMMAND_SIZE}"
+            text = f"ignored a datagram of {size} bytes: {expected}; {_OTHER_VERSION}"
+            self._link.log("bad_datagram", text, size=size, expected=COMMAND_SIZE)
             return False
         self.controller.receive(decode_command(datagram, self._n))
         return True
@@ -143,7 +148,7 @@ class RciServer:
                 command_id, request = decode_request(frame)
             except DecodeError as error:
                 self._frames.clear()
-                self._link.drop(peer, f"sent bytes that are not valid {_PROTOCOL}: {error}")
+                self._link.drop(peer, f"sent bytes that are not valid {_PROTOCOL}: {error}; {_OTHER_VERSION}")
                 return
             reply = self.controller.handle(request)
             self._log_refusal(request, reply)

@@ -276,6 +276,9 @@ def test_datagrams_of_another_size_are_counted_and_ignored(lockstep: Running) ->
             pass
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
     assert lockstep.server.bad_datagrams == 6
+    assert lockstep.lines == [
+        "ignored a datagram of 0 bytes: a command of this RCI has 290; the client may have another version"
+    ]
 
 
 def test_requests_split_into_single_bytes_and_joined_into_one_are_understood(lockstep: Running) -> None:
