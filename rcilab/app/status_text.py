@@ -28,7 +28,7 @@ _CRASHES = ("crashed.controller", "crashed.worker", "crashed.frozen")
 _PHASES = {
     **{code: f"phase.{code}" for code in _CRASHES}, "moving.held": "phase.held", "moving.guided": "phase.guided",
     "fault.released": "phase.released", "lost.rebooted": "phase.rebooted", "watched.idle": "phase.watched",
-    "watched.moving": "phase.watched_moving",
+    "watched.moving": "phase.watched_moving", "watched.lost": "phase.watched_lost",
 }  # fmt: skip
 """States that have a text of their own instead of that of their phase."""
 _SAFETY_STOPS = {"fault.pressed": "ready.pressed", "fault.released": "ready.released"}

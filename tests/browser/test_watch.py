@@ -44,5 +44,11 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             assert page.button("Execute").is_disabled()
             tab.keyboard.press("Escape")
             page.wait(lambda: "This page only watches: stop the program" in toast(tab), "what Stop cannot do")
+            controller.process.terminate()
+            page.wait(lambda: page.chip("phase") == "controller ended", "the end of the controller in the bar")
+            page.wait(
+                lambda: "start rcilab watch" in tab.locator(".rl-note:visible").first.inner_text().replace("`", ""),
+                "what to do",
+            )
             assert page.problems == []
             tab.close()

@@ -105,7 +105,8 @@ def is_plan_current(state: UiState, status: SupervisorStatus) -> bool:
 def connection_note(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns the message next to the destination, at the top of Run: why no motion can run there; None: none."""
     if state.watched:
-        return message("ready.watched", address=state.watched)
+        code = "watch.gone" if status.phase == "lost" else "ready.watched"
+        return message(code, address=state.watched)
     missing = explain_missing_robot(state.model, is_virtual=state.target == "virtual")
     if status.phase in ("fault", "lost", "crashed"):
         return _describe_arm(state, status)

@@ -70,6 +70,7 @@ class WatchedController:
             )
         self._ring = CycleRing.attach(found.pid, found.record)
         self._pid, self._world_address = found.pid, address
+        self._source = Path(f"/proc/{found.pid}/fd/{found.record}")
         self._facts: dict[str, Any] = self._ring.facts
         self._motions = ClientMotions(self._ring, _DISPLAY_LAG)
         self._reader = self._ring.open_reader()
@@ -99,7 +100,7 @@ class WatchedController:
         if row is None:
             return SupervisorStatus(phase="connecting", code="connecting", target=self.name, address=self.name)
         state, phase = row[0], self._find_phase(row)
-        code = {"lost": "lost.silent", "fault": "fault"}.get(phase, f"watched.{phase}")
+        code = phase if phase == "fault" else f"watched.{phase}"
         with self._lock:
             return SupervisorStatus(
                 phase=phase,
@@ -167,7 +168,7 @@ class WatchedController:
         now = time.monotonic()
         if self._reader.count != count:
             self._seen = self._reader.count, now
-        elif now - since > _SILENCE and (self._facts["realtime"] or not Path(f"/proc/{self._pid}").exists()):
+        elif now - since > _SILENCE and (self._facts["realtime"] or not self._source.exists()):
             return "lost"
         if int(row["faults"][0]):
             return "fault"

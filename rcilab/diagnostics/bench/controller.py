@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rcilab.control_process.launch import start_controller
+from rcilab.control_process.launch import VirtualController, start_controller
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import DeadlineError
@@ -19,7 +19,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
-from rcilab.diagnostics.bench.measure import Measurement, summarise, summarise_rate
+from rcilab.diagnostics.bench.measure import Measurement, summarise
 from rcilab.diagnostics.host import probe_realtime
 from rcilab.makers.driver import parse_address
 from rcilab.makers.rokae import wire as rci
@@ -90,9 +90,18 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
 
     The target is for 99.9 % of the periods, and only if the controller gets SCHED_FIFO.
     """
-    model = load_model(_ROBOT)
-    commands = joint_commands(model, seconds)
-    controller = start_controller(_ROBOT)
+    return measure_period("state_period", start_controller(_ROBOT), seconds)
+
+
+def measure_period(name: str, controller: VirtualController, seconds: float) -> Measurement:
+    """Returns the row of `bench_state_period` for a controller, and ends the controller.
+
+    Args:
+        name: Name of the row.
+        controller: A free-running controller without a client.
+        seconds: Duration of the motion, [s].
+    """
+    commands = joint_commands(load_model(_ROBOT), seconds)
     try:
         assert controller.address is not None
         address = parse_address(controller.address)
@@ -101,13 +110,14 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     finally:
         controller.end()
     deviation = np.abs(np.diff(stamps) - CYCLE_TIME)
-    found = summarise("state_period", deviation, "us", _JITTER_TARGET)
+    found = summarise(name, deviation, "us", _JITTER_TARGET)
     p999, largest = 1e6 * float(np.quantile(deviation, 0.999)), 1e6 * float(deviation.max())
     has_fifo = probe_realtime()[0]
     irregular = stamps[1:][1e6 * deviation > _JITTER_TARGET]
+    late = int((deviation > CYCLE_TIME).sum())
     note = (
-        f"|period - 1 ms| of {len(stamps)} states while moving; p99.9 {p999:.0f}, max {largest:.0f} us; "
-        f"{len(irregular)} off by more than {_JITTER_TARGET:g} us, "
+        f"|period - 1 ms| of {len(stamps)} states while moving; p99.9 {p999:.0f}, max {largest:.0f} us; {late} off by "
+        f"more than 1 ms, {len(irregular)} by more than {_JITTER_TARGET:g} us, "
         f"{int(stalls.explains(irregular, _RECOVERY_TIME).sum())} of them after one of {len(stalls.pauses)} stalls "
         "of a core; lateness of an empty loop with the highest priority: p99.9 "
         f"{1e6 * float(np.quantile(stalls.lateness, 0.999)):.0f} us"
@@ -117,30 +127,6 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     if is_faulty:
         note += "; THE MOTION WAS STOPPED BY A FAULT"
     return replace(found, note=note, ok=p999 <= _JITTER_TARGET and not is_faulty if has_fifo else None)
-
-
-def bench_lockstep() -> Measurement:
-    """Speed of a whole motion in lock-step: a client over sockets, which answers each state at once."""
-    model = load_model(_ROBOT)
-    commands = joint_commands(model, _DURATION)
-    rates: list[Measurement] = []
-    for plant in PLANT_KINDS:
-        controller = start_controller(_ROBOT, plant, lockstep=True)
-        try:
-            assert controller.address is not None
-            address = parse_address(controller.address)
-            stamps, is_faulty = _stream(address.host, address.port, commands, round(_DURATION / CYCLE_TIME))
-        finally:
-            controller.end()
-        rates.append(summarise_rate("lockstep", np.diff(stamps[::_SPAN]) / _SPAN, _RATE_TARGET))
-        if is_faulty:
-            return replace(rates[-1], ok=False, note="THE MOTION WAS STOPPED BY A FAULT")
-    found, other = rates
-    return replace(
-        found,
-        note=f"{_ROBOT}, {_DURATION:g} s of motion and a client in Python; median of spans of {_SPAN} cycles, and what "
-        f"99 % of them exceed; in MuJoCo {other.median:.1f} times",
-    )
 
 
 def joint_commands(model: RobotModel, duration: float) -> Command:

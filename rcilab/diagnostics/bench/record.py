@@ -1,15 +1,25 @@
-"""Cost of the controller's own record, per cycle."""
+"""Cost of the controller's own record: per cycle, and with a page that watches it."""
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
+import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
+from rcilab.control_process.launch import start_controller
 from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.errors import ConnectionLostError
 from rcilab.core.state import ControllerMode
-from rcilab.diagnostics.bench.controller import joint_commands
-from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.diagnostics.bench.browser import open_page, why_no_page
+from rcilab.diagnostics.bench.controller import joint_commands, measure_period
+from rcilab.diagnostics.bench.measure import Absent, Measurement, summarise
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import load_model
@@ -20,6 +30,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 _ROBOT = "xMatePro7"
 _CYCLES = 5000
+_WARM_UP = 6.0  # [s] The browser compiles shaders and uploads meshes first.
 
 
 def bench_record() -> Measurement:
@@ -56,3 +67,49 @@ def bench_record() -> Measurement:
     )
     ring.close()
     return summarise("record", times, "us", 10.0, note)
+
+
+def bench_watching(seconds: float = 10.0) -> Measurement | Absent:
+    """`state_period` while every motion is recorded in a file and a page in a real browser watches.
+
+    The note has the same row without the page, measured right before.
+    """
+    if (reason := why_no_page()) is not None:
+        return Absent(name="watching", note=reason)
+    with tempfile.TemporaryDirectory() as folder:
+        # The client of the bench has no priority beside a browser: its pauses must not end the motion.
+        options = ("--record", folder, "--lost-limit", "0")
+        alone = measure_period("watching", start_controller(_ROBOT, options=options), seconds)
+        controller = start_controller(_ROBOT, options=options)
+        assert controller.world_address is not None
+        with _watching_page(controller.world_address) as url, open_page(url):
+            time.sleep(_WARM_UP)
+            found = measure_period("watching", controller, seconds)
+    return replace(found, note=f"{found.note}; WITHOUT THE PAGE: {alone.note}")
+
+
+@contextmanager
+def _watching_page(address: str) -> Iterator[str]:
+    """Serves `rcilab watch ADDRESS` in a process of its own; yields its address for a browser."""
+    command = [
+        sys.executable,
+        "-m",
+        "rcilab.cli",
+        "watch",
+        address,
+        "--port",
+        "0",
+        "--no-browser",
+        "--quality",
+        "light",
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        found = re.search(r"http\S+", process.stdout.readline())
+        if found is None:
+            raise ConnectionLostError("bench: `rcilab watch` did not start")
+        yield found[0]
+    finally:
+        process.terminate()
+        process.wait()

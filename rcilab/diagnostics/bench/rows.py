@@ -53,6 +53,7 @@ ROWS = MappingProxyType(
         "import": "start",
         "start": "start",
         "state_period": "controller",
+        "watching": "record",
         "control_loop": "page",
         "spectators": "viewer_load",
     }
