@@ -13,6 +13,7 @@ from tests.peers.arena import PLANTS, Arena, arena
 from tests.peers.endurance import require_led
 from tests.peers.kinematics import Model
 from tests.peers.robot import ControlException, Output, Robot
+from tests.waiting import wait_for
 
 SECONDS = 1.0  # [s] of simulated time, one swing; the long versions are in tests/endurance.
 NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad] So that the move before a program takes 0.2 s.
@@ -69,6 +70,10 @@ def test_a_program_runs_to_its_end_and_moves_the_arm(place: Arena, name: str) ->
         assert len(states) >= SECONDS / programs.CYCLE
         q = np.array([state.q for state in states])
         assert np.ptp(q, axis=0).max() > 5e-3
+    wait_for(lambda: place.entries[-1].kind == "disconnected", 30.0, "the end of the connection")
+    assert {entry.kind for entry in place.entries} == {
+        "connected", "power_on", "motion_started", "motion_ended", "disconnected",
+    }  # fmt: skip
 
 
 def test_the_state_agrees_with_the_model_that_was_downloaded(place: Arena) -> None:
