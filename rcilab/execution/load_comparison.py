@@ -32,17 +32,17 @@ def describe_other_load(model: RobotModel, state: RobotState, robot: str) -> str
     joint = int(excess.argmax())
     mass = model.load.mass
     carries = f"a load of {mass:g} kg" if mass else "no load"
-    advice = "robot.set_load, or connect(..., apply=True), sends the model's"
+    sending = "robot.set_load, or connect(..., apply=True)"
     if is_known and excess[joint] > 0.0:
         return (
             f"the load of {robot} is not that of the model, which has {carries}: at standstill joint {joint + 1} has "
             f"{state.tau[joint]:.2f} N m, the model {expected[joint]:.2f} N m (tolerance {tolerance[joint]:.1f}); "
-            f"{advice}"
+            f"connect with a model that has the arm's load, or send the model's: {sending}"
         )
     unloaded = expected if mass == 0.0 else model.with_load(NO_LOAD).torque(state.q).gravity
     if mass == 0.0 or (is_known and bool((np.abs(expected - unloaded) > tolerance).any())):
         return ""
     return (
         f"whether {robot} has the load of the model, {mass:g} kg, is not known: its state does not contain it, and the "
-        f"torques of this pose do not show it; {advice}"
+        f"torques of this pose do not show it; to send it: {sending}"
     )
