@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from browser.page import BenchPage, close_toasts
+from rcilab.execution.simulation_control import SimulationControl
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.peers import programs
 from tests.peers.arena import Process
@@ -44,6 +45,11 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             assert page.button("Execute").is_disabled()
             tab.keyboard.press("Escape")
             page.wait(lambda: "This page only watches: stop the program" in toast(tab), "what Stop cannot do")
+            page.unfold("Safety buttons")
+            page.button("Emergency stop").click()
+            with SimulationControl(controller.host, controller.world_port) as world:
+                page.wait(lambda: world.status().button == "estop", "the emergency stop at the controller")
+            page.wait(lambda: page.status.is_pressed, "the stop in the status")
             controller.process.terminate()
             page.wait(lambda: page.chip("phase") == "controller ended", "the end of the controller in the bar")
             page.wait(
