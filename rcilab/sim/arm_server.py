@@ -199,10 +199,12 @@ class ArmServer:
         settings = {
             "prefill": config.prefill_cycles,
             "lost_limit": config.lost_limit,
-            "limit_table": controller.limit_table,
+            "on_loss": config.on_loss,
+            "realism": config.realism,
+            "force_sign": config.force_sign,
             "lockstep": config.lockstep,
         }
-        self._capture = CycleCapture(self.ring, controller, lambda: settings)
+        self._capture = CycleCapture(self.ring, controller, lambda: {**settings, "limit_table": controller.limit_table})
 
     def _open_simulation_port(self) -> SimulationPort | None:
         if self.config.world_port is None:
