@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 
 import pytest
 
 from rcilab.cli import main
 from rcilab.cli.bench import BENCHES
+from rcilab.diagnostics.bench.rows import ROWS
 
 KEYS = {"name", "median", "p99", "unit", "target", "ok", "note"}
 
@@ -15,6 +17,11 @@ def test_an_unknown_bench_is_refused_with_the_known_ones(capsys: pytest.CaptureF
     said = capsys.readouterr().err
     assert "unknown bench 'speed_of_light'" in said
     assert all(name in said for name in BENCHES)
+
+
+@pytest.mark.parametrize("name", BENCHES)
+def test_every_row_has_its_function(name: str) -> None:
+    assert callable(getattr(import_module(f"rcilab.diagnostics.bench.{ROWS[name]}"), f"bench_{name}"))
 
 
 @pytest.mark.parametrize("seconds", ["0", "-3", "nan", "1e9"])

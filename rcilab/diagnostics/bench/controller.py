@@ -19,7 +19,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
 from rcilab.diagnostics.bench.cpu_stall_monitor import CpuStallMonitor
-from rcilab.diagnostics.bench.measure import Measurement, summarise
+from rcilab.diagnostics.bench.measure import Measurement, summarise, summarise_rate
 from rcilab.diagnostics.host import probe_realtime
 from rcilab.makers.driver import parse_address
 from rcilab.makers.rokae import wire as rci
@@ -127,6 +127,30 @@ def measure_period(name: str, controller: VirtualController, seconds: float) -> 
     if is_faulty:
         note += "; THE MOTION WAS STOPPED BY A FAULT"
     return replace(found, note=note, ok=p999 <= _JITTER_TARGET and not is_faulty if has_fifo else None)
+
+
+def bench_lockstep() -> Measurement:
+    """Speed of a whole motion in lock-step: a client over sockets, which answers each state at once."""
+    model = load_model(_ROBOT)
+    commands = joint_commands(model, _DURATION)
+    rates: list[Measurement] = []
+    for plant in PLANT_KINDS:
+        controller = start_controller(_ROBOT, plant, lockstep=True)
+        try:
+            assert controller.address is not None
+            address = parse_address(controller.address)
+            stamps, is_faulty = _stream(address.host, address.port, commands, round(_DURATION / CYCLE_TIME))
+        finally:
+            controller.end()
+        rates.append(summarise_rate("lockstep", np.diff(stamps[::_SPAN]) / _SPAN, _RATE_TARGET))
+        if is_faulty:
+            return replace(rates[-1], ok=False, note="THE MOTION WAS STOPPED BY A FAULT")
+    found, other = rates
+    return replace(
+        found,
+        note=f"{_ROBOT}, {_DURATION:g} s of motion and a client in Python; median of spans of {_SPAN} cycles, and what "
+        f"99 % of them exceed; in MuJoCo {other.median:.1f} times",
+    )
 
 
 def joint_commands(model: RobotModel, duration: float) -> Command:
