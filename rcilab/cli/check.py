@@ -17,7 +17,7 @@ from rcilab.i18n.locale import LANGUAGES
 
 if TYPE_CHECKING:
     from rcilab.conformance.time_scaling import SlowDown
-    from rcilab.core.arrays import JointVector
+    from rcilab.core.arrays import Array, JointVector
     from rcilab.core.safety_box import SafetyBox
     from rcilab.core.spatial import Pose
     from rcilab.core.state import Mode
@@ -33,9 +33,9 @@ def add_parser(subparsers: Any) -> None:
         help="check a saved motion, program or recorded run by the robot's conditions",
         description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles), on the "
         "motion of a program (.json from Program.save), or on what the client of a recorded run (.rcirun) commanded: "
-        "the joint angles as sent, or for poses those that the controller commanded. Exit code: 0 it conforms, or the "
-        "written motion does; 1 it does not; 2 the file or the model name is not valid, or the program cannot be "
-        "planned.",
+        "the joint angles or torques as sent, or for poses the angles that the controller commanded. Exit code: 0 it "
+        "conforms, or the written motion does; 1 it does not; 2 the file or the model name is not valid, or the "
+        "program cannot be planned.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=f"{HELP}, or recorded run (.rcirun)")
     parser.add_argument(
@@ -81,7 +81,7 @@ def run(args: Namespace) -> int:
 
 def _run(args: Namespace) -> int:
     from rcilab.cli.report_json import as_json_text, report_as_json
-    from rcilab.conformance.check import check
+    from rcilab.conformance.check import check, check_torques
 
     out: Path | None = args.slow_down
     if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
@@ -91,7 +91,10 @@ def _run(args: Namespace) -> int:
     motion, model = as_motion(subject.found, subject.model, args.file, show=tell, max_rows=args.max_rows), subject.model
     for line in filter(None, (describe_arm(model, subject.box), subject.note)):
         tell(f"note: {line}")
-    report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
+    if subject.torques is None:
+        report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
+    else:
+        report = check_torques(motion, subject.torques, model, start=subject.start, box=subject.box)
     slowed = None if out is None else report.slow_down()
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)
@@ -117,6 +120,8 @@ class _Subject:
     mode: Mode
     start: JointVector | None = None
     """Commanded joint angles before the first command, [rad]; None: those of the motion's start."""
+    torques: Array | None = None
+    """Commanded torques, one row for each of the motion, [N m]."""
     note: str = ""
 
 
@@ -147,7 +152,7 @@ def _read_run(args: Namespace) -> _Subject:
     from rcilab.core.state import MODES
     from rcilab.model.robot_model import load_model
     from rcilab.recording.run import load_run
-    from rcilab.recording.sent_motion import sent_motion, with_stop
+    from rcilab.recording.sent_motion import sent_motion, sent_torques, with_stop
 
     run = load_run(args.file, max_rows=args.max_rows)
     tool, load, box = _arm_options(args)
@@ -159,13 +164,13 @@ def _read_run(args: Namespace) -> _Subject:
         model = load_model(args.model, **own)
     model = model if tool is None else model.with_tool(tool)
     model = model if load is None else model.with_load(load)
-    motion = sent_motion(run)
     recorded = run.setup.mode if run.setup.mode in MODES else "joint_position"
+    motion, torques = sent_torques(run) if recorded == "torque" else (sent_motion(run), None)
     ended = str(run.stopped or name_faults(run.faults))
     notes = []
     if ended:
         notes.append(f"the run ended early: {ended}")
-        continued = with_stop(motion, model)
+        continued = with_stop(motion, model) if torques is None else motion
         if continued is not motion:
             notes.append(f"after its last command at t = {motion.duration:.3f} s a stop is added")
             motion = continued
@@ -174,9 +179,10 @@ def _read_run(args: Namespace) -> _Subject:
     return _Subject(
         found=motion,
         model=model,
-        box=box,
+        box=run.setup.safety_box if box is None else box,
         mode=args.mode or recorded,
         start=None if run.truncated else run.q_c[0],
+        torques=torques,
         note="; ".join(notes),
     )
 

@@ -18,11 +18,11 @@ from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals
 from rcilab.conformance.start import StartState, as_start
-from rcilab.core.arrays import Array, Unquoted, described
+from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.state import Mode, require_mode
@@ -73,6 +73,47 @@ def check(
         InvalidValueError: The motion has another number of joints, or the start, the mode or another argument is not
             valid for this arm.
     """
+    return _check(motion, model, start, box, distance, mode)
+
+
+def check_torques(
+    motion: Motion,
+    torques: ArrayLike,
+    model: RobotModel,
+    *,
+    start: ArrayLike | StartState | None = None,
+    box: SafetyBox | None = None,
+    distance: ClearanceLimit | None = STANDARD_DISTANCE,
+) -> Report:
+    """Checks a recorded motion with the torques that were commanded, in torque mode.
+
+    `check` computes the torques of a motion from the model; here they are given. The report has no certificate, and
+    no motion can be slowed by it: the arm moves as the torques let it.
+
+    Args:
+        motion: The motion of the arm.
+        torques: Commanded torques, without gravity, one row for each of the motion, shape (N, n), [N m].
+        model: The arm.
+        start: As for `check`, also for the other two.
+        box: The safety box.
+        distance: Required distances of the links.
+
+    Raises:
+        InvalidValueError: An argument is not valid for this arm, or the numbers of rows differ.
+    """
+    rows = as_rows(torques, model.n, "torques", "N m", require_motion(motion).q)
+    return _check(motion, model, start, box, distance, "torque", rows)
+
+
+def _check(
+    motion: Motion,
+    model: RobotModel,
+    start: ArrayLike | StartState | None,
+    box: SafetyBox | None,
+    distance: ClearanceLimit | None,
+    mode: Mode,
+    torques: Array | None = None,
+) -> Report:
     require_motion(motion)
     require_model(model)
     if motion.n != model.n:
@@ -87,7 +128,7 @@ def check(
     rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
-    return _report(motion, rows, model=model, start=state, box=box, distance=distance, mode=mode)
+    return _report(motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques)
 
 
 def _report(
@@ -99,9 +140,10 @@ def _report(
     box: SafetyBox | None,
     distance: ClearanceLimit | None,
     mode: Mode,
+    torques: Array | None = None,
 ) -> Report:
     """Returns the report on a motion by some of the conditions."""
-    checker = _MotionChecker(motion, model, start, box, distance, mode)
+    checker = _MotionChecker(motion, model, start, box, distance, mode, torques)
     results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
@@ -113,9 +155,21 @@ def _report(
         motion=motion,
         start=start,
         measure=partial(checker.usage, rows),
-        issue=partial(issue_certificate, motion, model, start, box, distance, mode),
-        check_again=partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
+        issue=_issue_none
+        if torques is not None
+        else partial(issue_certificate, motion, model, start, box, distance, mode),
+        check_again=_refuse_other_motion
+        if torques is not None
+        else partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
     )
+
+
+def _issue_none() -> None:
+    """Commanded torques have no certificate: `execute` would compute others."""
+
+
+def _refuse_other_motion(motion: Motion, rows: tuple[Condition, ...]) -> Report:
+    raise UsageError("commanded torques cannot be slowed down: the arm moves as they let it")
 
 
 class _MotionChecker:
@@ -129,10 +183,11 @@ class _MotionChecker:
         box: SafetyBox | None,
         distance: ClearanceLimit | None,
         mode: Mode,
+        torques: Array | None = None,
     ) -> None:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
-        self._signals = MotionSignals(motion, model, start, box, distance, mode)
+        self._signals = MotionSignals(motion, model, start, box, distance, mode, torques)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:

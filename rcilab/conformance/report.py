@@ -237,7 +237,7 @@ class Report:
     """The state of the arm at the start of the check."""
     measure: Callable[[], Usage] = field(repr=False)
     """Evaluates every cycle, for `usage`."""
-    issue: Callable[[], Certificate] = field(repr=False)
+    issue: Callable[[], Certificate | None] = field(repr=False)
     """Issues the certificate, for `certificate`."""
     check_again: Callable[[Motion, tuple[Condition, ...]], Report] = field(repr=False)
     """Checks another motion by some of the rows, for the same arm, start, safety box and mode."""

@@ -47,6 +47,7 @@ class MotionSignals:
         box: The safety box, or None.
         distance: Required distances of the links from each other and from the floor, or None.
         mode: Mode of the motion. Commanded torques are computed in every row, as the controller checks each.
+        torques: Commanded torques, shape (N, n), [N m]; None: those of the motion.
     """
 
     def __init__(
@@ -57,8 +58,10 @@ class MotionSignals:
         box: SafetyBox | None,
         distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
+        torques: Array | None = None,
     ) -> None:
         self._motion = motion
+        self._commanded_torques = torques
         self._model = model
         self._start = start
         self._box = box
@@ -145,6 +148,9 @@ class MotionSignals:
     @cached_property
     def _torques(self) -> tuple[Array, Array]:
         """Torques without gravity and their backward differences over one cycle, each of shape (N + 3, n)."""
+        if self._commanded_torques is not None:
+            tau = np.concatenate((self._commanded_torques, np.tile(self._commanded_torques[-1], (HOLD_SAMPLES, 1))))
+            return tau, np.diff(tau, axis=0, prepend=0.0) / CYCLE_TIME
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
         places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.

@@ -9,15 +9,14 @@ from typing import cast
 import numpy as np
 
 from rcilab.conformance.advice import share
-from rcilab.conformance.check import check
+from rcilab.conformance.check import check, check_torques
 from rcilab.conformance.report import Report
 from rcilab.core.errors import RcilabError
-from rcilab.core.safety_box import SafetyBox
-from rcilab.core.spatial import Pose
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
 from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.run import Run
+from rcilab.recording.sent_motion import sent_torques
 
 _EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
 _BAR = 40  # Characters of the longest bar.
@@ -69,16 +68,12 @@ def _check(run: Run) -> tuple[Report | None, str]:
     try:
         mode = require_mode(run.setup.mode)
         start = run.cycles["q_c"][0]
-        return check(run.commanded(), run.model, start=start, box=_box(run), distance=None, mode=mode), ""
+        box = run.setup.safety_box
+        if mode == "torque":
+            return check_torques(*sent_torques(run), run.model, start=start, box=box, distance=None), ""
+        return check(run.commanded(), run.model, start=start, box=box, distance=None, mode=mode), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
-
-
-def _box(run: Run) -> SafetyBox | None:
-    box = run.setup.settings.get("safety_box")
-    if box is None:
-        return None
-    return SafetyBox(size=tuple(box["size"]), T_base_box=Pose.from_row_major(box["pose"]), active=box["active"])
 
 
 def _describe_nearest(report: Report) -> str:

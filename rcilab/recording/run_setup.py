@@ -7,6 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
@@ -33,6 +36,14 @@ class Setup:
             if self.started_ns
             else ""
         )
+
+    @property
+    def safety_box(self) -> SafetyBox | None:
+        """The safety box of the controller, where it recorded the run."""
+        box = self.settings.get("safety_box")
+        if box is None:
+            return None
+        return SafetyBox(size=tuple(box["size"]), T_base_box=Pose.from_row_major(box["pose"]), active=box["active"])
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields as JSON data."""

@@ -30,7 +30,7 @@ def sent_motion(run: Run) -> Motion:
     controller recorded which commands it played, it has these, up to one that was refused.
 
     Raises:
-        UsageError: Nothing was commanded, or torques were.
+        UsageError: Nothing was commanded, or torques were: see `sent_torques`.
     """
     rows = run.cycles
     if np.isfinite(rows["command_pose"]).any():
@@ -47,6 +47,26 @@ def sent_motion(run: Run) -> Motion:
     motion = Motion.from_cycles(_fill_gaps(index, sent["command"][first]), period)
     lost = int(index[-1]) + 1 - len(index)
     return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
+
+
+def sent_torques(run: Run) -> tuple[Motion, Array]:
+    """Returns the motion of the arm under the torques that a client commanded, and these torques, shape (N, n), [N m].
+
+    It has the joint angles that the controller reports as commanded, which are the measured ones under torques. A
+    command that did not arrive is interpolated, so that its change counts over the cycles in which it was held.
+
+    Raises:
+        UsageError: No torques were commanded.
+    """
+    rows = run.cycles
+    sent = rows[np.isfinite(rows["command_tau"]).all(axis=1)]
+    if not len(sent):
+        raise UsageError("in this run no torques were sent")
+    grid = sent["t"][0] + CYCLE_TIME * np.arange(round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1)
+    q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q_c"].T], axis=1)
+    return Motion.from_cycles(q), np.stack(
+        [np.interp(grid, sent["t"], column) for column in sent["command_tau"].T], axis=1
+    )
 
 
 def with_stop(motion: Motion, model: RobotModel) -> Motion:

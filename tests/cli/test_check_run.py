@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import rcilab
 from rcilab.cli import main
 from rcilab.control_process.simulate import simulate
 from rcilab.core.safety_box import SafetyBox
@@ -85,12 +86,31 @@ def test_a_run_of_poses_is_checked_by_the_angles_that_the_controller_commanded(t
     assert row(report, "cartesian.velocity.translation")["value"] > 0.0
 
 
-def test_a_run_of_torques_is_refused_in_one_sentence(tmp_path, capsys):
-    cycles = some_cycles().copy()
-    cycles["command"], cycles["command_tau"] = np.nan, 0.0
-    run_of(cycles).save(tmp_path / "a.rcirun")
-    assert main(["check", str(tmp_path / "a.rcirun")]) == 2
-    assert "torques were sent" in capsys.readouterr().err
+def test_a_run_of_torques_is_checked_by_the_torques_that_were_sent(tmp_path, capsys):
+    model = load_model("xMatePro7")
+    with simulate(model) as robot:
+        robot.power_on()
+
+        def callback(state, t):
+            tau = np.zeros(7)
+            tau[0] = 3.0 * min(t, 0.1)
+            return rcilab.JointTorque(tau, finished=t >= 0.2)
+
+        run = robot.control(callback, "torque")
+    run.save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 0
+    assert row(report, "torque.range")["value"] == pytest.approx(0.3)
+    assert row(report, "torque.rate")["value"] == pytest.approx(3.0)
+    cycles = run.cycles.copy()
+    cycles["command_tau"][50, 2] += 2.0
+    replace(run, cycles=cycles).save(tmp_path / "b.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "b.rcirun"))
+    assert code == 1
+    assert report["violations"][0]["id"] == "torque.rate"
+    assert report["violations"][0]["place"] == "joint 3"
+    assert main(["check", str(tmp_path / "b.rcirun"), "--slow-down", str(tmp_path / "c.npz")]) == 2
+    assert "torques cannot be slowed down" in capsys.readouterr().err
 
 
 def test_why_a_run_ended_early_is_told_with_its_report(tmp_path, capsys):
