@@ -41,11 +41,20 @@ def save_arm(arm: RobotDescription, file: str | Path, source: str = "") -> None:
     path = Path(file)
     if path.suffix.lower() != ENDING:
         raise InvalidValueError("arm file", str(file), "must end in .json")
+    try:
+        with replacing(path) as stream:
+            stream.write((json.dumps(arm_facts(arm, source), indent=1) + "\n").encode())
+    except OSError as error:
+        raise InvalidValueError("arm file", str(file), f"cannot be written: {error.strerror}") from error
+
+
+def arm_facts(arm: RobotDescription, source: str = "") -> dict[str, Any]:
+    """Returns the content of the file of an arm, as JSON data."""
     links = [
         {"mass": link.mass, "center_of_mass": link.center_of_mass.tolist(), "inertia": link.inertia.tolist()}
         for link in arm.links
     ]
-    content = {
+    return {
         "format": FORMAT,
         "version": VERSION,
         "model": arm.name,
@@ -56,11 +65,6 @@ def save_arm(arm: RobotDescription, file: str | Path, source: str = "") -> None:
         if arm.friction is None
         else dict(zip(_FRICTION, (values.tolist() for values in arm.friction), strict=True)),
     }
-    try:
-        with replacing(path) as stream:
-            stream.write((json.dumps(content, indent=1) + "\n").encode())
-    except OSError as error:
-        raise InvalidValueError("arm file", str(file), f"cannot be written: {error.strerror}") from error
 
 
 def load_arm(file: str | Path) -> RobotDescription:
@@ -77,17 +81,30 @@ def load_arm(file: str | Path) -> RobotDescription:
         content: Any = json.loads(text)
     except ValueError as error:
         raise InvalidValueError("arm file", path.name, f"is not valid JSON: {error}") from error
+    return build_arm(content, path.name)
+
+
+def build_arm(content: Any, name: str) -> RobotDescription:
+    """Returns the arm of the result of `arm_facts`.
+
+    Args:
+        content: The JSON data.
+        name: Name of its file, for errors.
+
+    Raises:
+        InvalidValueError: It is not that of an arm; also the other errors of `load_arm`.
+    """
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InvalidValueError("arm file", path.name, f'has no "format": "{FORMAT}"')
+        raise InvalidValueError("arm file", name, f'has no "format": "{FORMAT}"')
     if content.get("version") != VERSION:
-        raise VersionMismatchError(f"{path.name}, version", content.get("version"), VERSION, "save the arm again")
+        raise VersionMismatchError(f"{name}, version", content.get("version"), VERSION, "save the arm again")
     nominal = describe_robot(content.get("model", ""))
     try:
-        return _build_arm(nominal, content, path.name)
+        return _build_arm(nominal, content, name)
     except (LookupError, TypeError, ValueError) as error:
         if isinstance(error, InvalidValueError):
             raise
-        raise InvalidValueError("arm file", path.name, f"lacks or has a wrong {error}") from error
+        raise InvalidValueError("arm file", name, f"lacks or has a wrong {error}") from error
 
 
 _FRICTION = ("viscous", "coulomb", "offset")

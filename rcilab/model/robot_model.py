@@ -316,7 +316,8 @@ class RobotModel(ReachingArm):
     def __repr__(self) -> str:
         tool = f", tool={self.T_flange_tool!r}" if self._has_tool else ""
         load = f", load={self.load.mass:g} kg" if self.load.mass else ""
-        return f"RobotModel({self.name}, {self.n} axes{tool}{load})"
+        calibrated = "" if self.description.nominal is None else ", calibrated"
+        return f"RobotModel({self.name}, {self.n} axes{calibrated}{tool}{load})"
 
 
 def _digest(*parts: object) -> str:

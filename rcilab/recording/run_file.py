@@ -2,7 +2,8 @@
 
 The file is a sequence of chunks (`chunks.py`), in this order:
 
-    HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia]} or null,
+    HEAD    JSON: {"arm": {"name", "tool": 16 numbers row-major, "load": [mass, centre, inertia], and of a calibrated
+            arm "calibrated": as in its own file (`model/arm_file.py`)} or null,
             "fields": [[name, numpy type, shape], ...] of one cycle, "bytes": its size,
             "maker": whose faults the bits of "faults" are; the first versions had 32 bits, of Rokae,
             "realtime": false in lock-step, "setup": circumstances (`Setup`),
@@ -43,15 +44,15 @@ from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
+from rcilab.model.arm_file import arm_facts, build_arm
 from rcilab.model.dynamics.payload import Payload
-from rcilab.model.robot_model import load_model
+from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion.motion import Motion
 from rcilab.recording.chunks import Chunk, decode_chunks, encode_chunk, encode_header
 from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
-    from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
 
 R = TypeVar("R")
@@ -402,8 +403,10 @@ def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]
 
 
 def _arm_facts(model: RobotModel) -> dict[str, Any]:
-    load = model.load
+    load, description = model.load, model.description
+    own = {} if description.nominal is None else {"calibrated": arm_facts(description)}
     return {
+        **own,
         "name": model.name,
         "tool": model.T_flange_tool.as_row_major(),
         "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
@@ -413,7 +416,10 @@ def _arm_facts(model: RobotModel) -> dict[str, Any]:
 def _build_arm(facts: dict[str, Any]) -> RobotModel:
     mass, center, inertia = facts["load"]
     load = Payload(mass=mass, center_of_mass=np.array(center), inertia=np.array(inertia))
-    return load_model(facts["name"], tool=Pose.from_row_major(facts["tool"]), load=load)
+    model = load_model(facts["name"], tool=Pose.from_row_major(facts["tool"]), load=load)
+    if "calibrated" not in facts:
+        return model
+    return RobotModel(build_arm(facts["calibrated"], "the recorded arm"), model.T_flange_tool, load)
 
 
 def _fields(dtype: np.dtype[np.void]) -> list[tuple[str, Any]]:

@@ -21,7 +21,9 @@ from rcilab.makers.rokae.driver.loaded_arm import (
 from rcilab.makers.rokae.wire import ModelResponse
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel, load_model
+from rcilab.recording.run import load_run
 from rcilab.robots import DhRow, RobotDescription, describe_robot
+from tests.recording.runs import some_run
 
 TABLE = describe_robot("xMatePro7")
 MODEL = RobotModel(TABLE)
@@ -189,6 +191,12 @@ def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path)
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
     assert model.fingerprint["model"] == loaded.model.fingerprint["model"]
     assert model.clearance(model.home).distance > 0.0
+    assert "calibrated" in repr(model)
+    run = replace(some_run(), model=model)
+    run.save(tmp_path / "a.rcirun")
+    recorded = load_run(tmp_path / "a.rcirun").model
+    assert recorded is not None
+    assert recorded.fingerprint == model.fingerprint
 
 
 @pytest.mark.parametrize(
