@@ -55,7 +55,7 @@ ACCELERATION_ALLOWANCE = 3.5
 fault, with this filter, when commands came again after they had been missing for 22 cycles (recorded identification
 motion; docs/pauses.md). The other joints reached 0.8 to 2.2."""
 ACCELERATION_CUTOFF = 20.0  # [Hz] First order. Below the first resonances of arms of this size, above their motions.
-COMPLIANT_ALLOWANCE = 4.0
+COMPLIANT_ALLOWANCE = 3.4
 """Further factor on the acceleration bounds of a compliant arm. Its light last joints, pushed with 30 N or commanded a
 torque of some N m, accelerate faster than any position command allows."""
 LOST_COMMANDS_THRESHOLD = 20  # [cycles] The largest threshold in the makers' manuals.

@@ -22,6 +22,7 @@ from rcilab.robots.description import RobotDescription, ServoFigures
 
 _TYPICAL = ServoFigures(bandwidth=110.0, damping=0.9)  # Of an arm without figures: those of the xMate's large joints.
 _SETTLED = 1e-10  # [rad] Deviation from the commands, and its change in a cycle, that is dropped.
+_EVEN = 50  # [cycles] The longest pause over which the commanded acceleration is taken to be constant.
 _STILL = 1e-3  # [rad/s] A stream that ends below this velocity has ended at standstill.
 
 
@@ -77,7 +78,7 @@ class HoldResponse:
         velocity = self._velocity()
         if self._is_holding:
             self._is_holding = False
-            if cycles > 1:  # The mean velocity of the pause; at its end, with constant acceleration:
+            if 1 < cycles <= _EVEN:  # The mean velocity of the pause; at its end, with constant acceleration:
                 velocity = [2.0 * v - old for v, old in zip(velocity, before, strict=True)]
             self._off = [x - CYCLE_TIME * v - y for x, v, y in zip(q, velocity, self._q, strict=True)]
             self._off_rate = [v - dy for v, dy in zip(velocity, self._dq, strict=True)]

@@ -109,12 +109,16 @@ class StreamedMotion:
 
     def _longest_loss(self) -> int | None:
         """Returns the number of consecutive cycles without a command that ends the motion; None: none does."""
-        is_held = self._on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE
-        return self._lost_limit + LATE_TOLERANCE if self._lost_limit is not None and is_held else self._lost_limit
+        return None if self._lost_limit is None else self._lost_limit + self._tolerance
+
+    @property
+    def _tolerance(self) -> int:
+        """Cycles by which a command may be late before it is lost."""
+        return LATE_TOLERANCE if self._on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE else 0
 
     def _describe_loss(self) -> Remark:
         if not self.playout.is_playing:
             seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
             return Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
-        lost = self.playout.consecutive_lost
+        lost = self.playout.consecutive_lost - self._tolerance
         return Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost)

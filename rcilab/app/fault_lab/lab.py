@@ -32,6 +32,7 @@ from rcilab.makers.parameters import default_parameters
 from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion import plan_joint
+from rcilab.sim.streamed_motion import LATE_TOLERANCE
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
@@ -124,7 +125,7 @@ class FaultLab(Closeable):
         after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are already arriving.
         status = robot.world.status()
         progress(_SHOWN)
-        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost).find(scenario.fault)
+        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost - LATE_TOLERANCE).find(scenario.fault)
         if signal is None:
             raise RcilabError(
                 f"{scenario.fault.manual_name}: the record does not show what the controller saw: {status.reason}"

@@ -18,6 +18,7 @@ from collections.abc import Iterable
 from enum import Enum
 from typing import Final, NamedTuple
 
+from rcilab.conformance.common_conditions import COMPLIANT_ALLOWANCE
 from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.faults import RANGE_FAULTS, Fault
 from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
@@ -28,7 +29,7 @@ class FaultSource(Enum):
 
     COMMAND = "the command of this cycle is not followed"
     MEASUREMENT = "the command of this cycle has been followed; the measurement violates the condition"
-    ABSENCE = "there was no command, and missing commands are no longer extrapolated"
+    ABSENCE = "there was no command, and missing ones are no longer held or bridged"
 
 
 class FaultStop(NamedTuple):
@@ -63,10 +64,10 @@ FAULT_STOP: Final = {
     Fault.ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _ALL, _ANYTIME),
     Fault.ACTUAL_CARTESIAN_VELOCITY_LIMITS_VIOLATION: FaultStop(_MEASUREMENT, _TOOL, _ANYTIME),
     Fault.ACTUAL_JOINT_ACCELERATION_LIMITS_VIOLATION: FaultStop(
-        _MEASUREMENT, "all; four times the bound in impedance and torque modes", _ANYTIME
+        _MEASUREMENT, f"all; {COMPLIANT_ALLOWANCE:g} times the bound in impedance and torque modes", _ANYTIME
     ),
     Fault.ACTUAL_CARTESIAN_ACCELERATION_LIMITS_VIOLATION: FaultStop(
-        _MEASUREMENT, "both Cartesian modes; four times the bound in Cartesian impedance", _ANYTIME
+        _MEASUREMENT, f"both Cartesian modes; {COMPLIANT_ALLOWANCE:g} times the bound in Cartesian impedance", _ANYTIME
     ),
     Fault.COMMAND_JOINT_POSITION_LIMITS_VIOLATION: FaultStop(
         _COMMAND, "all but torque; with auto_limit joints stop inside instead", _BACK
