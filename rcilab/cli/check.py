@@ -39,7 +39,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=f"{HELP}, or recorded run (.rcirun)")
     parser.add_argument(
-        "--model", metavar="NAME", help="arm, such as xMatePro7 (any case); default: that of the program or the run"
+        "--model",
+        metavar="NAME",
+        help="arm, such as xMatePro7 (any case), or its file my_arm.json; default: that of the program or the run",
     )
     add_arm_options(parser)
     parser.add_argument(
@@ -89,7 +91,8 @@ def _run(args: Namespace) -> int:
     tell = (lambda line: None) if args.json else show
     subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args)
     motion, model = as_motion(subject.found, subject.model, args.file, show=tell, max_rows=args.max_rows), subject.model
-    for line in filter(None, (describe_arm(model, subject.box), subject.note)):
+    arm = describe_arm(model, subject.box)
+    for line in filter(None, (arm, subject.note)):
         tell(f"note: {line}")
     if subject.torques is None:
         report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
@@ -99,7 +102,8 @@ def _run(args: Namespace) -> int:
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)
     if args.json:
-        show(as_json_text({"model": model.name, **report_as_json(report), **_slow_down_as_json(slowed, out)}))
+        facts = {"model": model.name, "arm": arm, "note": subject.note}
+        show(as_json_text({**facts, **report_as_json(report), **_slow_down_as_json(slowed, out)}))
     else:
         show(report if args.explain is None else report.explain(args.explain))
         if slowed is not None:

@@ -56,7 +56,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=HELP)
     parser.add_argument("--robot", required=True, metavar="ADDRESS", help="rci://HOST:PORT")
-    parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; default: that of the robot")
+    parser.add_argument(
+        "--model", metavar="NAME", help="arm, such as xMatePro7, or its file my_arm.json; default: that of the robot"
+    )
     parser.add_argument(
         "--to-start",
         action="store_true",

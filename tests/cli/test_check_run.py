@@ -51,6 +51,7 @@ def test_what_was_sent_is_checked_not_the_plan_and_not_what_the_controller_made_
     build_run(cycles, plan=PLAN, model=MODEL, setup=SETUP).save(tmp_path / "a.rcirun")
     code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
     assert code == 1
+    assert report["arm"].startswith("with tool 0, 10, 120 mm")
     worst = report["violations"][0]
     assert (worst["place"], worst["worst_time"]) == ("joint 4", pytest.approx(0.2, abs=2.1e-3))
 
