@@ -35,6 +35,7 @@ from rcilab.sim.api import (
     Mount,
     Network,
     NetworkFaults,
+    OnLoss,
     PlaceArm,
     PlaceBox,
     Press,
@@ -126,6 +127,10 @@ class SimulationControl(Closeable):
     def set_limits(self, table: str) -> None:
         """Selects the Cartesian limits of commands: "manual", or "sdk" for those of the vendor's SDK."""
         self.ask(Limits(table))
+
+    def set_on_loss(self, behaviour: str) -> None:
+        """Chooses what the arm does while commands are missing, from the next motion on: "hold" or "bridge"."""
+        self.ask(OnLoss(behaviour))
 
     def set_network(self, faults: NetworkFaults | None = None, direction: Direction = "both") -> None:
         """Simulates network faults.

@@ -15,7 +15,7 @@ from rcilab.sim.arm_parameters import Floats
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
 from rcilab.sim.plants import REALISMS, Realism
-from rcilab.sim.streamed_motion import LOSS_BEHAVIOURS, PREFILL, LossBehaviour
+from rcilab.sim.streamed_motion import PREFILL, LossBehaviour, require_loss_behaviour
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
@@ -138,8 +138,7 @@ class ControllerConfig:
             raise InvalidValueError("realism", self.realism, f"is unknown; known: {', '.join(REALISMS)}")
         if self.realism != "off" and self.plant != "mujoco":
             raise InvalidValueError("realism", self.realism, "needs the plant mujoco: the ideal one has no friction")
-        if self.on_loss not in LOSS_BEHAVIOURS:
-            raise InvalidValueError("on_loss", self.on_loss, f"is unknown; known: {', '.join(LOSS_BEHAVIOURS)}")
+        require_loss_behaviour(self.on_loss)
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.patience is not None and not 0.01 <= self.patience <= 3600.0:

@@ -26,6 +26,7 @@ from rcilab.sim.api import (
     LoopBack,
     Mount,
     Network,
+    OnLoss,
     PlaceArm,
     PlaceBox,
     Press,
@@ -49,6 +50,7 @@ from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.force_profile import ForceProfile
 from rcilab.sim.maker_server import SimulatedController
+from rcilab.sim.streamed_motion import require_loss_behaviour
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,8 @@ class Environment:
                 self._controller.auto_limit = on
             case Limits(table):
                 self._controller.limit_table = table
+            case OnLoss(behaviour):
+                self._controller.arm.on_loss = require_loss_behaviour(behaviour)
             case Network(faults, direction):
                 self._network.replace(faults, direction)
             case StallClock():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, TypeAlias, get_args
 
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
@@ -25,10 +26,23 @@ LossBehaviour: TypeAlias = Literal["hold", "bridge"]
 LOSS_BEHAVIOURS: tuple[LossBehaviour, ...] = get_args(LossBehaviour)
 
 
+def require_loss_behaviour(name: str) -> LossBehaviour:
+    """Returns a behaviour by its name.
+
+    Raises:
+        InvalidValueError: There is no such behaviour.
+    """
+    for behaviour in LOSS_BEHAVIOURS:
+        if behaviour == name:
+            return behaviour
+    raise InvalidValueError("on_loss", name, f"is unknown; known: {', '.join(LOSS_BEHAVIOURS)}")
+
+
 class StreamedMotion:
     """The commands of a client, played one per cycle. Owned by the virtual arm.
 
     Attributes:
+        on_loss: What the arm does without commands.
         playout: The queue of commands, with its counts.
         is_followed: Whether commands are played: from `begin` to `discard`, or until `drain` has played the queue.
         playback: The output of the queue in the last `step`; None: it had none.
@@ -38,19 +52,16 @@ class StreamedMotion:
         torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
         lost_limit: Consecutive lost commands that end the motion with a violation; None: no limit. Where commands are
             held, those that are at most `LATE_TOLERANCE` late do not count.
-        on_loss: What the arm does without commands; torques are held in any case.
     """
 
-    def __init__(
-        self, prefill: int, torque_prefill: int | None, lost_limit: int | None, on_loss: LossBehaviour
-    ) -> None:
+    def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.playback: Playback | None = None
         self.mode = MotionMode(ControlLaw.POSITION, False)
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
         self._lost_limit = lost_limit
-        self._on_loss = on_loss
+        self.on_loss: LossBehaviour = "hold"
         self._generator: MotionGenerator | None = None
         self._drain: int | None = None  # Remaining cycles for the queue; None until the stream has ended.
 
@@ -65,9 +76,14 @@ class StreamedMotion:
         """Whether the reference still responds to commands that were missing."""
         return self.is_followed and self._generator is not None and self._generator.is_off_commands
 
-    def prepare(self, mode: MotionMode) -> None:
-        """Resets everything for a motion in this mode."""
-        self.mode = mode
+    def prepare(self, mode: MotionMode, on_loss: LossBehaviour) -> None:
+        """Resets everything for a motion in this mode.
+
+        Args:
+            mode: Type of command and control law.
+            on_loss: What the arm does without commands; torques are held in any case.
+        """
+        self.mode, self.on_loss = mode, on_loss
         self.playout.begin(max_queued=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
 
     def begin(self, generator: MotionGenerator) -> None:
@@ -114,7 +130,7 @@ class StreamedMotion:
     @property
     def _tolerance(self) -> int:
         """Cycles by which a command may be late before it is lost."""
-        return LATE_TOLERANCE if self._on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE else 0
+        return LATE_TOLERANCE if self.on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE else 0
 
     def _describe_loss(self) -> Remark:
         if not self.playout.is_playing:

@@ -89,6 +89,7 @@ class VirtualArm:
         measured_state: The sensors.
         resting_law: The control law while no command is followed. BRAKED engages the brakes at standstill.
         is_monitored: Whether measurements are checked.
+        on_loss: What the arm does while commands are missing, from the next motion on.
         warnings: Sentences about the motions so far; the reader clears them.
         playback: The output of the queue in the last cycle; None while no commands are followed.
         on_command: Called with every command that is queued.
@@ -128,10 +129,10 @@ class VirtualArm:
         self.playback: Playback | None = None
         self.on_command: Callable[[ArmCommand], None] = lambda command: None
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
-        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit, on_loss)
+        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
         self.warnings: list[str] = []
         self._friction_watch = friction_watch
-        self._servos = servo_figures(model.description) if on_loss == "hold" else None
+        self.on_loss: LossBehaviour = on_loss
         self._actuator = Actuator(model, parameters)
         self._tau_c: list[float] | None = None
         self._tool_version = self.commanded.version
@@ -217,7 +218,7 @@ class VirtualArm:
 
     def prepare_motion(self, mode: MotionMode) -> None:
         """Resets everything for a motion in this mode."""
-        self._motion.prepare(mode)
+        self._motion.prepare(mode, self.on_loss)
 
     def begin_motion(self, limits: Limits) -> None:
         """Follows commands from now on, from the present reference.
@@ -231,7 +232,8 @@ class VirtualArm:
             tolerance = tolerance.widened(start_tolerance(self._last_compliance, parameters))
         starts = (sensors.measured.q, np.array(self.commanded.q))
         tools = (sensors.tool.pose, self.tool_c.pose)
-        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance, self._servos)
+        servos = servo_figures(self.model.description) if self._motion.on_loss == "hold" else None
+        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance, servos)
         self._motion.begin(build_generator(mode, bounds, list(self.commanded.q)))
         sensors.begin(
             bounds.limits,

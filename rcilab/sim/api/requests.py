@@ -124,6 +124,19 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
+class OnLoss:
+    """Chooses what the arm does while commands are missing, from the next motion on."""
+
+    name: ClassVar[str] = "on_loss"
+    behaviour: str
+    """"hold" or "bridge"."""
+
+    def __post_init__(self) -> None:
+        """Checks the word."""
+        _put(self, "behaviour", as_name(self.behaviour, "behaviour"))
+
+
+@dataclass(frozen=True, slots=True)
 class Network:
     """Sets the simulated network faults."""
 
@@ -346,6 +359,7 @@ WorldRequest: TypeAlias = (
     | LoopBack
     | AutoLimit
     | Limits
+    | OnLoss
     | Network
     | StallClock
     | PlaceBox

@@ -53,6 +53,7 @@ REQUESTS = st.one_of(
     st.builds(world.LoopBack, st.booleans()),
     st.builds(world.AutoLimit, st.booleans()),
     st.builds(world.Limits, st.sampled_from(["manual", "sdk"])),
+    st.builds(world.OnLoss, st.sampled_from(["hold", "bridge"])),
     st.builds(world.Network, FAULTS, st.sampled_from(world.DIRECTIONS)),
     st.builds(world.StallClock, st.just(0.0) | st.floats(0.001, 1), st.floats(0, 100), st.none() | st.floats(10, 100)),
     st.builds(world.PlaceBox, names, row(st.floats(0.001, 1), 3), row(length, 3), row(st.floats(0.1, 1), 4)),

@@ -87,10 +87,13 @@ def test_a_push_ends_after_its_time_and_a_new_one_replaces_it(place) -> None:
 def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.handle(world.Limits("sdk")) == world.Done()
     assert place.handle(world.Limits("none")) == world.Refused("limit table: 'none' is unknown; known: manual, sdk")
+    assert place.handle(world.OnLoss("bridge")) == world.Done()
+    assert place.handle(world.OnLoss("panic")) == world.Refused("on_loss: 'panic' is unknown; known: hold, bridge")
     assert place.handle(world.AutoLimit(True)) == world.Done()
     assert place.handle(world.SetInput(2, True)) == world.Done()
     assert isinstance(place.handle(world.SetInput(6, True)), world.Refused)
     assert place.cycle.limit_table == "sdk"
+    assert place.cycle.arm.on_loss == "bridge"
     assert place.cycle.auto_limit
     assert place.status.auto_limit
     assert place.cycle.settings.inputs == (False, False, True, False, False, False)

@@ -83,6 +83,17 @@ def test_a_bridged_pause_is_not_what_a_real_arm_does(make_hand) -> None:
     assert (found.slowest > 0.95 * np.abs(SPEED)).all()
 
 
+def test_another_behaviour_counts_from_the_next_motion_on(make_hand) -> None:
+    hand = make_hand("xMatePro3", prefill=10, lost_limit=None)
+    hand.start()
+    hand.cycle.arm.on_loss = "bridge"
+    hand.play(hand.swing(1, 0.5, 0.3))
+    hand.step(40)
+    assert hand.state.dq_c[0] < 0.25  # It still holds.
+    hand.ask(rci.StopMove())
+    assert (pause_at_speed(hand, 30).slowest > 0.95 * np.abs(SPEED)).all()
+
+
 @pytest.mark.parametrize("pause", [1, 3, 10, 22])
 def test_after_a_pause_the_arm_is_back_at_its_commands_to_the_last_bit(make_hand, pause: int) -> None:
     hand = make_hand("xMatePro3")
