@@ -37,7 +37,7 @@ from rcilab.sim.plant import Measurement, Plant, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, LossBehaviour, StreamedMotion
 from rcilab.sim.tool_kinematics import ToolKinematics
-from rcilab.sim.violations import CycleViolation, Violations
+from rcilab.sim.violations import Violations, describe_violations
 
 STANDSTILL = 1e-4  # [rad/s] Below it a joint is stationary; 0.006 deg/s is far below what a tool resolves.
 SETTLE_LIMIT = 300  # [cycles] Timeout for an arm that an obstacle keeps off its reference.
@@ -70,12 +70,6 @@ class StepResult(NamedTuple):
 
 
 _CLEAN = StepResult()
-
-
-def _blame_pause(violation: CycleViolation) -> CycleViolation:
-    """Returns the violation of a measurement while the servo responds to a pause, which explains an acceleration."""
-    is_acceleration = isinstance(violation, LimitViolation) and violation.condition.order == 2
-    return blame_lost_commands(violation.remark) if is_acceleration else violation
 
 
 class VirtualArm:
@@ -131,6 +125,7 @@ class VirtualArm:
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
         self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
         self.warnings: list[str] = []
+        self._has_warned = False  # Of the present pause.
         self._friction_watch = friction_watch
         self.on_loss: LossBehaviour = on_loss
         self._actuator = Actuator(model, parameters)
@@ -293,9 +288,11 @@ class VirtualArm:
         if self.is_monitored:
             # The arm's own stop is a motion of the joints: the tool has no commanded motion.
             violations = self.measured_state.check(is_commanded=self._motion.is_followed)
+            is_off_commands = self._motion.is_off_commands
+            self._has_warned &= is_off_commands
+            if violations and is_off_commands:
+                violations = self._explain_by_pause(violations)
             if violations:
-                if self._motion.is_off_commands:
-                    violations = tuple(map(_blame_pause, violations))
                 result = StepResult(measured_violations=violations)
                 self._react()
         return result
@@ -312,6 +309,27 @@ class VirtualArm:
             return True
         self._take(self._law, measured)
         return False
+
+    def _explain_by_pause(self, violations: Violations) -> Violations:
+        """Returns the violations of a measurement in or after a pause of the client.
+
+        An acceleration of the servo's response does not stop the arm: it is not known which one would. A velocity does,
+        and is due to the lost commands.
+        """
+        excused = [v for v in violations if isinstance(v, LimitViolation) and v.condition.order == 2]
+        if excused and not self._has_warned:
+            self._has_warned = True
+            self.warnings.append(
+                f"commands were missing, and the arm jolts: {describe_violations(excused)}, which no pause that is "
+                "known of a real arm reaches; a real arm may stop here"
+            )
+        return tuple(
+            blame_lost_commands(violation.remark)
+            if isinstance(violation, LimitViolation) and violation.condition.order == 1
+            else violation
+            for violation in violations
+            if violation not in excused
+        )
 
     def _react(self) -> None:
         self._motion.discard()
