@@ -171,13 +171,10 @@ def _read_run(args: Namespace) -> _Subject:
     recorded = run.setup.mode if run.setup.mode in MODES else "joint_position"
     motion, torques = sent_torques(run) if recorded == "torque" else (sent_motion(run), None)
     ended = str(run.stopped or name_faults(run.faults))
-    notes = []
-    if ended:
-        notes.append(f"the run ended early: {ended}")
-        continued = with_stop(motion, model) if torques is None else motion
-        if continued is not motion:
-            notes.append(f"after its last command at t = {motion.duration:.3f} s a stop is added")
-            motion = continued
+    notes = [f"the run ended early: {ended}"] if ended else []
+    if torques is None and (continued := with_stop(motion, model)) is not motion:
+        notes.append(f"after its last command at t = {motion.duration:.3f} s, which still moves, a stop is added")
+        motion = continued
     if run.truncated:
         notes.append("the beginning of the run is missing, so that the motion begins with a jump")
     return _Subject(

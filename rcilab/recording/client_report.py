@@ -16,7 +16,7 @@ from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
 from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.run import Run
-from rcilab.recording.sent_motion import sent_torques
+from rcilab.recording.sent_motion import sent_motion, sent_torques, with_stop
 
 _EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
 _BAR = 40  # Characters of the longest bar.
@@ -71,7 +71,9 @@ def _check(run: Run) -> tuple[Report | None, str]:
         box = run.setup.safety_box
         if mode == "torque":
             return check_torques(*sent_torques(run), run.model, start=start, box=box, distance=None), ""
-        return check(run.commanded(), run.model, start=start, box=box, distance=None, mode=mode), ""
+        # Without a fault: what the client commanded, not what the arm did in its pauses.
+        motion = run.commanded() if run.faults else with_stop(sent_motion(run), run.model)
+        return check(motion, run.model, start=start, box=box, distance=None, mode=mode), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
 

@@ -14,7 +14,7 @@ def playout_delay(cycles: NDArray[np.void]) -> int:
     Args:
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
     """
-    rows, sources = _played(cycles)
+    rows, sources = played_commands(cycles)
     return max(int(np.median(rows - sources)), 1) if rows.size else 1
 
 
@@ -28,7 +28,7 @@ def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> Jo
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
         with_refused: Whether a command that the controller refused is included.
     """
-    rows, sources = _played(cycles)
+    rows, sources = played_commands(cycles)
     if not rows.size:
         return cycles["q_c"][:1].copy()
     q = cycles["q_c"].copy()
@@ -52,8 +52,12 @@ def judged_joints(cycles: NDArray[np.void]) -> JointPath:
     return q[: max(len(q) - after, 1)]
 
 
-def _played(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Returns the rows in which a command was played, and the rows with those commands."""
+def played_commands(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Returns the rows in which a command was played, and the rows with those commands: of the states they answer.
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+    """
     rows = np.flatnonzero(cycles["played"])
     sources = rows - cycles["age"][rows].astype(np.intp)
     is_known = (sources >= 0) & (sources < rows)

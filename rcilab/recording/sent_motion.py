@@ -15,11 +15,13 @@ from rcilab.core.errors import UsageError
 from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
-from rcilab.recording.playout import judged_joints
+from rcilab.recording.playout import played_commands
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
+
+_STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 
 
 def sent_motion(run: Run) -> Motion:
@@ -27,7 +29,8 @@ def sent_motion(run: Run) -> Motion:
 
     It has the joint angles as they were sent; if poses of the tool were sent, the joint angles that the controller
     reports as commanded. A command that did not arrive is interpolated; `.notes` counts them. Where a virtual
-    controller recorded which commands it played, it has these, up to one that was refused.
+    controller recorded which commands it played, it has these, up to one that was refused, at the times of the states
+    that they answer: what the arm did in a pause of the client is not the client's.
 
     Raises:
         UsageError: Nothing was commanded, or torques were: see `sent_torques`.
@@ -35,9 +38,10 @@ def sent_motion(run: Run) -> Motion:
     rows = run.cycles
     if np.isfinite(rows["command_pose"]).any():
         return run.commanded()
-    if "played" in (rows.dtype.names or ()) and np.isfinite(rows["command"]).any():
-        return Motion.from_cycles(judged_joints(rows))
-    sent = rows[np.isfinite(rows["command"]).all(axis=1)]
+    has_angles = np.isfinite(rows["command"]).all(axis=1)
+    if "played" in (rows.dtype.names or ()):
+        has_angles &= np.isin(np.arange(len(rows)), _judged_rows(rows))
+    sent = rows[has_angles]
     if not len(sent):
         what = "torques were sent, which have no path" if np.isfinite(rows["command_tau"]).any() else "nothing was sent"
         raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
@@ -47,6 +51,13 @@ def sent_motion(run: Run) -> Motion:
     motion = Motion.from_cycles(_fill_gaps(index, sent["command"][first]), period)
     lost = int(index[-1]) + 1 - len(index)
     return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
+
+
+def _judged_rows(cycles: NDArray[np.void]) -> NDArray[np.intp]:
+    """Returns the rows whose commands were played, or refused."""
+    rows, sources = played_commands(cycles)
+    faulty = np.flatnonzero(cycles["faults"])
+    return sources[rows <= faulty[0]] if faulty.size else sources
 
 
 def sent_torques(run: Run) -> tuple[Motion, Array]:
@@ -72,16 +83,18 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
 def with_stop(motion: Motion, model: RobotModel) -> Motion:
     """Returns a motion whose last row still moves, continued by the fastest stop; one that ends at rest as it is.
 
-    For the commands of a run that ended early: held at its last row, the arm would stop with a jump that nobody
-    commanded.
+    A check holds the arm at the last row. A client whose motion ended early did not command the jump of such an end,
+    and a controller stops the arm smoothly after the last command of a program that ends moving a little.
 
     Raises:
         PlanningError: The last rows are farther apart than any robot's.
     """
     q = motion.q
-    if len(q) < 3 or not (np.diff(q[-3:], axis=0)).any():
+    if len(q) < 3:
         return motion
     dq, ddq = (q[-1] - q[-2]) / CYCLE_TIME, (q[-1] - 2.0 * q[-2] + q[-3]) / CYCLE_TIME**2
+    if np.abs(dq).max() <= _STILL and np.abs(ddq).max() <= _STEADY:
+        return motion
     stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq))
     return replace(Motion.from_cycles(np.concatenate((q, stop.q[1:]))), notes=motion.notes)
 

@@ -164,7 +164,7 @@ def test_a_run_that_ended_in_the_middle_is_not_blamed_for_a_jump_at_its_end(tmp_
     run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun")]) == 0
     said = capsys.readouterr().out
-    assert "the run ended early: an emergency stop was pressed; after its last command at t = 0.299 s a stop is" in said
+    assert "the run ended early: an emergency stop was pressed; after its last command at t = 0.299 s, which" in said
     spoiled = some_cycles()[:300].copy()
     spoiled["command"][150, 1] += 1e-4
     run_of(spoiled, stopped="joint 2: jump").save(tmp_path / "b.rcirun")

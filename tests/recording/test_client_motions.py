@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ import pytest
 from rcilab.conformance.check import check
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError, VersionMismatchError
+from rcilab.model.robot_model import load_model
 from rcilab.recording.client_motions import ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import Run, build_run, load_run
-from rcilab.recording.sent_motion import sent_motion
+from rcilab.recording.sent_motion import sent_motion, with_stop
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
@@ -26,6 +28,7 @@ from tests.waiting import wait_for
 
 NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad]
 SECONDS = 1.0  # [s]
+MODEL = load_model("xMatePro7")
 
 
 @contextmanager
@@ -179,6 +182,24 @@ def test_commands_that_answer_one_state_again_are_all_recorded() -> None:
     assert [row.tobytes() for row in run.command[sources]] == [data[8:64] for data in sent]
     assert sent_motion(run).notes == ()
     assert check(sent_motion(run), parts[0].motion.model, distance=None).ok
+
+
+def test_a_pause_of_the_client_is_not_blamed_on_the_commands_around_it() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.joint_sine(robot, SECONDS, period=SECONDS)
+        run = as_run(collect(motions, 2)[1])
+    cycles = run.cycles.copy()
+    pause = np.flatnonzero(cycles["played"])[300:320]
+    cycles["played"][pause], cycles["missed"][pause] = 0, 1
+    cycles["q_c"][pause] = cycles["q_c"][pause[0] - 1]  # The arm is held there.
+    paused = replace(run, cycles=cycles)
+    assert not check(paused.commanded(), MODEL, distance=None).ok
+    motion = with_stop(sent_motion(paused), MODEL)
+    assert motion.notes == ("20 commands did not arrive and are interpolated",)
+    assert check(motion, MODEL, distance=None).ok
+    np.testing.assert_allclose(sent_motion(paused).q, sent_motion(run).q, rtol=0, atol=1e-6)
+    assert "nearest limit" in report_on_client(paused).line
 
 
 def test_tool_load_and_settings_in_force_are_recorded() -> None:
