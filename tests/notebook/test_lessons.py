@@ -174,13 +174,13 @@ def test_the_first_lesson_shows_what_it_talks_about() -> None:
 
 
 def test_the_sixth_lesson_shows_its_numbers_at_any_pace_and_again() -> None:
-    """What its prose promises: no id left out, a success rate of 0.900, fault 19 after 20 states without an answer."""
+    """What its prose promises: no id left out, a success rate of 0.900, fault 19 after 50 states without an answer."""
     path = LESSONS[5]
     notebook = execute(read_slowly_and_twice(path), path)
     said = printed(notebook)
     assert printed(notebook, "stderr") == ""
     assert re.findall(r"\[\((\d+), .*?\((\d+), .*\((\d+), .*mrad", said) == [("1", "2", "300")] * 2
     assert re.findall(r"^0\.\d{3}$", said, re.MULTILINE) == ["0.900"] * 2
-    assert re.findall(r"(\d+) × (00.*)", said) == [("20", "00 " * 19 + "01")] * 2
+    assert re.findall(r"(\d+) × (00.*)", said) == [("50", "00 " * 19 + "01")] * 2
     assert said.count("kInstabilityDetection REFLEX") == said.count("RecoveryStatus.SUCCESS") == 2
     assert len(shown(notebook, "image/png")) == 2 * 2  # The bytes, the success rate.
