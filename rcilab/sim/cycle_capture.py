@@ -112,6 +112,7 @@ class CycleCapture:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = time.monotonic_ns()
         self._received += 1
+        self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
         row = self._rows.get(command.number)
         if row is None:
             return

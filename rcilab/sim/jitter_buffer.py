@@ -118,13 +118,13 @@ class JitterBuffer:
         """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
 
-    def push(self, command: ArmCommand) -> None:
-        """Queues a command from the network."""
+    def push(self, command: ArmCommand) -> bool:
+        """Queues a command from the network; returns False for a duplicate of one."""
         queue, newest = self._queue, self._newest
         if command == newest:
             self.duplicates += 1
             self._is_repeating = True
-            return
+            return False
         is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
         if not is_reordered:
             self._newest = command
@@ -132,11 +132,13 @@ class JitterBuffer:
             self.late += 1
         elif is_reordered and command in queue:
             self.duplicates += 1
+            return False
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
                 self.dropped += 1
             queue.append(command)
+        return True
 
     def pop_extra_cycle(self) -> bool:
         """Returns whether an extra cycle is due: many more commands than the prefill were queued in the last window.

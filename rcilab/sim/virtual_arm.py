@@ -86,7 +86,7 @@ class VirtualArm:
         on_loss: What the arm does while commands are missing, from the next motion on.
         warnings: Sentences about the motions so far; the reader clears them.
         playback: The output of the queue in the last cycle; None while no commands are followed.
-        on_command: Called with every command that is queued.
+        on_command: Called with every command that arrives for a motion, except for duplicates.
 
     Args:
         model: The arm.
@@ -255,8 +255,8 @@ class VirtualArm:
         """Queues a command; returns whether one was expected."""
         if not self._motion.is_followed:
             return False
-        self.on_command(command)
-        self._motion.playout.push(command)
+        if self._motion.playout.push(command):
+            self.on_command(command)
         return True
 
     def step(self, command: ArmCommand | None = None) -> StepResult:

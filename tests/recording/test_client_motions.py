@@ -202,6 +202,30 @@ def test_a_pause_of_the_client_is_not_blamed_on_the_commands_around_it() -> None
     assert "nearest limit" in report_on_client(paused).line
 
 
+def test_duplicates_do_not_displace_other_commands() -> None:
+    """Of a burst of old answers with doubles among them, as after the sleep of the vendor's client."""
+    with watched(mode_delay=0.005) as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+        state = robot.receive_fresh_state()
+        while state.robot_mode != wire.ROBOT_MOVE:
+            state = robot.receive_fresh_state()
+        sent = sent_commands(robot)
+        start = state.q_c[:7]
+        for step in (0, 0, 1, 1, 1, 2, 3, 3, 4, 5):  # Of 1 nrad, all answers to one state.
+            robot.answer(state, Output(q=tuple(angle + 1e-9 * step for angle in start)))
+        state = robot.next_state(state.message_id)
+        robot.answer(state, Output(q=tuple(angle + 5e-9 for angle in start)))
+        robot.next_state(state.message_id)
+        robot.stop_move()
+        run = as_run(collect(motions, 2)[1])
+    played = np.flatnonzero(run.cycles["played"])
+    sources = played - run.cycles["age"][played].astype(int)
+    assert (sources < played).all()
+    different = [data for data, before in zip(sent, [b"", *sent], strict=False) if data != before]
+    assert [row.tobytes() for row in run.command[sources]] == [data[8:64] for data in different]
+
+
 def test_tool_load_and_settings_in_force_are_recorded() -> None:
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
