@@ -172,7 +172,7 @@ def _read_run(args: Namespace) -> _Subject:
     motion, torques = sent_torques(run) if recorded == "torque" else (sent_motion(run), None)
     ended = str(run.stopped or name_faults(run.faults))
     notes = [f"the run ended early: {ended}"] if ended else []
-    if torques is None and (continued := with_stop(motion, model)) is not motion:
+    if torques is None and (continued := with_stop(motion, model, recorded)) is not motion:
         notes.append(f"after its last command at t = {motion.duration:.3f} s, which still moves, a stop is added")
         motion = continued
     if run.truncated:

@@ -14,6 +14,7 @@ from rcilab.conformance.report import Report
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
+from rcilab.model.robot_model import require_model
 from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.run import Run
 from rcilab.recording.sent_motion import sent_motion, sent_torques, with_stop
@@ -61,19 +62,30 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     return ClientReport(line=line, text="\n".join(lines) + "\n")
 
 
+def check_client(run: Run) -> Report:
+    """Returns the check of what a client commanded in a run, in its mode, without distances between links.
+
+    Of a motion that a fault ended, of the accepted commands and the controller's own stop.
+
+    Raises:
+        InvalidValueError: The run does not name its arm or mode.
+        UsageError: Nothing was commanded.
+    """
+    model, mode = require_model(run.model), require_mode(run.setup.mode)
+    start, box = run.cycles["q_c"][0], run.setup.safety_box
+    if mode == "torque":
+        return check_torques(*sent_torques(run), model, start=start, box=box, distance=None)
+    # Without a fault: what the client commanded, not what the arm did in its pauses.
+    motion = run.commanded() if run.faults else with_stop(sent_motion(run), model, mode)
+    return check(motion, model, start=start, box=box, distance=None, mode=mode)
+
+
 def _check(run: Run) -> tuple[Report | None, str]:
-    """Returns the check of the commanded motion in its mode, or why there is none."""
-    if run.model is None or len(run.cycles) < 2:
+    """Returns the check, or why there is none."""
+    if len(run.cycles) < 2:
         return None, "; too short for a check"
     try:
-        mode = require_mode(run.setup.mode)
-        start = run.cycles["q_c"][0]
-        box = run.setup.safety_box
-        if mode == "torque":
-            return check_torques(*sent_torques(run), run.model, start=start, box=box, distance=None), ""
-        # Without a fault: what the client commanded, not what the arm did in its pauses.
-        motion = run.commanded() if run.faults else with_stop(sent_motion(run), run.model)
-        return check(motion, run.model, start=start, box=box, distance=None, mode=mode), ""
+        return check_client(run), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
 

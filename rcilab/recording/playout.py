@@ -41,15 +41,20 @@ def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> Jo
 
 
 def judged_joints(cycles: NDArray[np.void]) -> JointPath:
-    """Returns the joint angles of the played commands up to a refused one, shape (M, n), [rad]: what a check judges.
+    """Returns the joint angles up to the last played command, or a refused one, shape (M, n), [rad].
 
     Args:
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
     """
     q = played_joints(cycles, with_refused=True)
+    rows, _ = played_commands(cycles)
     faulty = np.flatnonzero(cycles["faults"])
-    after = len(cycles) - 1 - int(faulty[0]) if faulty.size else 0  # Rows of the controller's own stop.
-    return q[: max(len(q) - after, 1)]
+    if not rows.size:
+        return q
+    end = (
+        int(min(rows[-1], faulty[0])) if faulty.size else int(rows[-1])
+    )  # Then come rows of the controller's own stop.
+    return q[: end - int(rows[0]) + 1]
 
 
 def played_commands(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

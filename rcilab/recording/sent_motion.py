@@ -15,12 +15,13 @@ from rcilab.core.errors import UsageError
 from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
-from rcilab.recording.playout import played_commands
+from rcilab.recording.playout import judged_joints, played_commands
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
 
+_FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 
 
@@ -36,10 +37,11 @@ def sent_motion(run: Run) -> Motion:
         UsageError: Nothing was commanded, or torques were: see `sent_torques`.
     """
     rows = run.cycles
+    is_played = "played" in (rows.dtype.names or ())
     if np.isfinite(rows["command_pose"]).any():
-        return run.commanded()
+        return Motion.from_cycles(judged_joints(rows)) if is_played else run.commanded()
     has_angles = np.isfinite(rows["command"]).all(axis=1)
-    if "played" in (rows.dtype.names or ()):
+    if is_played:
         has_angles &= np.isin(np.arange(len(rows)), _judged_rows(rows))
     sent = rows[has_angles]
     if not len(sent):
@@ -80,11 +82,12 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     )
 
 
-def with_stop(motion: Motion, model: RobotModel) -> Motion:
-    """Returns a motion whose last row still moves, continued by the fastest stop; one that ends at rest as it is.
+def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
+    """Returns a motion whose last row still moves, continued by a stop; one that ends at rest as it is.
 
     A check holds the arm at the last row. A client whose motion ended early did not command the jump of such an end,
-    and a controller stops the arm smoothly after the last command of a program that ends moving a little.
+    and a controller stops the arm smoothly after the last command of a program that ends moving a little. Joints stop
+    as fast as their limits allow; where poses are commanded, on a course that the limits of the tool allow, too.
 
     Raises:
         PlanningError: The last rows are farther apart than any robot's.
@@ -95,8 +98,19 @@ def with_stop(motion: Motion, model: RobotModel) -> Motion:
     dq, ddq = (q[-1] - q[-2]) / CYCLE_TIME, (q[-1] - 2.0 * q[-2] + q[-3]) / CYCLE_TIME**2
     if np.abs(dq).max() <= _STILL and np.abs(ddq).max() <= _STEADY:
         return motion
-    stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq))
-    return replace(Motion.from_cycles(np.concatenate((q, stop.q[1:]))), notes=motion.notes)
+    if mode.startswith("cartesian"):
+        stop = q[-1] + _fade_out(dq, ddq)
+    else:
+        stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq)).q[1:]
+    return replace(Motion.from_cycles(np.concatenate((q, stop))), notes=motion.notes)
+
+
+def _fade_out(dq: Array, ddq: Array) -> JointPath:
+    """Returns the way of every cycle until standstill; velocity and acceleration continue and vanish smoothly."""
+    s = CYCLE_TIME * np.arange(1, round(_FADE_TIME / CYCLE_TIME) + 1)[:, np.newaxis]
+    u = s / _FADE_TIME
+    velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3
+    return CYCLE_TIME * np.cumsum(velocity, axis=0)
 
 
 def _fill_gaps(index: NDArray[np.intp], q: JointPath) -> JointPath:

@@ -195,7 +195,7 @@ def test_a_pause_of_the_client_is_not_blamed_on_the_commands_around_it() -> None
     cycles["q_c"][pause] = cycles["q_c"][pause[0] - 1]  # The arm is held there.
     paused = replace(run, cycles=cycles)
     assert not check(paused.commanded(), MODEL, distance=None).ok
-    motion = with_stop(sent_motion(paused), MODEL)
+    motion = with_stop(sent_motion(paused), MODEL, "joint_position")
     assert motion.notes == ("20 commands did not arrive and are interpolated",)
     assert check(motion, MODEL, distance=None).ok
     np.testing.assert_allclose(sent_motion(paused).q, sent_motion(run).q, rtol=0, atol=1e-6)

@@ -14,9 +14,6 @@ from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watched_controller import WatchedController
 from rcilab.conformance.check import check
-from rcilab.conformance.start import StartState
-from rcilab.core.arrays import JointPath
-from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.state import require_mode
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import message
@@ -24,8 +21,10 @@ from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion import Motion
 from rcilab.recording.client_motions import ClientMotion, MotionPart
+from rcilab.recording.client_report import check_client
 from rcilab.recording.playout import judged_joints, played_joints
 from rcilab.recording.run import Run, build_run
+from rcilab.recording.sent_motion import with_stop
 
 if TYPE_CHECKING:
     from rcilab.app.store import Store
@@ -34,7 +33,6 @@ _PERIOD = 0.4  # [s] Between two drawings of a motion in progress; drawing and c
 _WINDOW = 10_000  # [cycles] Of a motion in progress.
 _LONGEST = 60_000  # [cycles] Of a finished motion; its record in a file is complete.
 _FEWEST = 2  # [cycles]
-_FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm.
 
 
 class WatchActions:
@@ -108,23 +106,15 @@ class WatchActions:
 def draw_plan(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
     """Returns the commands of a run as scene, timeline and curves draw a plan.
 
-    A motion in progress is continued until standstill: without that, its end would look like a violation.
+    A refused command is drawn, and the check includes it. A motion in progress is continued by a stop: without it, its
+    end would look like a violation.
     """
-    q = played_joints(run.cycles, with_refused=True)
-    checked = judged_joints(run.cycles)
-    if not (run.faults or has_ended) and len(q) > 2:
-        checked = q = np.concatenate([q, _fade_out(q)])
-    row = run.cycles[len(run.cycles) - len(q)] if len(q) <= len(run.cycles) else run.cycles[0]
-    start = StartState(q[0], row["dq_c"], row["ddq_c"])
-    report = check(Motion.from_cycles(checked), model, start=start, distance=None, mode=require_mode(run.setup.mode))
-    return replace(build_plan_view(model, Motion.from_cycles(q), report), complete=True)
-
-
-def _fade_out(q: JointPath) -> JointPath:
-    """Returns rows after the last one until standstill; velocity and acceleration continue and vanish smoothly."""
-    dq = (q[-1] - q[-2]) / CYCLE_TIME
-    ddq = (q[-1] - 2.0 * q[-2] + q[-3]) / CYCLE_TIME**2
-    s = CYCLE_TIME * np.arange(1, round(_FADE_TIME / CYCLE_TIME) + 1)[:, np.newaxis]
-    u = s / _FADE_TIME
-    velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3
-    return q[-1] + CYCLE_TIME * np.cumsum(velocity, axis=0)
+    mode = require_mode(run.setup.mode)
+    motion = Motion.from_cycles(played_joints(run.cycles, with_refused=True))
+    if run.faults:
+        judged = Motion.from_cycles(judged_joints(run.cycles))
+        report = check(judged, model, start=run.cycles["q_c"][0], distance=None, mode=mode)
+    else:
+        motion = motion if has_ended else with_stop(motion, model, "cartesian_position")
+        report = check_client(run)
+    return replace(build_plan_view(model, motion, report), complete=True)
