@@ -156,7 +156,7 @@ def _read_run(args: Namespace) -> _Subject:
     from rcilab.core.state import MODES
     from rcilab.model.robot_model import load_model
     from rcilab.recording.run import load_run
-    from rcilab.recording.sent_motion import sent_motion, sent_torques, with_stop
+    from rcilab.recording.sent_motion import sent_motion, sent_torques, start_of, with_stop
 
     run = load_run(args.file, max_rows=args.max_rows)
     tool, load, box = _arm_options(args)
@@ -182,7 +182,7 @@ def _read_run(args: Namespace) -> _Subject:
         model=model,
         box=run.setup.safety_box if box is None else box,
         mode=args.mode or recorded,
-        start=None if run.truncated else run.q_c[0],
+        start=start_of(run),
         torques=torques,
         note="; ".join(notes),
     )

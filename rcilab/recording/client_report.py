@@ -17,7 +17,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import require_model
 from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.run import Run
-from rcilab.recording.sent_motion import sent_motion, sent_torques, with_stop
+from rcilab.recording.sent_motion import sent_motion, sent_torques, start_of, with_stop
 
 _EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
 _BAR = 40  # Characters of the longest bar.
@@ -72,7 +72,7 @@ def check_client(run: Run) -> Report:
         UsageError: Nothing was commanded.
     """
     model, mode = require_model(run.model), require_mode(run.setup.mode)
-    start, box = run.cycles["q_c"][0], run.setup.safety_box
+    start, box = start_of(run), run.setup.safety_box
     if mode == "torque":
         return check_torques(*sent_torques(run), model, start=start, box=box, distance=None)
     # Without a fault: what the client commanded, not what the arm did in its pauses.

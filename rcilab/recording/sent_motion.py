@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, JointPath
+from rcilab.core.arrays import Array, JointPath, JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
 from rcilab.core.errors import UsageError
+from rcilab.core.state import COMPLIANT_MODES
 from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
@@ -80,6 +81,14 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     return Motion.from_cycles(q), np.stack(
         [np.interp(grid, sent["t"], column) for column in sent["command_tau"].T], axis=1
     )
+
+
+def start_of(run: Run) -> JointVector | None:
+    """Returns the commanded joint angles before the first command, shape (n,), [rad]; None where they do not bind it.
+
+    A compliant arm rests beside its last command, and a controller absorbs the offset of the next first one.
+    """
+    return None if run.truncated or run.setup.mode in COMPLIANT_MODES else run.q_c[0]
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:

@@ -24,7 +24,7 @@ from rcilab.recording.client_motions import ClientMotion, MotionPart
 from rcilab.recording.client_report import check_client
 from rcilab.recording.playout import judged_joints, played_joints
 from rcilab.recording.run import Run, build_run
-from rcilab.recording.sent_motion import with_stop
+from rcilab.recording.sent_motion import start_of, with_stop
 
 if TYPE_CHECKING:
     from rcilab.app.store import Store
@@ -113,7 +113,7 @@ def draw_plan(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
     motion = Motion.from_cycles(played_joints(run.cycles, with_refused=True))
     if run.faults:
         judged = Motion.from_cycles(judged_joints(run.cycles))
-        report = check(judged, model, start=run.cycles["q_c"][0], distance=None, mode=mode)
+        report = check(judged, model, start=start_of(run), distance=None, mode=mode)
     else:
         motion = motion if has_ended else with_stop(motion, model, "cartesian_position")
         report = check_client(run)
