@@ -30,9 +30,9 @@ def sent_motion(run: Run) -> Motion:
     """Returns the motion that a client commanded, on the grid of the controller's cycles.
 
     It has the joint angles as they were sent; if poses of the tool were sent, the joint angles that the controller
-    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them. Where a virtual
-    controller recorded which commands it played, it has these, up to one that was refused, at the times of the states
-    that they answer: what the arm did in a pause of the client is not the client's.
+    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them: what the arm did in a
+    pause of the client is not the client's. Where a virtual controller recorded which commands it played, it has these
+    at the times when they were played, up to one that was refused.
 
     Raises:
         UsageError: Nothing was commanded, or torques were: see `sent_torques`.
@@ -41,26 +41,36 @@ def sent_motion(run: Run) -> Motion:
     is_played = "played" in (rows.dtype.names or ())
     if np.isfinite(rows["command_pose"]).any():
         return Motion.from_cycles(judged_joints(rows)) if is_played else run.commanded()
-    has_angles = np.isfinite(rows["command"]).all(axis=1)
-    if is_played:
-        has_angles &= np.isin(np.arange(len(rows)), _judged_rows(rows))
-    sent = rows[has_angles]
-    if not len(sent):
+    period = 1 if is_played else state_cycles(rows)
+    index, q = _played_angles(rows) if is_played else _sent_angles(rows, period)
+    if not len(q):
         what = "torques were sent, which have no path" if np.isfinite(rows["command_tau"]).any() else "nothing was sent"
         raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
-    period = state_cycles(rows)
-    index = np.rint((sent["t"] - sent["t"][0]) / (period * CYCLE_TIME)).astype(np.intp)
-    index, first = np.unique(index, return_index=True)
-    motion = Motion.from_cycles(_fill_gaps(index, sent["command"][first]), period)
+    motion = Motion.from_cycles(_fill_gaps(index, q), period)
     lost = int(index[-1]) + 1 - len(index)
     return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
 
 
-def _judged_rows(cycles: NDArray[np.void]) -> NDArray[np.intp]:
-    """Returns the rows whose commands were played, or refused."""
+def _sent_angles(cycles: NDArray[np.void], period: int) -> tuple[NDArray[np.intp], JointPath]:
+    """Returns the sent joint angles, with their numbers on the grid of the states, from 0."""
+    sent = cycles[np.isfinite(cycles["command"]).all(axis=1)]
+    if not len(sent):
+        return np.zeros(0, np.intp), sent["command"]
+    index = np.rint((sent["t"] - sent["t"][0]) / (period * CYCLE_TIME)).astype(np.intp)
+    index, first = np.unique(index, return_index=True)
+    return index, sent["command"][first]
+
+
+def _played_angles(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], JointPath]:
+    """Returns the played joint angles, up to refused ones, with the numbers of their cycles, from 0."""
     rows, sources = played_commands(cycles)
+    q = cycles["command"][sources]
+    is_judged = np.isfinite(q).all(axis=1)
     faulty = np.flatnonzero(cycles["faults"])
-    return sources[rows <= faulty[0]] if faulty.size else sources
+    if faulty.size:
+        is_judged &= rows <= faulty[0]
+    rows, q = rows[is_judged], q[is_judged]
+    return rows - rows[0] if rows.size else rows, q
 
 
 def sent_torques(run: Run) -> tuple[Motion, Array]:
