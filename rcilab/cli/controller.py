@@ -243,8 +243,11 @@ def run(args: argparse.Namespace) -> int:
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
 
-    with _recording(given.get("record"), server):
-        server.run(lambda: print_interruptibly(f"{server.description}{world}"))
+    try:
+        with _recording(given.get("record"), server):
+            server.run(lambda: print_interruptibly(f"{server.description}{world}"))
+    finally:
+        server.close()
     return 0
 
 

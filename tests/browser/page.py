@@ -65,7 +65,7 @@ class BenchPage:
         """Puts robot and settings into the state a test starts from, past the page."""
         ask = self.bench.dispatcher.ask
         if self.status.phase == "fault":
-            self.bench.session.recover().wait(10.0)
+            self.bench.session.robot().recover().wait(10.0)
         self.wait(lambda: self.status.phase == "idle" and bool(self.status.powered), "a powered, idle arm", 30.0)
         ask(SetView(name="language", value="en"))
         ask(SetSpeed(speed=0.5))

@@ -354,7 +354,7 @@ def test_with_the_real_controller_the_goal_follows_the_arm_and_undo_brings_it_ba
         ask(PressJog(axis="joint.3", sign=-1))
         wait(lambda: status().code == "idle.jogged", "the arm to rest")
         wait(lambda: np.array_equal(store.state.goal.q, status().q_c), "the goal where the arm is")
-        assert store.state.no_plan.code == "plan.here"
+        wait(lambda: getattr(store.state.no_plan, "code", "") == "plan.here", "the plan of nothing")
         assert np.delete(status().q_c, 3) == pytest.approx(np.delete(start, 3), abs=1e-12)
         ask(PoseGoal(name="undo"))
         wait(lambda: np.array_equal(store.state.goal.q, start) and store.state.plan is not None, "the goal of before")
