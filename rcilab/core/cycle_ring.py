@@ -58,7 +58,8 @@ class CycleRing:
         self.descriptor = descriptor
         try:
             size = os.fstat(descriptor).st_size
-            self._map = mmap.mmap(descriptor, size)
+            # Populated, because a page that is touched for the first time would delay a cycle.
+            self._map = mmap.mmap(descriptor, size, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE)
             header = _HEADER.unpack_from(self._map, 0) if size >= _HEADER.size else (b"", 0, 0, 0, 0)
             magic, version, self.n, row_size, capacity = header
             dtype = cycle_dtype(self.n, complete=True, playout=True)

@@ -21,7 +21,6 @@ import numpy as np
 
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
-from rcilab.core.fault import FaultCode
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
@@ -35,8 +34,9 @@ _FAULTS = struct.Struct("<QIBBBB")
 _STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
 _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
-_REST = STATE_FIELDS + OTHER_STATE_FIELDS
-_POSES = tuple(index for index, name in enumerate(_REST) if name.startswith("T_"))
+_ARRAYS = STATE_FIELDS + OTHER_STATE_FIELDS[:-4]
+_POSE, _POSE_C = _ARRAYS.index("T_base_tool"), _ARRAYS.index("T_base_tool_c")
+_ROWS = int(RingCounter.ROWS)
 _FARTHEST = 256  # [rows] A command for a state before or after so many others is not recorded: no queue is longer.
 
 
@@ -67,12 +67,14 @@ class CycleCapture:
         self._rows: dict[int, int] = {}  # Row of each recent message id.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
         self._waiting: deque[tuple[int, ArmCommand]] = deque()  # Time of arrival, [ns]; for rows to come.
-        self._rest_of = attrgetter(*_REST)
+        self._arrays_of = attrgetter(*_ARRAYS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
         self._answer = self._find_answer(controller.arm.mode)
-        self._faults: tuple[FaultCode, ...] = ()
-        self._bits = 0
+        self._modes: tuple[object, ...] = ()
+        self._status = b""  # Faults and modes, packed: they rarely change.
+        self._counters = ring.counters
+        self._arm, self._playout = controller.arm, controller.arm.playout
         self._received = self._duplicates = 0
         controller.arm.on_command = self._take
 
@@ -87,10 +89,10 @@ class CycleCapture:
 
     def write(self) -> None:
         """Writes the row of this cycle; call it after its state was sent."""
-        controller = self._controller
-        state, arm = controller.state, controller.arm
-        self._follow_motion(state)
-        playback, playout = arm.playback, arm.playout
+        state, playback, playout = self._controller.state, self._arm.playback, self._playout
+        is_following = playback is not None or self._arm.is_following
+        if is_following is not self._is_moving:
+            self._follow_motion(state, is_following)
         played = age = missed = 0
         if playback is not None:
             missed = int(playback.is_lost)
@@ -106,7 +108,7 @@ class CycleCapture:
         self._count += 1
         if self._waiting:
             self._add(self._count - 1, *self._waiting.popleft())
-        self._ring.counters[RingCounter.ROWS] = self._count
+        self._counters[_ROWS] = self._count
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
@@ -145,10 +147,9 @@ class CycleCapture:
             return struct.Struct("<17d").pack_into, self._offsets["command_pose"], _pose_of
         return joints, self._offsets["command"], attrgetter("q")
 
-    def _follow_motion(self, state: RobotState) -> None:
+    def _follow_motion(self, state: RobotState, is_following: bool) -> None:
         """Writes the events of a motion that begins or has ended."""
         controller = self._controller
-        is_following = controller.arm.is_following or controller.arm.playback is not None
         is_moving = is_following or (self._is_moving and controller.is_moving)
         if is_moving is self._is_moving:
             return
@@ -192,23 +193,26 @@ class CycleCapture:
         )
 
     def _pack(self, state: RobotState, playout: tuple[int, ...]) -> bytes:
-        if state.faults is not self._faults:
-            self._faults, self._bits = state.faults, sum(1 << fault for fault in state.faults)
-        rest: list[Any] = list(self._rest_of(state))
-        for index in _POSES:
-            rest[index] = rest[index].tobytes()
-        *rest, psi, psi_c, dpsi_c, ddpsi_c = rest
+        modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode
+        if modes != self._modes:
+            self._modes = modes
+            self._status = _FAULTS.pack(sum(1 << fault for fault in state.faults), 0, *modes[1:], 0)
+        arrays = self._arrays_of(state)
         parts: tuple[Any, ...] = (
             _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
             state.q,
             state.q_c,
             state.dq,
             self._no_joints,
-            _FAULTS.pack(self._bits, 0, state.robot_mode, state.controller_mode, state.motion_generator_mode, 0),
+            self._status,
             state.tau,
             self._no_answer,
-            *rest,
-            _TAIL.pack(psi, psi_c, dpsi_c, ddpsi_c, *playout),
+            *arrays[:_POSE],
+            arrays[_POSE].tobytes(),
+            *arrays[_POSE + 1 : _POSE_C],
+            arrays[_POSE_C].tobytes(),
+            *arrays[_POSE_C + 1 :],
+            _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
         )
         return b"".join(parts)
 

@@ -90,11 +90,11 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
 
     The target is for 99.9 % of the periods, and only if the controller gets SCHED_FIFO.
     """
-    return measure_period("state_period", start_controller(_ROBOT), seconds)
+    return measure_period("state_period", start_controller(_ROBOT), seconds)[0]
 
 
-def measure_period(name: str, controller: VirtualController, seconds: float) -> Measurement:
-    """Returns the row of `bench_state_period` for a controller, and ends the controller.
+def measure_period(name: str, controller: VirtualController, seconds: float) -> tuple[Measurement, int]:
+    """Returns the row of `bench_state_period` for a controller and the number of late cycles; ends the controller.
 
     Args:
         name: Name of the row.
