@@ -333,12 +333,14 @@ class Run:
                 lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
             )  # fmt: skip
         steps = np.diff(sent["message_id"].astype(np.int64))
+        is_played = "missed" in (self.cycles.dtype.names or ())  # There a number may have several commands.
+        lost = self.cycles["missed"].sum() if is_played else (steps // state_cycles(self.cycles) - 1).sum()
         period = np.diff(sent["received_ns"]) * 1e-9
         response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
         lateness = sent["lateness"]
         return Timing(
             cycles=len(sent),
-            lost=int((steps // state_cycles(self.cycles) - 1).sum()),
+            lost=int(lost),
             period_median=float(np.median(period)),
             period_max=float(period.max()),
             response_median=float(np.median(response)),

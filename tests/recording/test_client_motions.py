@@ -180,6 +180,7 @@ def test_commands_that_answer_one_state_again_are_all_recorded() -> None:
     sources = played - run.cycles["age"][played].astype(int)
     assert (sources < played).all()
     assert [row.tobytes() for row in run.command[sources]] == [data[8:64] for data in sent]
+    assert run.timing.lost == 0
     assert sent_motion(run).notes == ()
     assert check(sent_motion(run), parts[0].motion.model, distance=None).ok
 
