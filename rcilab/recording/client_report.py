@@ -53,8 +53,6 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
-        if run.faults:
-            lines.append("The accepted commands, and the controller's own stop:")
         lines += [str(report), ""]
     lines += _describe_commands(run, end, counts)
     lines += ["", "Settings in force (SI units):"]
@@ -65,7 +63,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
 def check_client(run: Run) -> Report:
     """Returns the check of what a client commanded in a run, in its mode, without distances between links.
 
-    Of a motion that a fault ended, of the accepted commands and the controller's own stop.
+    It ends with a command that the controller refused, and continues with a stop where it still moves.
 
     Raises:
         InvalidValueError: The run does not name its arm or mode.
@@ -75,8 +73,7 @@ def check_client(run: Run) -> Report:
     start, box = start_of(run), run.setup.safety_box
     if mode == "torque":
         return check_torques(*sent_torques(run), model, start=start, box=box, distance=None)
-    # Without a fault: what the client commanded, not what the arm did in its pauses.
-    motion = run.commanded() if run.faults else with_stop(sent_motion(run), model, mode)
+    motion = with_stop(sent_motion(run), model, mode)
     return check(motion, model, start=start, box=box, distance=None, mode=mode)
 
 
@@ -126,6 +123,9 @@ def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str
     answered = run.cycles["sent_ns"] != 0
     if not run.realtime or not answered.any():
         return [*lines, "  in lock-step, times have no meaning"] if not run.realtime else lines
+    answered &= np.isfinite(run.cycles["lateness"])
+    if not answered.any():
+        return [*lines, "  no command came after the state that it answers: a repeated number shifts all later ones"]
     times = 1e3 * run.cycles["lateness"][answered]
     lines.append(
         f"  from state to command: median {np.median(times):.3f} ms, 99 % {np.percentile(times, 99):.3f} ms, "

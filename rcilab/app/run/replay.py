@@ -14,6 +14,7 @@ from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.makers.configuration import RobotConfiguration
+from rcilab.recording.client_report import check_client
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -38,8 +39,12 @@ def require_replayable(run: Run) -> RobotModel:
 def replayed(state: UiState, run: Run) -> UiState:
     """Returns a state that shows a run."""
     model = require_replayable(run)
-    motion = run.plan or run.commanded()  # A callback has no plan: its commands are drawn and checked.
-    report = run.report or check(motion, model)
+    if "played" in (run.cycles.dtype.names or ()):
+        report = check_client(run)
+        motion = report.motion
+    else:
+        motion = run.plan or run.commanded()  # A callback has no plan: its commands are drawn and checked.
+        report = run.report or check(motion, model)
     plan = replace(build_plan_view(model, motion, report), complete=True)
     goal = goal_at(model, motion.goal)
     wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))

@@ -13,18 +13,13 @@ from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watched_controller import WatchedController
-from rcilab.conformance.check import check
-from rcilab.core.state import require_mode
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import message
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import RobotModel
-from rcilab.motion import Motion
 from rcilab.recording.client_motions import ClientMotion, MotionPart
 from rcilab.recording.client_report import check_client
-from rcilab.recording.playout import judged_joints, played_joints
 from rcilab.recording.run import Run, build_run
-from rcilab.recording.sent_motion import start_of, with_stop
 
 if TYPE_CHECKING:
     from rcilab.app.store import Store
@@ -64,8 +59,6 @@ class WatchActions:
         if len(part.cycles):
             self._rows.append(part.cycles)
             self._count += len(part.cycles)
-        while len(self._rows) > 1 and self._count - len(self._rows[0]) > _LONGEST:
-            self._count -= len(self._rows.pop(0))
         if part.end is not None:
             if self._count >= _FEWEST:
                 self._show(_LONGEST, part.end.stopped, has_ended=True)
@@ -74,7 +67,7 @@ class WatchActions:
 
     def _show(self, longest: int, stopped: str | None = None, *, has_ended: bool = False) -> None:
         assert self._motion is not None
-        self._rows = [np.concatenate(self._rows)]
+        self._rows = [np.concatenate(self._rows)[-_LONGEST:].copy()]
         cycles = self._rows[0][-longest:]
         is_whole = len(cycles) == self._count
         if not is_whole:
@@ -82,14 +75,14 @@ class WatchActions:
             cycles["t"] -= cycles["t"][0]
         model, setup = self._motion.model, self._motion.setup
         run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
-        plan, recording = draw_plan(run, model, has_ended=has_ended), whole_recording(run)
+        plan, recording = draw_plan(run, model), whole_recording(run)
         wanted = self._store.state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
         setup = replace(self._store.state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
         self._store.update(
             model=model, setup=setup, plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0
         )
         if has_ended:
-            self._store.update(goal=goal_at(model, plan.motion.goal))
+            self._store.update(goal=goal_at(model, run.q_c[-1]))
 
     def _report(self, part: MotionPart) -> None:
         end, motion = part.end, part.motion
@@ -103,18 +96,10 @@ class WatchActions:
         self._store.notify("bad", message(code, **facts, reason=describe_note(first), more=len(more)))
 
 
-def draw_plan(run: Run, model: RobotModel, *, has_ended: bool) -> Plan:
-    """Returns the commands of a run as scene, timeline and curves draw a plan.
+def draw_plan(run: Run, model: RobotModel) -> Plan:
+    """Returns the commands of a run as scene, timeline and curves draw a plan: those that the check judges.
 
-    A refused command is drawn, and the check includes it. A motion in progress is continued by a stop: without it, its
-    end would look like a violation.
+    They end with a refused command, and continue with a stop where they still move.
     """
-    mode = require_mode(run.setup.mode)
-    motion = Motion.from_cycles(played_joints(run.cycles, with_refused=True))
-    if run.faults:
-        judged = Motion.from_cycles(judged_joints(run.cycles))
-        report = check(judged, model, start=start_of(run), distance=None, mode=mode)
-    else:
-        motion = motion if has_ended else with_stop(motion, model, "cartesian_position")
-        report = check_client(run)
-    return replace(build_plan_view(model, motion, report), complete=True)
+    report = check_client(run)
+    return replace(build_plan_view(model, report.motion, report), complete=True)
