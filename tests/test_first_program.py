@@ -42,7 +42,7 @@ def swing(amplitude: float, period: float) -> tuple[list[str], bool]:
 
 
 def printed(kind: str) -> str:
-    """The text of the page's log line that contains some words."""
+    """The text of the page's log line that contains a phrase."""
     (line,) = [line for line in PAGE.splitlines() if line.startswith("rcilab controller:") and kind in line]
     return re.sub(r"^rcilab controller: \S+ \S+ s ", "", line)
 

@@ -130,7 +130,7 @@ class PageConnection(Protocol):
         """Returns the object that takes requests.
 
         Raises:
-            UsageError: There is none.
+            UsageError: There is no robot.
         """
         ...
 

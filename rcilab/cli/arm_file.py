@@ -1,4 +1,4 @@
-"""The set-up file of an arm, `rcilab controller my_arm.toml`: what a teach pendant holds, and options of the command.
+"""The configuration file of an arm, `rcilab controller my_arm.toml`: settings of a teach pendant, and options.
 
 Numbers are in SI units: `start = [0, 0.52, 0, 1.05, 0, 1.57, 0]`. A text is as on the command line and may have a unit:
 `start = "0,30,0,60,0,90,0deg"`.
@@ -36,12 +36,12 @@ class ArmFile:
 
 
 def read_arm_file(file: Path) -> ArmFile:
-    """Returns the options in a set-up file.
+    """Returns the options in a configuration file.
 
     Raises:
         InvalidValueError: The file cannot be read or is not TOML; a section or key is unknown or has a wrong value.
     """
-    content = _parse(read_limited(file, "set-up file", lambda size: _require_size(file, size)), file)
+    content = _parse(read_limited(file, "configuration file", lambda size: _require_size(file, size)), file)
     options: dict[str, object] = {}
     keys: dict[str, str] = {}
     for section, table in content.items():
@@ -68,12 +68,12 @@ def _parse(data: bytes, file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:  # Not UTF-8, or not TOML.
-        raise InvalidValueError("set-up file", str(file), f"is not valid TOML: {error}") from error
+        raise InvalidValueError("configuration file", str(file), f"is not valid TOML: {error}") from error
 
 
 def _require_size(file: Path, size: int) -> None:
     if size > _LARGEST:
-        raise InvalidValueError("set-up file", str(file), f"has {size} bytes; at most {_LARGEST} are expected")
+        raise InvalidValueError("configuration file", str(file), f"has {size} bytes; at most {_LARGEST} are expected")
 
 
 def _text(value: Any, name: str) -> str:
@@ -144,7 +144,7 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "log_format": _text,
     },
 }
-"""Every key of a set-up file and the reader of its value. Without a unit, numbers are in SI units."""
+"""Every key of a configuration file and the reader of its value. Without a unit, numbers are in SI units."""
 
 
 def _tool(position: tuple[float, ...] = (0.0, 0.0, 0.0), rpy: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Pose:

@@ -135,11 +135,11 @@ def parse_box(text: str, option: str = "--box") -> SafetyBox:
     """
     from rcilab.core.safety_box import SafetyBox
 
-    edges, at, place = text.partition("@")
+    edges, at, pose = text.partition("@")
     if not at:
         raise _invalid(text, option, f"{BOX_FORM} with its centre after @")
     size = _quantities(text, edges.split(","), 3, _LENGTH, option, BOX_FORM)
-    T_base_box = _pose(text, place, option, BOX_FORM)
+    T_base_box = _pose(text, pose, option, BOX_FORM)
     try:
         return SafetyBox(size=size, T_base_box=T_base_box)
     except InvalidValueError as error:

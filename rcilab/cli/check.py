@@ -88,12 +88,13 @@ def _run(args: Namespace) -> int:
     out: Path | None = args.slow_down
     if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
         raise InvalidValueError("--slow-down", str(out), "is the file to check; choose another one")
-    tell = (lambda line: None) if args.json else show
+    show_note = (lambda line: None) if args.json else show
     subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args)
-    motion, model = as_motion(subject.found, subject.model, args.file, show=tell, max_rows=args.max_rows), subject.model
+    model = subject.model
+    motion = as_motion(subject.found, model, args.file, show=show_note, max_rows=args.max_rows)
     arm = describe_arm(model, subject.box)
     for line in filter(None, (arm, subject.note)):
-        tell(f"note: {line}")
+        show_note(f"note: {line}")
     if subject.torques is None:
         report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
     else:

@@ -37,8 +37,8 @@ simulation port, and ends on Ctrl-C.
 breakpoint or on a busy machine. FILE, or the options below, start the arm where yours stands.
 """
 
-EPILOG = """A set-up file holds what the teach pendant of your arm holds, and options of this command; options on the
-command line take precedence over it. Numbers are in SI units; a text is as on the command line:
+EPILOG = """A configuration file holds the settings of your arm's teach pendant and options of this command; options of
+the command line take precedence over it. Numbers are in SI units; a text is as on the command line:
 
   [arm]
   model = "xMatePro7"
@@ -85,7 +85,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         argument_default=argparse.SUPPRESS,  # An option that is not given may be in the file.
     )
     parser.add_argument(
-        "file", nargs="?", type=Path, default=None, metavar="FILE", help="set-up of the arm, such as my_arm.toml"
+        "file", nargs="?", type=Path, default=None, metavar="FILE", help="configuration of the arm, such as my_arm.toml"
     )
     parser.add_argument("--model", metavar="NAME", help="arm, such as xMatePro7; required here or in the file")
     parser.add_argument("--host", metavar="ADDR", help=f"address to listen on ({_HOST})")
@@ -173,7 +173,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def _add_arm_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group(
-        "set-up of the arm",
+        "configuration of the arm",
         "what its teach pendant holds, kept by a reboot; a value that begins with - follows =, as --tool=-10,0,120mm",
     )
     group.add_argument(
@@ -208,7 +208,7 @@ def _add_network_options(parser: argparse.ArgumentParser) -> None:
         group.add_argument(f"--{name}", type=float, metavar="SHARE", help=f"share of {meaning}, 0 to 1")
     group.add_argument("--delay", type=float, metavar="S", help="delay of every datagram")
     group.add_argument("--jitter", type=float, metavar="S", help="largest random delay in addition")
-    group.add_argument("--faults-on", metavar="WAY", help="affected datagrams: commands, states or both (both)")
+    group.add_argument("--faults-on", metavar="DIRECTION", help="affected datagrams: commands, states or both (both)")
     group.add_argument("--tcp-delay", type=float, metavar="S", help="delay of every TCP reply")
     group.add_argument(
         "--tcp-split", nargs="?", type=int, const=1, metavar="N", help="send replies N bytes at a time (1)"
@@ -268,7 +268,9 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
 
     option = options.get
     if "model" not in options:
-        raise UsageError("the arm is not named; add --model NAME, such as --model xMatePro7, or a file with its set-up")
+        raise UsageError(
+            "the arm is not named; add --model NAME, such as --model xMatePro7, or a file with its configuration"
+        )
     n = describe_robot(options["model"]).n
     client_host, client_port = _client(option("client"))
     network, states_network = _networks(options)
@@ -331,7 +333,7 @@ def _signals(text: str) -> tuple[int, ...]:
 def _with_option_name(
     error: InvalidValueError, given: Mapping[str, object], keys: Mapping[str, str]
 ) -> InvalidValueError:
-    """Returns an error with the name of the option, or its place in the file, instead of that of the setting."""
+    """Returns an error with the name of the option, or its key in the file, instead of that of the setting."""
     setting, colon, rest = error.name.partition(": ")
     option = _OPTIONS.get(setting, setting)
     if option in keys and option not in given:

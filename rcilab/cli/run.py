@@ -67,7 +67,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--apply",
         action="store_true",
-        help="first send tool, load and safety box of the program to the controller; without it what differs is told",
+        help="first send tool, load and safety box of the program to the controller; without it, reports what differs",
     )
     parser.add_argument("--yes", action="store_true", help="do not ask; for scripts that have asked before")
     parser.add_argument(
@@ -203,15 +203,15 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
         return robot.model.name
 
 
-def _connect(args: Namespace, model: RobotModel | None, tell: Callable[[str], None]) -> RobotSession:
-    """Returns a session; what differs from the model's tool and load is told."""
+def _connect(args: Namespace, model: RobotModel | None, report: Callable[[str], None]) -> RobotSession:
+    """Returns a session; reports what differs from the model's tool and load."""
     from rcilab.execution.session import connect
 
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         robot = connect(args.robot, model, args.timeout, apply=args.apply)
     for warning in found:
-        tell(f"note: {warning.message}; rcilab run --apply sends tool, load and safety box of the program")
+        report(f"note: {warning.message}; rcilab run --apply sends tool, load and safety box of the program")
     return robot
 
 

@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Adds the command."""
     parser = subparsers.add_parser(
         "world",
-        help="push or place a virtual robot, place an obstacle, press its emergency stop",
+        help="push or move a virtual robot, place an obstacle, press its emergency stop",
         description="Controls the simulated environment of a virtual robot through its simulation port.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -144,8 +144,8 @@ def _describe_other_tool(command: CartesianPosition, state: RobotState, T_flange
     implied = (T_base_flange.inverse() @ as_pose(command.T_base_tool)).position
     if float(np.linalg.norm(implied)) > _LONGEST_TOOL:
         return ""
-    places = np.round(1e3 * np.array((implied, T_flange_tool.position)), 1) + 0.0  # No minus sign before zero.
-    theirs, ours = (", ".join(map(str, place)) for place in places.tolist())
+    positions = np.round(1e3 * np.array((implied, T_flange_tool.position)), 1) + 0.0  # No minus sign before zero.
+    theirs, ours = (", ".join(map(str, position)) for position in positions.tolist())
     return (
         f". If it was computed at the arm's present angles, then with a tool at ({theirs}) mm in the flange, but the "
         f"controller has one at ({ours}) mm: robot.model has the controller's tool, robot.set_tool sets another"

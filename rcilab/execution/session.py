@@ -91,9 +91,9 @@ def connect(
     """Returns a session with the robot at an address. Nothing moves and no motor is switched.
 
     Tool and load are settings of the controller, which change what the arm does: they are sent only with `apply`.
-    Without it a warning says in one sentence what differs from the model. The tool is known from the state. The load is
-    not: it is compared by the torques at standstill, which show 2 kg in most poses and may not show 0.5 kg; if they
-    cannot show the model's load, the warning says so.
+    Without it a warning reports in one sentence what differs from the model. The tool is known from the state. The load
+    is not: it is compared by the torques at standstill, which show 2 kg in most poses and may not show 0.5 kg; if they
+    cannot show the model's load, the warning reports that.
 
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,

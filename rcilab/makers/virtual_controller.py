@@ -26,7 +26,7 @@ def build_virtual_controller(
         log: Takes the entries of its log, and must not wait; None: a thread writes them to stderr.
 
     Raises:
-        InvalidValueError: The set-up of the arm is not valid.
+        InvalidValueError: The configuration of the arm is not valid.
         ModelError: The configuration names no known arm, or one without a virtual controller.
         UsageError: An address or port cannot be used.
     """

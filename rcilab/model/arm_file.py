@@ -1,4 +1,4 @@
-"""The file of one arm: what its controller says of it, in JSON, for `load_model("my_arm.json")`.
+"""The file of one arm: the controller's description of it, in JSON, for `load_model("my_arm.json")`.
 
     {"format": "rcilab arm", "version": 1, "model": "xMatePro7", "source": "LoadRobotModel of rci://...",
      "dh": [[a, alpha, d, theta], ...], "links": [{"mass", "center_of_mass", "inertia"}, ...],

@@ -78,7 +78,7 @@ def check_client(run: Run) -> Report:
 
 
 def _check(run: Run) -> tuple[Report | None, str]:
-    """Returns the check, or why there is none."""
+    """Returns the check, or the reason why it is missing."""
     if len(run.cycles) < 2:
         return None, "; too short for a check"
     try:

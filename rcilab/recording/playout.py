@@ -40,7 +40,7 @@ def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> Jo
     return q[rows[0] :]
 
 
-def judged_joints(cycles: NDArray[np.void]) -> JointPath:
+def checked_joints(cycles: NDArray[np.void]) -> JointPath:
     """Returns the joint angles up to the last played command, or a refused one, shape (M, n), [rad].
 
     Args:

@@ -16,7 +16,7 @@ from rcilab.core.state import COMPLIANT_MODES
 from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
-from rcilab.recording.playout import judged_joints, played_commands
+from rcilab.recording.playout import checked_joints, played_commands
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
@@ -40,7 +40,7 @@ def sent_motion(run: Run) -> Motion:
     rows = run.cycles
     is_played = "played" in (rows.dtype.names or ())
     if np.isfinite(rows["command_pose"]).any():
-        return Motion.from_cycles(judged_joints(rows)) if is_played else run.commanded()
+        return Motion.from_cycles(checked_joints(rows)) if is_played else run.commanded()
     period = 1 if is_played else state_cycles(rows)
     index, q = _played_angles(rows) if is_played else _sent_angles(rows, period)
     if not len(q):
@@ -65,11 +65,11 @@ def _played_angles(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], JointPat
     """Returns the played joint angles, up to refused ones, with the numbers of their cycles, from 0."""
     rows, sources = played_commands(cycles)
     q = cycles["command"][sources]
-    is_judged = np.isfinite(q).all(axis=1)
+    is_checked = np.isfinite(q).all(axis=1)
     faulty = np.flatnonzero(cycles["faults"])
     if faulty.size:
-        is_judged &= rows <= faulty[0]
-    rows, q = rows[is_judged], q[is_judged]
+        is_checked &= rows <= faulty[0]
+    rows, q = rows[is_checked], q[is_checked]
     return rows - rows[0] if rows.size else rows, q
 
 
@@ -96,13 +96,13 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
 def start_of(run: Run) -> JointVector | None:
     """Returns the commanded joint angles before the first command, shape (n,), [rad]; None where they do not bind it.
 
-    A compliant arm rests beside its last command, and a controller absorbs the offset of the next first one.
+    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one.
     """
     return None if run.truncated or run.setup.mode in COMPLIANT_MODES else run.q_c[0]
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
-    """Returns a motion whose last row still moves, continued by a stop; one that ends at rest as it is.
+    """Returns a motion whose last row still moves, continued by a stop; one that ends at standstill as it is.
 
     A check holds the arm at the last row. A client whose motion ended early did not command the jump of such an end,
     and a controller stops the arm smoothly after the last command of a program that ends moving a little. Joints stop
@@ -125,7 +125,7 @@ def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
 
 
 def _fade_out(dq: Array, ddq: Array) -> JointPath:
-    """Returns the way of every cycle until standstill; velocity and acceleration continue and vanish smoothly."""
+    """Returns the displacement in every cycle until standstill; velocity and acceleration vanish smoothly."""
     s = CYCLE_TIME * np.arange(1, round(_FADE_TIME / CYCLE_TIME) + 1)[:, np.newaxis]
     u = s / _FADE_TIME
     velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3

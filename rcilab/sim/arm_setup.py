@@ -1,4 +1,4 @@
-"""The set-up of an arm: where it stands, and the settings of its teach pendant, which a client finds at power-up."""
+"""The configuration of an arm: its joint angles and the settings of its teach pendant, as at power-up."""
 
 from __future__ import annotations
 

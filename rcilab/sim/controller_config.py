@@ -153,7 +153,7 @@ class ControllerConfig:
             )
 
     def setup(self, home: Floats) -> ArmSetup | None:
-        """Returns the set-up of the arm; None if it is that after delivery.
+        """Returns the configuration of the arm; None if it is that after delivery.
 
         Args:
             home: Joint angles for `start` of None, so that they are checked, too, shape (n,), [rad].

@@ -3,8 +3,7 @@
 A row is written when the state of its cycle is sent; the command that answers it is added when it arrives. A client
 that received no state in time, or old ones again, repeats numbers (see `jitter_buffer`): such a command is added to the
 next row without one, also to one that is yet to come.
-The rows of a motion have its number; two events, `begin` and `end`, say whose motion it was, with which settings, and
-how it ended.
+The rows of a motion have its number; two events, `begin` and `end`, have its client, its settings and its end.
 """
 
 from __future__ import annotations
@@ -139,7 +138,7 @@ class CycleCapture:
         return True
 
     def _find_answer(self, mode: MotionMode) -> tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]:
-        """Returns how a command of this mode is stored: the packer, its place in a row, and its numbers."""
+        """Returns how a command of this mode is stored: the packer, its offset in a row, and its numbers."""
         joints = struct.Struct(f"<{self._ring.n}d").pack_into
         if mode.law is ControlLaw.TORQUE:
             return joints, self._offsets["command_tau"], attrgetter("tau")

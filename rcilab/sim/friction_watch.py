@@ -1,6 +1,6 @@
 """What friction does to a compliant arm: whether it holds the arm off its command, and whether a joint rings.
 
-Both are seen on the moving arm, not predicted. A compliant arm at rest is held by friction if the torques of its
+Both are seen on the moving arm, not predicted. A stationary compliant arm is held by friction if the torques of its
 springs are not zero, but smaller than the friction. A joint rings if its velocity swings many times in a row, quickly.
 """
 
@@ -18,7 +18,7 @@ from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.plant import Measurement, Setpoint
 from rcilab.sim.tool_kinematics import ToolKinematics
 
-_REST = 0.01  # [rad/s] Below it a joint that friction holds is at rest; a tuning value.
+_STILL = 0.01  # [rad/s] Below it a joint that friction holds is stationary; a tuning value.
 _SLACK = 1.1  # Between the friction and the torque that it holds; noise and the creep of simulated friction.
 _SMALLEST_ANGLE = 5e-4  # [rad] Smaller deviations are not worth a warning.
 _SMALLEST_DISTANCE = 5e-4  # [m]
@@ -52,7 +52,7 @@ class FrictionWatch:
             joint.step(dq)
 
     def conclude(self, parameters: ArmParameters) -> list[str]:
-        """Returns what there is to say about the motion that has ended, as sentences, and forgets it."""
+        """Returns the findings about the motion that has ended, as sentences, and drops its data."""
         law = self._law
         if law is None:
             return []
@@ -67,8 +67,8 @@ class FrictionWatch:
 
     def _is_held(self) -> bool:
         tau = np.abs(self._setpoint.tau if self._setpoint.tau is not None else 0.0)
-        is_at_rest = float(np.abs(self._measured.dq).max()) < _REST
-        return is_at_rest and bool((tau <= _SLACK * np.array(self._friction)).all())
+        is_still = float(np.abs(self._measured.dq).max()) < _STILL
+        return is_still and bool((tau <= _SLACK * np.array(self._friction)).all())
 
     def _describe_joint(self, parameters: ArmParameters) -> str | None:
         off = np.abs(np.array(self._setpoint.q) - self._measured.q)

@@ -29,7 +29,7 @@ class LogEntry:
     wall: float
     """Time of day, [s] since the epoch."""
     facts: Mapping[str, object] = field(default_factory=dict[str, object])
-    """Numbers and words of the text by name, such as the request, its status and the phase."""
+    """Numbers and names in the text, by key, such as the request, its status and the phase."""
 
     @property
     def t(self) -> float:

@@ -109,7 +109,7 @@ class ControllerLog:
         Args:
             kind: One of `KINDS`.
             text: One sentence.
-            facts: Its numbers and words.
+            facts: Its numbers and names.
         """
         self.write_counts()
         seen = self._periods.setdefault(kind, _Period(self._clock() + _PERIOD))

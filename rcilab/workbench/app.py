@@ -138,7 +138,7 @@ class Workbench:
         """Serves the page, then connects to the robot in the background."""
         sys.setswitchinterval(min(sys.getswitchinterval(), _SWITCH_INTERVAL))
         ask = self.dispatcher.ask
-        # A page that watches cannot stop the motion, and says so; otherwise Stop takes the direct path.
+        # A page that watches cannot stop the motion, and shows that; otherwise Stop takes the direct path.
         stop = self.session.stop if self._config.watch is None else lambda: ask(RobotCommand(what="stop"))
         self.live = live.LiveChannel(stop, self._receive, lambda: self._guarded_server.guard.count_malformed())
         gate = AccessPolicy(host=self._config.host, port=self.port, token=self._config.token, title="this workbench")

@@ -95,7 +95,7 @@ def test_a_motion_in_progress_is_drawn_without_a_violation_at_its_end(place: Are
         assert len(plan.report.usage().ratio) == len(plan.motion.q)  # The scene colours the path by it.
 
 
-def test_a_refused_command_is_drawn_and_said(place: Arena, watching) -> None:
+def test_a_refused_command_is_drawn_and_reported(place: Arena, watching) -> None:
     store, actions, controller = watching
     with place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)

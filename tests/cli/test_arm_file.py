@@ -1,4 +1,4 @@
-"""The set-up file of an arm: everything in it, what takes precedence, and one sentence for what is wrong."""
+"""The configuration file of an arm: everything in it, what takes precedence, and one sentence for what is wrong."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def test_every_option_of_an_arm_and_its_controller_can_be_in_the_file_and_is_doc
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "expected"),
     [
         ("[arm]\nmodell = 1", "my_arm.toml: [arm]: 'modell' is unknown; known: model, start, di"),
         ("[robot]\nmodel = 'xMate3'", "my_arm.toml: '[robot]' is unknown; known: arm, tool, load"),
@@ -169,17 +169,17 @@ def test_every_option_of_an_arm_and_its_controller_can_be_in_the_file_and_is_doc
         ("#" * 200_000, "has 200000 bytes; at most 100000 are expected"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Path, text: str, words: str) -> None:
+def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "my_arm.toml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InvalidValueError) as raised:
         read_arm_file(path)
-    assert words in str(raised.value)
+    assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "changed", "words"),
+    ("arguments", "changed", "expected"),
     [
         ([], ("prefill = 20", "prefill = 200"), "my_arm.toml: [controller] prefill needs 0 to 100 cycles, got 200"),
         (["--prefill", "200"], ("", ""), "--prefill needs 0 to 100 cycles, got 200"),
@@ -195,17 +195,19 @@ def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Pat
         ([], ('plant = "mujoco"', 'plant = "clay"'), "my_arm.toml: [controller] plant: 'clay' is unknown"),
     ],
 )
-def test_a_value_that_cannot_be_names_its_option_or_its_place(
-    file: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], changed: tuple[str, str], words: str
+def test_a_value_that_cannot_be_names_its_option_or_its_key(
+    file: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], changed: tuple[str, str], expected: str
 ) -> None:
     file.write_text(FULL.replace(*changed, 1) if changed[0] else FULL, encoding="utf-8")
     assert main(["controller", str(file), *arguments]) == 2
     shown = capsys.readouterr().err
-    assert words in shown
+    assert expected in shown
     assert shown.count("\n") == 1
 
 
-def test_a_controller_without_an_arm_says_how_to_name_one(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_controller_without_an_arm_explains_how_to_name_one(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     assert main(["controller"]) == 2
     assert "add --model NAME" in capsys.readouterr().err
     assert main(["controller", str(tmp_path / "none.toml")]) == 2

@@ -44,7 +44,7 @@ def test_soft_limits_have_a_range_for_each_joint() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parse", "text", "words"),
+    ("parse", "text", "expected"),
     [
         (lambda text: parse_joints(text, 7), "0,30", "with 7 joint angles"),
         (lambda text: parse_joints(text, 2), "0,x", "--start: '0,x' is not of the form"),
@@ -65,9 +65,9 @@ def test_soft_limits_have_a_range_for_each_joint() -> None:
         (lambda text: parse_soft_limits(text, 1), "1:-1", "empty range 1:-1 for joint 1"),
     ],
 )
-def test_bad_text_is_explained_in_one_sentence(parse, text: str, words: str) -> None:
+def test_bad_text_is_explained_in_one_sentence(parse, text: str, expected: str) -> None:
     with pytest.raises(InvalidValueError) as raised:
         parse(text)
     message = str(raised.value)
-    assert words in message
+    assert expected in message
     assert "\n" not in message

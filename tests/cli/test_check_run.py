@@ -114,7 +114,7 @@ def test_a_run_of_torques_is_checked_by_the_torques_that_were_sent(tmp_path, cap
     assert "torques cannot be slowed down" in capsys.readouterr().err
 
 
-def test_why_a_run_ended_early_is_told_with_its_report(tmp_path, capsys):
+def test_why_a_run_ended_early_is_in_its_report(tmp_path, capsys):
     some_run(stopped="on request").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun")]) == 0
     assert "the run ended early: on request" in capsys.readouterr().out

@@ -252,7 +252,7 @@ def test_bad_input_is_one_line_and_exit_code_two(motion_file, capsys):
     assert "teach pendant" in lines[0]
 
 
-def test_tool_load_and_box_of_a_program_are_told_and_sent_with_apply(tmp_path, capsys):
+def test_tool_load_and_box_of_a_program_are_reported_and_sent_with_apply(tmp_path, capsys):
     controller = start_controller(MODEL.name, lockstep=True)
     file = tmp_path / "program.json"
     program = Program(
@@ -266,8 +266,8 @@ def test_tool_load_and_box_of_a_program_are_told_and_sent_with_apply(tmp_path, c
     program.save(file)
     try:
         assert main(["run", str(file), "--robot", controller.address, "--yes"]) == 0
-        told = capsys.readouterr().out
-        assert told.count("note: the tool of") == told.count("note: the load of") == 1
+        output = capsys.readouterr().out
+        assert output.count("note: the tool of") == output.count("note: the load of") == 1
         replace(program, start=tuple(GOAL), waypoints=(Waypoint.joint(MODEL.home, speed=1.0),)).save(file)
         assert main(["run", str(file), "--robot", controller.address, "--yes", "--apply"]) == 0
         assert "note:" not in capsys.readouterr().out

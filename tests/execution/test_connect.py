@@ -150,7 +150,7 @@ def test_apply_needs_a_model() -> None:
         connect("rci://127.0.0.2:9", apply=True)
 
 
-def test_a_load_that_the_torques_do_not_show_is_said_to_be_unknown(address: str) -> None:
+def test_a_load_that_the_torques_do_not_show_is_reported_as_unknown(address: str) -> None:
     light = MODEL.with_load(Payload(mass=0.5))
     with connect(address) as robot:
         state = robot.state

@@ -402,7 +402,7 @@ def test_load_and_box_come_back_from_file_and_script_and_older_files_have_none(t
 
 
 @pytest.mark.parametrize(
-    ("line", "words"),
+    ("line", "expected"),
     [
         ('"payload": [99, 0, 0, 0]', "line 2, payload: .*rated for"),
         ('"payload": [1, 0, 0]', "line 2, payload: .* needs .13,."),
@@ -411,6 +411,6 @@ def test_load_and_box_come_back_from_file_and_script_and_older_files_have_none(t
         ('"box": [1, 1, 1, 0, 0, 0, 2, 0, 0, 0]', "line 2, box wxyz: .*length 2"),
     ],
 )
-def test_a_bad_load_or_box_is_refused_with_its_line(line, words):
-    with pytest.raises(InvalidValueError, match=words):
+def test_a_bad_load_or_box_is_refused_with_its_line(line, expected):
+    with pytest.raises(InvalidValueError, match=expected):
         Program.from_json(lines(GOOD, head=f'"format": "rcilab program", "version": 1, {line}'))

@@ -85,7 +85,7 @@ PROGRAMS: dict[str, tuple[Callable[..., Any], str, slice]] = {
 
 @pytest.mark.parametrize("mode", PROGRAMS)
 def test_every_command_of_a_client_is_recorded_bit_for_bit(mode: str) -> None:
-    program, field, place_in_datagram = PROGRAMS[mode]
+    program, field, part_of_datagram = PROGRAMS[mode]
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         sent = sent_commands(robot)
@@ -94,7 +94,7 @@ def test_every_command_of_a_client_is_recorded_bit_for_bit(mode: str) -> None:
     run, end = as_run(parts), parts[-1].end
     assert (run.setup.mode, run.setup.client) == (mode, "127.0.0.1")
     answered = run.cycles[run.cycles["sent_ns"] != 0]
-    assert [row.tobytes() for row in answered[field]] == [data[place_in_datagram] for data in sent]
+    assert [row.tobytes() for row in answered[field]] == [data[part_of_datagram] for data in sent]
     assert [int.from_bytes(data[:8], "big") for data in sent] == answered["message_id"].tolist()
     assert end is not None
     assert (end.stopped, end.received, end.lost) == (None, len(sent), 0)

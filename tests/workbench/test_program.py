@@ -593,7 +593,7 @@ def test_another_name_leaves_the_plan_as_it_is(square):
     assert square.program.draft.name == "square"
 
 
-def test_load_and_box_of_a_file_survive_the_page_and_what_differs_from_setup_is_told(bench):
+def test_load_and_box_of_a_file_survive_the_page_and_what_differs_from_setup_is_shown(bench):
     box = (1.0, 1.0, 2.0, 0.4, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0)
     step = Waypoint.joint(MODEL.home + 0.1)
     payload = payload_numbers(Payload(mass=2.0))

@@ -97,7 +97,7 @@ class WatchActions:
 
 
 def draw_plan(run: Run, model: RobotModel) -> Plan:
-    """Returns the commands of a run as scene, timeline and curves draw a plan: those that the check judges.
+    """Returns the commands of a run as scene, timeline and curves draw a plan: those that are checked.
 
     They end with a refused command, and continue with a stop where they still move.
     """

@@ -77,7 +77,7 @@ def bench_watching(seconds: float = 10.0) -> Measurement | Absent:
     if (reason := why_no_page()) is not None:
         return Absent(name="watching", note=reason)
     with tempfile.TemporaryDirectory() as folder:
-        # The client of the bench has no priority beside a browser: its pauses must not end the motion.
+        # The client of the bench has no priority over a browser: its pauses must not end the motion.
         options = ("--record", folder, "--lost-limit", "0")
 
         def alone() -> tuple[Measurement, int]:

@@ -87,7 +87,7 @@ class RciController:
         state: The last reported state.
         ignored: Number of commands that arrived outside of a motion.
         safety_stop: The active safety stop.
-        on_transition: Receives the situation before and after every transition; None: nobody does.
+        on_transition: Receives the situation before and after every transition; None: no receiver.
 
     Args:
         arm: The arm after power-up.

@@ -78,7 +78,7 @@ class Settings(ArmParameters):
 
 
 def apply_setup(settings: Settings, setup: ArmSetup, arm: RobotDescription) -> Settings:
-    """Returns the settings with those of a set-up, whose bounds are those of a client's requests.
+    """Returns the settings with those of a configuration, whose bounds are those of a client's requests.
 
     Raises:
         InvalidValueError: A value is out of its bounds; it names the part and the value.

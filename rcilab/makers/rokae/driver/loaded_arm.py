@@ -1,4 +1,4 @@
-"""What a controller says of its arm in the answer to LoadRobotModel, as a model, compared with the maker's table.
+"""An arm as its controller describes it in the answer to LoadRobotModel, as a model, compared with the maker's table.
 
 The answer has the Denavit-Hartenberg table, 43 base parameters and three friction coefficients per joint. Base
 parameters determine the torques and not the inertias of single links. Here the inertias of the table are changed by the
@@ -62,7 +62,7 @@ class LoadedArm:
     differences: tuple[Difference, ...]
     """Every number that differs from the table, by joint."""
     notes: tuple[str, ...]
-    """What the controller does not say, or says in a way that could not be used."""
+    """What the controller does not report, or reports in a form that could not be used."""
     source: str
     """Where it comes from."""
 
@@ -78,7 +78,7 @@ class LoadedArm:
         """Returns the comparison in one sentence."""
         name = self.model.name
         if not self.differences:
-            return f"{name}: the controller says what is in the table"
+            return f"{name}: the controller reports what is in the table"
         lengths = [entry for entry in self.differences if entry.unit == "mm"]
         parts = [f"{len(self.differences)} numbers differ from the table"]
         if lengths:
@@ -92,7 +92,7 @@ class LoadedArm:
             ours, theirs = (RobotModel(arm).torque(home).gravity for arm in (self.model.description, nominal))
             joint = int(np.abs(ours - theirs).argmax())
             parts.append(
-                f"gravity torque at home most at joint {joint + 1}, {ours[joint]:.2f} N m in place of "
+                f"gravity torque at home most at joint {joint + 1}, {ours[joint]:.2f} N m instead of "
                 f"{theirs[joint]:.2f} N m"
             )
         return f"{name}: {'; '.join(parts)}"

@@ -45,7 +45,7 @@ class RciSessionCommands(RciCommands):
         self._lock = lock
 
     def load_robot_model(self) -> LoadedArm:
-        """Returns what the controller says of its arm (LoadRobotModel), as a model that can be saved, and compared.
+        """Returns the arm as its controller describes it (LoadRobotModel), as a model that can be saved, and compared.
 
         The model has the session's tool and load; limits and names are those of the table. It is for your computations
         and for `connect(address, model)`; this session keeps its own model.

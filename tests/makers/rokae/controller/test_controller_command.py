@@ -95,7 +95,7 @@ def test_the_faults_of_the_command_line_are_in_force() -> None:
     assert status.stalls == 1
 
 
-def test_the_arm_starts_where_the_command_line_and_the_file_say(tmp_path: Path) -> None:
+def test_the_arm_starts_where_the_command_line_and_the_file_put_it(tmp_path: Path) -> None:
     file = tmp_path / "my_arm.toml"
     file.write_text('[arm]\nmodel = "xMate3"\nstart = "0,30,60,0,90,10deg"\n[controller]\nport = 0\n', encoding="utf-8")
     with controller(str(file)) as process:

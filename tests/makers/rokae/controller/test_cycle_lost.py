@@ -167,7 +167,7 @@ def test_a_cycle_that_nobody_sees_is_no_gap_for_the_client(make_hand) -> None:
 
 
 @both
-def test_a_client_that_jumps_behind_a_gap_is_told_so(make_hand, on_loss) -> None:
+def test_a_client_that_jumps_after_a_pause_learns_why(make_hand, on_loss) -> None:
     hand = make_hand(prefill=4, on_loss=on_loss)
     hand.start()
     rows = hand.swing(1, 1.0, 0.4)

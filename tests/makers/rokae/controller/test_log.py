@@ -174,7 +174,7 @@ def test_an_address_of_another_machine_may_be_the_client_s_second_one() -> None:
     assert "unless that is another address of its machine, it receives none" in text
 
 
-def test_local_addresses_and_their_receivers_are_told_apart() -> None:
+def test_local_addresses_and_their_receivers_are_distinguished() -> None:
     assert local_delivery.is_local_address("127.0.0.3")
     assert not local_delivery.is_local_address("192.0.2.7")
     with bind_udp(0, "127.0.0.3") as udp:

@@ -1,4 +1,4 @@
-"""`--realism real`: friction, noise and steps of a recorded xMatePro3, and what the log says of their effect."""
+"""`--realism real`: friction, noise and steps of a recorded xMatePro3, and the log of their effect."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_friction_holds_a_soft_joint_off_its_command_and_the_warning_is_true(sti
     assert f"a stiffness of {stiffness:g} N m/rad ends up to {bound[joint]:.2g} deg off" in warning
 
 
-def test_a_soft_tool_is_said_to_be_held_by_friction() -> None:
+def test_a_soft_tool_that_friction_holds_is_reported() -> None:
     hand = real_hand()
     hand.ask(rci.SetCartesianImpedance((500.0,) * 3 + (50.0,) * 3))
     hand.start(3, 2)
@@ -119,7 +119,7 @@ def test_a_soft_tool_is_said_to_be_held_by_friction() -> None:
     assert f"the tool ended {1e3 * off:.2g} mm" in warning
 
 
-def test_without_friction_nothing_is_said() -> None:
+def test_without_friction_nothing_is_reported() -> None:
     hand = real_hand("off")
     hand.ask(rci.SetJointImpedance((100.0,) * 7))
     hand.start(2, 1)
@@ -132,17 +132,17 @@ def drive_by_torques(hand: Hand, damping: float) -> list[str]:
     hand.start(4, 0)
     stiffness = np.array([600.0, 600.0, 600.0, 600.0, 250.0, 150.0, 50.0])
     dampers = np.array([50.0, 50.0, damping, 50.0, 5.0, 5.0, 0.5])
-    start, on_the_way = hand.state.q, deque([np.zeros(7)] * 2)
+    start, delayed = hand.state.q, deque([np.zeros(7)] * 2)
     for k in range(1500):
         goal = start + 0.3 * smooth(min(k / 600.0, 1.0))
-        on_the_way.append(stiffness * (goal - hand.state.q) - dampers * hand.state.dq)
-        if hand.torque(on_the_way.popleft().tolist()).faults:
+        delayed.append(stiffness * (goal - hand.state.q) - dampers * hand.state.dq)
+        if hand.torque(delayed.popleft().tolist()).faults:
             break
     hand.ask(rci.StopMove())
     return hand.cycle.arm.warnings
 
 
-def test_a_gain_that_rings_with_friction_and_not_without_is_told_with_joint_frequency_and_amplitude() -> None:
+def test_a_gain_that_rings_with_friction_is_reported_with_joint_frequency_and_amplitude() -> None:
     assert drive_by_torques(real_hand("off"), 28.0) == []
     assert drive_by_torques(real_hand(), 15.0) == []
     warnings = drive_by_torques(real_hand(), 28.0)

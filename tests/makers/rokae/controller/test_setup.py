@@ -1,4 +1,4 @@
-"""The set-up of an arm, at power-up and from the simulation port: where it stands, and what its teach pendant holds."""
+"""The configuration of an arm, at power-up and from the simulation port: joint angles and teach pendant."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ LOW = SafetyBox(size=(2.0, 2.0, 0.5), T_base_box=Pose((0.0, 0.0, 1.2)))
 
 
 @pytest.mark.parametrize(
-    ("setup", "words"),
+    ("setup", "expected"),
     [
         ({"start": (0.0,) * 6}, "joint angles: (0.0, 0.0, 0.0, 0.0, 0.0, 0.0) has shape (6,), needs (7,)"),
         ({"start": (0.0, 2.5, *[0.0] * 5)}, "joint 2 at 143.239 deg is outside its range of -120 to 120 deg"),
@@ -90,10 +90,10 @@ LOW = SafetyBox(size=(2.0, 2.0, 0.5), T_base_box=Pose((0.0, 0.0, 1.2)))
         ({"inputs": (6,)}, "digital input"),
     ],
 )
-def test_a_set_up_that_cannot_be_is_one_sentence(setup: dict[str, object], words: str) -> None:
+def test_a_configuration_that_is_not_valid_is_one_sentence(setup: dict[str, object], expected: str) -> None:
     with pytest.raises(InvalidValueError) as raised:
         build_virtual_controller(ControllerConfig(model="xMatePro7", port=0, **setup))  # type: ignore[arg-type]
-    assert words in str(raised.value)
+    assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
 
 

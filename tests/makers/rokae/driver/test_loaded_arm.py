@@ -1,4 +1,4 @@
-"""What LoadRobotModel says of an arm: as a model, compared with the table, and as a file."""
+"""The description of an arm from LoadRobotModel: as a model, compared with the table, and as a file."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_the_inverse_of_a_calibrated_arm_reaches_its_poses(name: str) -> None:
     assert rcilab.check(motion, arm, mode="cartesian_position").ok
 
 
-def test_what_differs_is_told_by_joint_and_parameter_with_its_amount() -> None:
+def test_what_differs_is_listed_by_joint_and_parameter_with_its_amount() -> None:
     response = with_friction(model_response(TABLE))
     dh, numbers = list(response.dh), list(response.dynamics_with_friction)
     dh[4 * 2 + 2] += 0.52
@@ -137,7 +137,7 @@ def test_what_differs_is_told_by_joint_and_parameter_with_its_amount() -> None:
     assert any("with and without friction differ" in note for note in loaded.notes)
 
 
-def test_another_arm_another_zero_and_what_is_not_served_are_said() -> None:
+def test_another_arm_another_zero_and_what_is_not_served_are_reported() -> None:
     far = list(model_response(TABLE).dh)
     far[2] += 20.0
     with pytest.raises(ModelError, match=r"d of joint 1 is 424 mm at the controller .* another arm"):
@@ -200,7 +200,7 @@ def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "expected"),
     [
         ({"format": "x"}, 'has no "format": "rcilab arm"'),
         ({"dh": [[0, 0, 0, 0]]}, "dh.* must be a list of 7 entries"),
@@ -209,11 +209,11 @@ def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path)
         ({"friction": {"viscous": [0.0] * 6, "coulomb": [0.0] * 7, "offset": [0.0] * 7}}, "viscous.* needs .7,"),
     ],
 )
-def test_a_file_that_is_none_is_refused_in_one_sentence(tmp_path: Path, change: dict, words: str) -> None:
+def test_a_file_that_is_not_valid_is_refused_in_one_sentence(tmp_path: Path, change: dict, expected: str) -> None:
     file = tmp_path / "a.json"
     build_loaded_arm(model_response(TABLE), TABLE, "x", MODEL).save(file)
     file.write_text(json.dumps({**json.loads(file.read_text()), **change}))
-    with pytest.raises(InvalidValueError, match=words) as raised:
+    with pytest.raises(InvalidValueError, match=expected) as raised:
         load_model(str(file))
     assert "\n" not in str(raised.value)
 
