@@ -6,7 +6,7 @@ import argparse
 import os
 import signal
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from rcilab.cli.arm_options import (
     parse_tool,
 )
 from rcilab.cli.output import print_interruptibly
+from rcilab.cli.signal_handlers import Handler, handled_signals
 
 if TYPE_CHECKING:
     from rcilab.core.errors import InvalidValueError
@@ -235,19 +236,13 @@ def run(args: argparse.Namespace) -> int:
         server = build_virtual_controller(_config({**file.options, **given}))
     except InvalidValueError as error:
         raise _with_option_name(error, given, file.keys) from error
-    signal.signal(signal.SIGTERM, lambda *_: server.request_stop())
-    if "exit_with_parent" not in given:
-        signal.signal(signal.SIGINT, lambda *_: server.request_stop())
-    else:  # The parent handles interrupts; VS Code sends the interrupt of a kernel to all its child processes.
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handlers: dict[int, Handler] = dict.fromkeys((signal.SIGINT, signal.SIGTERM), lambda *_: server.request_stop())
+    if "exit_with_parent" in given:  # It handles interrupts; VS Code sends that of a kernel to all its child processes.
+        handlers[signal.SIGINT] = signal.SIG_IGN
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
-
-    try:
-        with _recording(given.get("record"), server):
-            server.run(lambda: print_interruptibly(f"{server.description}{world}"))
-    finally:
-        server.close()
+    with handled_signals(handlers), closing(server), _recording(given.get("record"), server):
+        server.run(lambda: print_interruptibly(f"{server.description}{world}"))
     return 0
 
 

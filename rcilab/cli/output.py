@@ -12,6 +12,7 @@ from contextlib import suppress
 from types import FrameType
 from typing import TextIO
 
+from rcilab.cli.signal_handlers import handled_signals
 from rcilab.core.errors import plain_text
 
 _UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EFBIG, errno.EBADF}
@@ -79,14 +80,9 @@ def print_interruptibly(line: str, stream: TextIO | None = None) -> None:
     found = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     handlers = {int(number): handler for number, handler in found.items() if callable(handler)}
     try:
-        try:
-            for number in handlers:
-                signal.signal(number, on_signal)
+        with handled_signals(dict.fromkeys(handlers, on_signal)):
             target.write(f"{line}\n")
             target.flush()
-        finally:
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
     except _InterruptedWriteError:
         drop_unread_output()
 

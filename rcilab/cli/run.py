@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import drop_output, drop_unread_output, show
+from rcilab.cli.signal_handlers import handled_signals
 from rcilab.core.errors import (
     ControlError,
     InvalidValueError,
@@ -146,12 +147,8 @@ def _stopping_on_signals() -> Iterator[_Stopper]:
     if threading.current_thread() is not threading.main_thread():  # Only the main thread can handle signals.
         yield stopper
         return
-    before = {number: signal.signal(number, stopper.on_signal) for number in _STOP_SIGNALS}
-    try:
+    with handled_signals(dict.fromkeys(_STOP_SIGNALS, stopper.on_signal)):
         yield stopper
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:

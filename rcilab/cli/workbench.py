@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcilab.cli.output import print_interruptibly
+from rcilab.cli.signal_handlers import Handler, handled_signals
 from rcilab.core.errors import UsageError
 from rcilab.core.memory import OUT_OF_MEMORY, is_out_of_memory
 
@@ -114,9 +115,8 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     from rcilab.workbench.app import Workbench
 
     ending = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ending.set())
-    with _ended_by_memory_error(ending), Workbench(config) as bench:
+    handlers: dict[int, Handler] = dict.fromkeys((signal.SIGINT, signal.SIGTERM), lambda *_: ending.set())
+    with handled_signals(handlers), _ended_by_memory_error(ending), Workbench(config) as bench:
         is_secret = config.token is not None and not sys.stdout.isatty()
         address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
         print_interruptibly(f"rcilab workbench: {address}  (Ctrl-C ends it)")

@@ -49,6 +49,8 @@ def test_the_arm_goes_on_without_the_recorder(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     assert main(["controller", "--model", "xMatePro7", "--port", "0", "--record", str(tmp_path / "file" / "x")]) == 2
     assert "--record" in (line := capsys.readouterr().err)
     assert "is not a folder that can be written to: Not a directory" in line
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
