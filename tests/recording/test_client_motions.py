@@ -38,6 +38,20 @@ def watched(**options: Any) -> Iterator[tuple[Arena, ClientMotions]]:
         yield place, ClientMotions(CycleRing.attach(os.getpid(), place.server.ring.descriptor))
 
 
+def record_two_motions(folder: Path, program: Callable[..., Any]) -> list[str]:
+    """Records a preparing motion and a program of a peer; returns the lines for the log."""
+    lines: list[str] = []
+    with arena(is_recorded=True) as place:
+        assert place.server.ring is not None
+        recorder = ClientRecorder(folder, place.server.ring, lambda kind, text: lines.append(text))
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=1.0)
+            program(robot, SECONDS, period=SECONDS)
+            assert not any(state.errors for state in robot.states)
+        wait_for(lambda: (recorder.poll(), len(lines) == 2)[1])
+    return lines
+
+
 def collect(motions: ClientMotions, count: int) -> list[list[MotionPart]]:
     """The parts of the next motions that end, one list a motion."""
     found: list[list[MotionPart]] = [[]]
@@ -57,6 +71,15 @@ def as_run(parts: list[MotionPart]) -> Run:
     motion = parts[0].motion
     cycles = np.concatenate([part.cycles for part in parts])
     return build_run(cycles, plan=None, model=motion.model, setup=motion.setup, realtime=False)
+
+
+def start_moving(robot: Robot) -> wire.State:
+    """Starts a joint motion; returns the first state that is to be answered."""
+    robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+    state = robot.receive_fresh_state()
+    while state.robot_mode != wire.ROBOT_MOVE:
+        state = robot.receive_fresh_state()
+    return state
 
 
 def sent_commands(robot: Robot) -> list[bytes]:
@@ -151,10 +174,7 @@ def test_a_motion_right_after_another_keeps_its_first_command() -> None:
     """The end of a motion is read before the client has answered the first state of the next one."""
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
-        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
-        state = robot.receive_fresh_state()
-        while state.robot_mode != wire.ROBOT_MOVE:
-            state = robot.receive_fresh_state()
+        state = start_moving(robot)
         (first,) = collect(motions, 1)
         assert first[-1].end is not None
         for _ in range(20):
@@ -207,10 +227,7 @@ def test_duplicates_do_not_displace_other_commands() -> None:
     """Of a burst of old answers with doubles among them, as after the sleep of the vendor's client."""
     with watched(mode_delay=0.005) as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
-        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
-        state = robot.receive_fresh_state()
-        while state.robot_mode != wire.ROBOT_MOVE:
-            state = robot.receive_fresh_state()
+        state = start_moving(robot)
         sent = sent_commands(robot)
         start = state.q_c[:7]
         for step in (0, 0, 1, 1, 1, 2, 3, 3, 4, 5):  # Of 1 nrad, all answers to one state.
@@ -243,14 +260,7 @@ def test_tool_load_and_settings_in_force_are_recorded() -> None:
 
 
 def test_the_recorder_writes_a_run_and_a_report_for_every_motion(tmp_path: Path) -> None:
-    lines: list[str] = []
-    with arena(is_recorded=True) as place:
-        assert place.server.ring is not None
-        recorder = ClientRecorder(tmp_path, place.server.ring, lambda kind, text: lines.append(text))
-        with place.connect() as robot:
-            programs.prepare(robot, NEAR, factor=1.0)
-            programs.line(robot, SECONDS, period=SECONDS)
-        wait_for(lambda: (recorder.poll(), len(lines) == 2)[1])
+    lines = record_two_motions(tmp_path, programs.line)
     first, second = sorted(tmp_path.glob("*.rcirun"))
     run = load_run(second)
     assert run.is_complete
@@ -265,17 +275,9 @@ def test_the_recorder_writes_a_run_and_a_report_for_every_motion(tmp_path: Path)
 
 
 def test_a_folder_that_cannot_be_written_to_costs_the_run_and_not_the_motion(tmp_path: Path) -> None:
-    lines: list[str] = []
     folder = tmp_path / "gone"
     folder.write_text("a file")
-    with arena(is_recorded=True) as place:
-        assert place.server.ring is not None
-        recorder = ClientRecorder(folder, place.server.ring, lambda kind, text: lines.append(text))
-        with place.connect() as robot:
-            programs.prepare(robot, NEAR, factor=1.0)
-            programs.joint_sine(robot, SECONDS, period=SECONDS)
-            assert not any(state.errors for state in robot.states)
-        wait_for(lambda: (recorder.poll(), len(lines) == 2)[1])
+    lines = record_two_motions(folder, programs.joint_sine)
     assert all("is not recorded from here on" in line for line in lines)
 
 

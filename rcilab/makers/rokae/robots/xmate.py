@@ -14,7 +14,9 @@ import numpy as np
 
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, JointLimits, Limits
-from rcilab.robots.description import JointImperfection, Link, ServoFigures
+from rcilab.makers.rokae.conditions import rci_conditions
+from rcilab.makers.rokae.faults import Fault
+from rcilab.robots.description import DhRow, JointImperfection, Link, RobotDescription, ServoFigures
 
 MANUAL = "RCI user manual V1.3.1"
 ROS2 = "vendor's public ROS 2 description package"
@@ -54,6 +56,46 @@ _CARTESIAN_SOURCES = {
     "cartesian.rotation_stiffness": "3.1.6, setCartesianImpedance",
 }
 _SEVEN_AXIS_NOTE = "; the manual prints the 6-axis range, this one is the vendor client's for 7 axes"
+
+
+def build_xmate(
+    *,
+    name: str,
+    dh: tuple[DhRow, ...],
+    dh_source: str,
+    base: Link,
+    links: tuple[Link, ...],
+    home_deg: tuple[float, ...],
+    rated_payload: float,
+) -> RobotDescription:
+    """Returns an arm with what all xMate arms have in common.
+
+    Args:
+        name: Name of the arm.
+        dh: Denavit-Hartenberg rows, one per joint.
+        dh_source: Their source.
+        base: The base.
+        links: The links, one per joint.
+        home_deg: Joint angles of the home pose, [deg].
+        rated_payload: [kg].
+    """
+    n = len(dh)
+    return RobotDescription(
+        name=name,
+        dh=dh,
+        dh_source=dh_source,
+        base=base,
+        links=links,
+        limits=xmate_limits(n),
+        home=readonly_copy([radians(angle) for angle in home_deg]),
+        rated_payload=rated_payload,
+        rated_payload_source="range the vendor's client accepts for setLoad",
+        maker="rokae",
+        faults=Fault,
+        conditions=rci_conditions,
+        servos=xmate_servos(n),
+        imperfections=xmate_imperfections(n),
+    )
 
 
 def xmate_limits(n: int) -> Limits:

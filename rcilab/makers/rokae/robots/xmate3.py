@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
-from rcilab.core.arrays import readonly_copy
-from rcilab.makers.rokae.conditions import rci_conditions
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, tabled_link, xmate_imperfections, xmate_limits, xmate_servos
-from rcilab.robots.description import DhRow, RobotDescription
+from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, build_xmate, tabled_link
+from rcilab.robots.description import DhRow
 
 _SHOULDER = 0.3415  # [m] d1
 _ELBOW = _SHOULDER + 0.3940  # [m] + a2
 _WRIST = _ELBOW + 0.3660  # [m] + d4
 _FLANGE = _WRIST + 0.2503  # [m] + d6
 
-DESCRIPTION = RobotDescription(
+DESCRIPTION = build_xmate(
     name="xMate3",
     dh=(
         DhRow(a=0.0, alpha=-pi / 2, d=0.3415),
@@ -38,13 +35,6 @@ DESCRIPTION = RobotDescription(
         tabled_link(2.150, (-0.000072, 0.00994, 0.089188), (0.014409, 0.013858, 0.002604, -0.001650), _WRIST, ROS2),
         tabled_link(1.067, (0.000057, 0.011981, -0.048), (0.002007, 0.001376, 0.001541, -0.000169), _FLANGE, ROS2),
     ),
-    limits=xmate_limits(6),
-    home=readonly_copy([radians(angle) for angle in (0, 30, 60, 0, 90, 0)]),
+    home_deg=(0, 30, 60, 0, 90, 0),
     rated_payload=3.0,
-    rated_payload_source="range the vendor's client accepts for setLoad",
-    maker="rokae",
-    faults=Fault,
-    conditions=rci_conditions,
-    servos=xmate_servos(6),
-    imperfections=xmate_imperfections(6),
 )

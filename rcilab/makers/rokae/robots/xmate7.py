@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
-from rcilab.core.arrays import readonly_copy
-from rcilab.makers.rokae.conditions import rci_conditions
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, tabled_link, xmate_imperfections, xmate_limits, xmate_servos
-from rcilab.robots.description import DhRow, RobotDescription
+from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, build_xmate, tabled_link
+from rcilab.robots.description import DhRow
 
 _SHOULDER = 0.4040  # [m] d1
 _ELBOW = _SHOULDER + 0.4375  # [m] + a2
 _WRIST = _ELBOW + 0.4125  # [m] + d4
 _FLANGE = _WRIST + 0.2755  # [m] + d6
 
-DESCRIPTION = RobotDescription(
+DESCRIPTION = build_xmate(
     name="xMate7",
     dh=(
         DhRow(a=0.0, alpha=-pi / 2, d=0.4040),
@@ -38,13 +35,6 @@ DESCRIPTION = RobotDescription(
         tabled_link(2.192, (-0.000062, 0.013079, 0.114262), (0.017043, 0.016075, 0.003122, -0.002965), _WRIST, ROS2),
         tabled_link(0.961, (0.000574, 0.016762, -0.051921), (0.002276, 0.001504, 0.001555, -0.000282), _FLANGE, ROS2),
     ),
-    limits=xmate_limits(6),
-    home=readonly_copy([radians(angle) for angle in (0, 30, 60, 0, 90, 0)]),
+    home_deg=(0, 30, 60, 0, 90, 0),
     rated_payload=7.0,
-    rated_payload_source="range the vendor's client accepts for setLoad",
-    maker="rokae",
-    faults=Fault,
-    conditions=rci_conditions,
-    servos=xmate_servos(6),
-    imperfections=xmate_imperfections(6),
 )

@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
-from rcilab.core.arrays import readonly_copy
-from rcilab.makers.rokae.conditions import rci_conditions
-from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.robots.xmate import (
-    MANUAL,
-    ROS2,
-    pro_heights,
-    solid_link,
-    tabled_link,
-    xmate_imperfections,
-    xmate_limits,
-    xmate_servos,
-)
-from rcilab.robots.description import DhRow, RobotDescription
+from rcilab.makers.rokae.robots.xmate import MANUAL, ROS2, build_xmate, pro_heights, solid_link, tabled_link
+from rcilab.robots.description import DhRow
 
 _HEIGHTS = pro_heights(d1=0.3415, d3=0.3940, d5=0.3660, d7=0.2503)
 
-DESCRIPTION = RobotDescription(
+DESCRIPTION = build_xmate(
     name="xMatePro3",
     dh=(
         DhRow(a=0.0, alpha=-pi / 2, d=0.3415),
@@ -43,13 +31,6 @@ DESCRIPTION = RobotDescription(
         solid_link(2.18056, (0.0, 0.013, 0.099), 0.055, 0.24, _HEIGHTS[5]),
         solid_link(0.94078, (0.0, 0.011, -0.038), 0.050, 0.10, _HEIGHTS[6]),
     ),
-    limits=xmate_limits(7),
-    home=readonly_copy([radians(angle) for angle in (0, 30, 0, 60, 0, 90, 0)]),
+    home_deg=(0, 30, 0, 60, 0, 90, 0),
     rated_payload=3.0,
-    rated_payload_source="range the vendor's client accepts for setLoad",
-    maker="rokae",
-    faults=Fault,
-    conditions=rci_conditions,
-    servos=xmate_servos(7),
-    imperfections=xmate_imperfections(7),
 )
