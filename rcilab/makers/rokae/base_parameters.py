@@ -38,6 +38,14 @@ def base_parameters(arm: RobotDescription) -> Array:
     return np.asarray(np.linalg.lstsq(equations, torques, rcond=None)[0], dtype=np.float64)
 
 
+@lru_cache(maxsize=4)
+def regrouping(arm: RobotDescription) -> Array:
+    """Returns the matrix that gives the base parameters of an arm from all parameters of its links, shape (43, 70)."""
+    model, states = RobotModel(arm), random_states(arm.n)
+    equations = np.concatenate([full_regressor(model, *state) for state in states])
+    return np.asarray(np.linalg.lstsq(equations[:, COLUMNS], equations, rcond=None)[0], dtype=np.float64)
+
+
 def random_states(n: int) -> list[tuple[JointVector, JointVector, JointVector]]:
     """Returns joint angles, velocities and accelerations that excite all parameters, the same in every call."""
     random = np.random.default_rng(7)
@@ -93,11 +101,3 @@ def _tensor_times(v: Array) -> Array:
     """Returns the matrix that gives I @ v from (Ixx, Ixy, Ixz, Iyy, Iyz, Izz), shape (3, 6)."""
     x, y, z = v
     return np.array([[x, y, z, 0.0, 0.0, 0.0], [0.0, x, 0.0, y, z, 0.0], [0.0, 0.0, x, 0.0, y, z]])
-
-
-@lru_cache(maxsize=4)
-def regrouping(arm: RobotDescription) -> Array:
-    """Returns the matrix that gives the base parameters of an arm from all parameters of its links, shape (43, 70)."""
-    model, states = RobotModel(arm), random_states(arm.n)
-    equations = np.concatenate([full_regressor(model, *state) for state in states])
-    return np.asarray(np.linalg.lstsq(equations[:, COLUMNS], equations, rcond=None)[0], dtype=np.float64)
