@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from rcilab.cli.arm_options import parse_angles, parse_lengths
+from rcilab.cli.arm_options import parse_angles, parse_lengths, parse_mass
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
@@ -20,7 +20,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_joints
 
-_LARGEST = 100_000  # [bytes]
+_LARGEST = 10_000  # [bytes] Ten times a full set-up file; of the worst content, 40 000 bytes take 5 s to parse.
 _LARGEST_NUMBER = 2**31
 _Read = Callable[[Any, str], object]
 
@@ -82,6 +82,10 @@ def _text(value: Any, name: str) -> str:
     return value
 
 
+def _folder(value: Any, name: str) -> Path:
+    return Path(_text(value, name))
+
+
 def _whole(value: Any, name: str) -> int:
     return as_integer(value, name, 0, _LARGEST_NUMBER)
 
@@ -103,7 +107,7 @@ def _turns(value: Any, name: str) -> tuple[float, ...]:
 
 
 def _mass(value: Any, name: str) -> float:
-    return as_float(value, name, "kg")
+    return parse_mass(value, name) if isinstance(value, str) else as_float(value, name, "kg")
 
 
 def _inertia(value: Any, name: str) -> tuple[float, ...]:
@@ -142,6 +146,7 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "world_port": _whole,
         "no_world": as_flag,
         "log_format": _text,
+        "record": _folder,
     },
 }
 """Every key of a configuration file and the reader of its value. Without a unit, numbers are in SI units."""

@@ -101,6 +101,16 @@ def parse_lengths(text: str, option: str) -> tuple[float, ...]:
     return _quantities(text, text.split(","), 3, _LENGTH, option, "X,Y,Z[mm]")
 
 
+def parse_mass(text: str, option: str) -> float:
+    """Parses a mass, such as `2000g`, [kg]; `option` is its name in errors.
+
+    Raises:
+        InvalidValueError: The text is not valid.
+    """
+    (mass,) = _quantities(text, [text], 1, _MASS, option, "MASS[g]")
+    return mass
+
+
 def parse_tool(text: str, option: str = "--tool") -> Pose:
     """Parses the pose of a tool in the flange frame, such as `0,0,120mm,0,0,90deg`.
 

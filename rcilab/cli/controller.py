@@ -58,7 +58,7 @@ the command line take precedence over it. Numbers are in SI units; a text is as 
   lower = "-160,-110,-160,-110,-160,-110,-350deg"
   upper = "160,110,160,110,160,110,350deg"
   [controller]
-  plant = "mujoco"                  # every option of the first list, with _ for -
+  plant = "mujoco"                  # every option of the first list but --model, with _ for -
   mode_delay = 0.2
 """
 
@@ -232,18 +232,22 @@ def run(args: argparse.Namespace) -> int:
 
     given = vars(args)
     file = ArmFile({}, {}) if args.file is None else read_arm_file(args.file)
+    options = {**file.options, **given}
     try:
-        server = build_virtual_controller(_config({**file.options, **given}))
+        _serve(build_virtual_controller(_config(options)), options)
     except InvalidValueError as error:
         raise _with_option_name(error, given, file.keys) from error
+    return 0
+
+
+def _serve(server: ArmServer, options: Mapping[str, Any]) -> None:
     handlers: dict[int, Handler] = dict.fromkeys((signal.SIGINT, signal.SIGTERM), lambda *_: server.request_stop())
-    if "exit_with_parent" in given:  # It handles interrupts; VS Code sends that of a kernel to all its child processes.
+    if "exit_with_parent" in options:  # It handles interrupts; VS Code sends that of a kernel to all its children.
         handlers[signal.SIGINT] = signal.SIG_IGN
     # In one write, so that a reader that waits for the first line also gets the second one.
     world = "" if server.world_address is None else f"\nworld {server.world_address}"
-    with handled_signals(handlers), closing(server), _recording(given.get("record"), server):
+    with handled_signals(handlers), closing(server), _recording(options.get("record"), server):
         server.run(lambda: print_interruptibly(f"{server.description}{world}"))
-    return 0
 
 
 def _recording(folder: Path | None, server: ArmServer) -> AbstractContextManager[None]:
@@ -331,6 +335,9 @@ def _with_option_name(
     """Returns an error with the name of the option, or its key in the file, instead of that of the setting."""
     setting, colon, rest = error.name.partition(": ")
     option = _OPTIONS.get(setting, setting)
+    if option == "start" and not (option in keys or option in given):
+        requirement = f"{error.requirement}; that is its home pose, choose another with --start"
+        return type(error)("the arm", error.value, requirement)
     if option in keys and option not in given:
         name = keys[option]
     elif option in given or setting in _OPTIONS:

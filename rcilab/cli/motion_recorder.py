@@ -120,7 +120,7 @@ def _require_writable(folder: Path) -> None:
             pass
     except OSError as error:
         raise InvalidValueError(
-            "--record", os.fspath(folder), f"is not a folder that can be written to: {error.strerror}; choose another"
+            "record", os.fspath(folder), f"is not a folder that can be written to: {error.strerror}; choose another"
         ) from error
 
 

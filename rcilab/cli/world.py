@@ -15,14 +15,16 @@ EPILOG = """examples, for a controller that has printed "world 127.0.0.2:40123":
   rcilab world 127.0.0.2:40123 press button=estop
   rcilab world 127.0.0.2:40123 press button=none
   rcilab world 127.0.0.2:40123 place_arm q=0,30,0,60,0,90,0deg
-  rcilab world 127.0.0.2:40123 set_tool position=[0,0,0.12]
+  rcilab world 127.0.0.2:40123 set_tool position=0,0,120mm
   rcilab world 127.0.0.2:40123 set_load mass=2 center_of_mass=[0,0,0.05]
   rcilab world 127.0.0.2:40123 status
 Contact (place_box, floor, walls) needs a controller with --plant mujoco. place_arm, set_tool, set_load, set_box and
 set_soft_limits act as the teach pendant: on a stationary arm, and kept by a reboot."""
 
 _ANGLES = ("q", "lower", "upper")
-"""Fields whose text may be angles with a unit, as on the command line of the controller."""
+_LENGTHS = ("position", "size", "center_of_mass", "point")
+_MASS = "mass"
+"""Fields whose text may have a unit, as on the command line of the controller."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -44,22 +46,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Sends the request and prints the reply: a status as JSON, else "done"."""
-    from rcilab.core.errors import InvalidValueError
-    from rcilab.execution.simulation_control import SimulationControl
+    from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
     from rcilab.sim.api import WorldStatus, status_as_dict
 
-    host, colon, port = args.address.rpartition(":")
-    if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise InvalidValueError("address", args.address, "needs HOST:PORT, such as 127.0.0.2:40123")
+    address = parse_simulation_port(args.address)
     request = _request(args.request, args.fields)
-    with SimulationControl(host, int(port)) as world:
+    with SimulationControl(*address) as world:
         answer = world.ask(request)
     print(json.dumps(status_as_dict(answer), indent=1) if isinstance(answer, WorldStatus) else "done")
     return 0
 
 
 def _request(name: str, texts: list[str]) -> WorldRequest:
-    from rcilab.cli.arm_options import parse_angles
     from rcilab.core.errors import InvalidValueError, UsageError
     from rcilab.sim.api import Refused, decode_world_request
 
@@ -71,8 +69,19 @@ def _request(name: str, texts: list[str]) -> WorldRequest:
         try:
             content[field] = json.loads(value)
         except (ValueError, RecursionError):
-            content[field] = parse_angles(value, field) if field in _ANGLES else value
+            content[field] = _read(field, value)
     _, request = decode_world_request(json.dumps(content).encode())
     if isinstance(request, Refused):
         raise UsageError(request.reason)
     return request
+
+
+def _read(field: str, text: str) -> object:
+    """Returns a value that is not JSON: numbers with a unit where the field may have one, else the text."""
+    from rcilab.cli.arm_options import parse_angles, parse_lengths, parse_mass
+
+    if field in _ANGLES:
+        return parse_angles(text, field)
+    if field in _LENGTHS:
+        return parse_lengths(text, field)
+    return parse_mass(text, field) if field == _MASS else text

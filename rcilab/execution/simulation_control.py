@@ -19,7 +19,14 @@ from numpy.typing import ArrayLike
 
 from rcilab.core.arrays import as_vector
 from rcilab.core.closeable import Closeable
-from rcilab.core.errors import ConnectionLostError, DecodeError, ProtocolError, UsageError, plain_text
+from rcilab.core.errors import (
+    ConnectionLostError,
+    DecodeError,
+    InvalidValueError,
+    ProtocolError,
+    UsageError,
+    plain_text,
+)
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose, as_pose
 from rcilab.model.dynamics.payload import Payload
@@ -59,6 +66,25 @@ from rcilab.sim.api import (
 )
 
 TIMEOUT = LONGEST_STALL + 5.0  # [s] A stalled controller responds after the stall, on a busy machine later.
+
+
+def parse_simulation_port(address: str) -> tuple[str, int]:
+    """Returns host and port of a simulation port, HOST:PORT.
+
+    Raises:
+        InvalidValueError: It is not such an address.
+    """
+    if "://" in address:
+        raise InvalidValueError(
+            "address",
+            address,
+            "is where the program of the arm connects; use the simulation port, which the controller prints after "
+            "'world', such as 127.0.0.2:40123",
+        )
+    host, colon, port = address.rpartition(":")
+    if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+        raise InvalidValueError("address", address, "needs HOST:PORT, such as 127.0.0.2:40123")
+    return host, int(port)
 
 
 class SimulationControl(Closeable):
@@ -238,7 +264,13 @@ class SimulationControl(Closeable):
                 connection = self._connect()
                 connection.sendall(encode_world_request(request, self._last_id))
                 answer = self._receive(connection)
-            except (OSError, DecodeError) as error:
+            except DecodeError as error:
+                self._disconnect()
+                raise ConnectionLostError(
+                    f"{self._name} does not respond to {request.name} as a virtual controller of this release "
+                    f"({error.problem}); check the address"
+                ).coded("world_silent") from error
+            except (OSError, UnicodeError) as error:  # The latter for a name that no host can have.
                 self._disconnect()
                 raise ConnectionLostError(
                     f"{self._name} does not respond to {request.name} ({error}); check that the virtual controller "

@@ -399,7 +399,10 @@ class ArmServer:
             text = f"{name_faults(faults)}: {_shortened(controller.reason)}; the arm stops"
             self._log.write("fault", text, faults=names, reason=str(controller.reason), phase=controller.phase_name)
             if controller.lacks_commands and controller.arm.playout.lost:
-                text = "a client that pauses needs more prefill (--prefill 50), SCHED_FIFO for itself, or --lockstep"
+                text = (
+                    "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer "
+                    "needs SCHED_FIFO, or --lockstep"
+                )
                 self._log.write("advice", text)
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:

@@ -149,7 +149,7 @@ class ControllerConfig:
             raise InvalidValueError(
                 "lost_limit",
                 self.lost_limit,
-                f"needs {FEWEST_LOST} to {MOST_LOST} cycles; None, or 0 on the command line, is no limit",
+                f"needs {FEWEST_LOST} to {MOST_LOST} cycles; 0 on the command line or in a file is no limit",
             )
 
     def setup(self, home: Floats) -> ArmSetup | None:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import os
+import socket
+import threading
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -12,8 +17,9 @@ from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.watch_actions import WatchActions, draw_plan
 from rcilab.app.run.watched_controller import WatchedController
 from rcilab.app.store import Store, UiState
-from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
+from rcilab.core.errors import ConnectionLostError, InvalidValueError, ProtocolError, UsageError
 from rcilab.core.state import RobotMode
+from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
 from tests.peers import programs
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import ControlException
@@ -129,3 +135,69 @@ def test_a_controller_without_a_record_is_refused() -> None:
         assert place.server.world_address is not None
         with pytest.raises(UsageError, match="keeps no record"):
             WatchedController(place.server.world_address)
+
+
+def lie(answer: bytes) -> str:
+    """Returns the address of a simulation port that gives this answer to its first client."""
+    listener = socket.create_server(("127.0.0.1", 0))
+
+    def serve() -> None:
+        with listener:
+            client, _ = listener.accept()
+            with client:
+                client.recv(4096)
+                client.sendall(answer)
+
+    threading.Thread(target=serve, daemon=True).start()
+    return "{}:{}".format(*listener.getsockname())
+
+
+def status(**changed: Any) -> bytes:
+    """Returns the answer of a controller that keeps a record, with other values; None removes one."""
+    right = WorldStatus(model="xMatePro7", plant="ideal", cycle=1, phase="idle", pid=os.getpid(), record=0)
+    content = json.loads(encode_world_answer(right, 1))
+    for name, value in changed.items():
+        holder = content if name in content else content["status"]
+        holder[name] = value
+        if value is None:
+            del holder[name]
+    return json.dumps(content).encode() + b"\n"
+
+
+def test_a_true_answer_is_understood() -> None:
+    _, answer = decode_world_answer(status())
+    assert isinstance(answer, WorldStatus)
+    assert answer.pid == os.getpid()
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (status(pid=2**22 + 1), "process 4194305) cannot be opened: No such file or directory"),
+        (status(record=10_000), "cannot be opened: No such file or directory"),
+        (status(record=-1), "keeps no record to watch"),
+        (status(model=None), "(status: model is missing); check the address"),
+        (status(colour="red"), "(status: colour is unknown); check the address"),
+        (status(status=[1]), "(status: not a JSON object)"),
+        (status(q="x" * 100), "is not a list"),
+        (status(q="x" * 1000), "xxx"),
+        (status(commands={"loss": 5}), "(status: loss needs 0 to 1, got 5)"),
+        (status(remark={"facts": {"facts": 1}}), "the remark on the last fault is not valid"),
+        (b'{"id":1,"ok":true}\n', "the response to a status request is Done()"),
+        (b"220 mail ESMTP\n", "not valid JSON"),
+        (b"x" * 70_000, "a line is longer than 65536 bytes"),
+        (b"", "it closed the connection"),
+    ],
+)
+def test_what_is_no_controller_or_says_what_is_not_so_is_refused_in_one_sentence(answer: bytes, words: str) -> None:
+    with pytest.raises((ConnectionLostError, ProtocolError, UsageError)) as raised:
+        WatchedController(lie(answer))
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 400
+
+
+@pytest.mark.parametrize("host", ["a..b", "x" * 100])
+def test_a_name_that_no_host_can_have_is_refused(host: str) -> None:
+    with pytest.raises(ConnectionLostError, match="does not respond to status"):
+        WatchedController(f"{host}:80")

@@ -45,6 +45,7 @@ lost_limit = 0
 on_loss = "bridge"
 auto_limit = true
 log_format = "json"
+record = "runs"
 no_world = true
 """
 
@@ -123,7 +124,7 @@ def test_the_example_of_the_help_is_a_valid_file(tmp_path: Path, monkeypatch: py
 
 PAGE = Path(__file__).parents[2] / "docs" / "controller.md"
 NOT_IN_A_FILE = {
-    "help", "file", "record", "exit_with_parent", "loss", "reorder", "duplicate", "corrupt", "delay", "jitter",
+    "help", "file", "exit_with_parent", "loss", "reorder", "duplicate", "corrupt", "delay", "jitter",
     "faults_on", "tcp_delay", "tcp_split", "tcp_break", "seed", "stall",
 }  # fmt: skip
 """Options of one experiment, not of an arm or its controller."""
@@ -157,7 +158,9 @@ def test_every_option_of_an_arm_and_its_controller_can_be_in_the_file_and_is_doc
         ("[arm]\nstart = '0,1mm'", "my_arm.toml: [arm] start: '0,1mm' has the unit 'mm'"),
         ("[arm]\ndi = 3", "my_arm.toml: [arm] di needs a list of signal numbers, such as [0, 3], got 3"),
         ("[tool]\nposition = [0, 0]", "my_arm.toml: [tool] position needs 3 numbers [m]"),
-        ("[load]\nmass = 'heavy'", "my_arm.toml: [load] mass must be a finite number [kg], got 'heavy'"),
+        ("[load]\nmass = 'heavy'", "my_arm.toml: [load] mass: 'heavy' is not of the form MASS[g]"),
+        ("[load]\nmass = true", "my_arm.toml: [load] mass must be a finite number [kg], got True"),
+        ("[load]\nmass = '2mm'", "my_arm.toml: [load] mass: '2mm' has the unit 'mm' where kg or g is expected"),
         ("[load]\ncenter_of_mass = [0, 0, 0]", "my_arm.toml: [load] mass is missing"),
         ("[load]\nmass = -1", "my_arm.toml: [load]: load mass must be from 0 to 100 [kg], got -1.0"),
         ("[box]\nsize = [1, 1, 0]\ncenter = [0, 0, 0]", "my_arm.toml: [box]: safety box size must be three lengths"),
@@ -165,8 +168,8 @@ def test_every_option_of_an_arm_and_its_controller_can_be_in_the_file_and_is_doc
         ("[controller]\nport = 'x'", "my_arm.toml: [controller] port needs a whole number"),
         ("[controller]\nlockstep = 1", "my_arm.toml: [controller] lockstep needs true or false, got 1"),
         ("[arm\n", "is not valid TOML"),
-        ("a = " + "[" * 10_000, "is not valid TOML"),
-        ("#" * 200_000, "has 200000 bytes; at most 100000 are expected"),
+        ("a = " + "[" * 9_000, "is not valid TOML"),
+        ("#" * 200_000, "has 200000 bytes; at most 10000 are expected"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Path, text: str, expected: str) -> None:
@@ -184,6 +187,13 @@ def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Pat
         ([], ("prefill = 20", "prefill = 200"), "my_arm.toml: [controller] prefill needs 0 to 100 cycles, got 200"),
         (["--prefill", "200"], ("", ""), "--prefill needs 0 to 100 cycles, got 200"),
         ([], ("10,30,0", "10,130,0"), "my_arm.toml: [arm] start: [10.0, 130.0, "),
+        ([], ("lost_limit = 0", "lost_limit = 9"), "lost_limit needs 10 to 20 cycles, got 9; 0 on the command line or"),
+        (
+            [],
+            ('record = "runs"', 'record = "/dev/null"'),
+            "my_arm.toml: [controller] record: '/dev/null' is not",
+        ),
+        (["--record", "/dev/null"], ("", ""), "--record: '/dev/null' is not a folder that can be written to"),
         ([], ("10,30,0", "30,0"), "my_arm.toml: [arm] start: "),
         (["--start", "0,130,0,0,0,0,0deg"], ("", ""), "--start: [0.0, 130.0, "),
         (["--start", "0,30deg"], ("", ""), "--start: '0,30deg' is not of the form Q1,Q2,...[deg] with 7 joint angles"),
@@ -203,6 +213,29 @@ def test_a_value_that_cannot_be_names_its_option_or_its_key(
     shown = capsys.readouterr().err
     assert expected in shown
     assert shown.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--box", "1,1,1@0,0,3"], ["--soft-limits=-60:60,-10:10,-60:60,-60:60,-60:60,-60:60,-60:60deg"]]
+)
+def test_an_arm_that_cannot_stand_in_its_home_pose_is_refused_without_a_word_about_a_start_that_was_not_given(
+    capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    assert main(["controller", "--model", "xMatePro7", "--port", "0", *arguments]) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("rcilab: the arm: [0.0, 30.0, 0.0, 60.0, 0.0, 90.0, 0.0] deg: ")
+    assert shown.endswith("; that is its home pose, choose another with --start\n")
+
+
+def test_a_mass_may_have_a_unit_and_the_folder_of_recordings_a_place_in_the_file(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file.write_text(FULL.replace("mass = 2", 'mass = "2000g"'), encoding="utf-8")
+    config = config_of(str(file), monkeypatch=monkeypatch)
+    assert config.load is not None
+    assert config.load.mass == 2.0
+    assert read_arm_file(file).options["record"] == Path("runs")
+    assert config.is_recorded
 
 
 def test_a_controller_without_an_arm_explains_how_to_name_one(

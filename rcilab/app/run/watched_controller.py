@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from rcilab.control_process.status import Lateness, Phase, SupervisorStatus
 from rcilab.core.cycle_ring import CycleRing
-from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.errors import UsageError
 from rcilab.core.state import ControllerMode, Mode, RobotMode, require_mode
-from rcilab.execution.simulation_control import SimulationControl
+from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
 from rcilab.model.robot_model import RobotModel
 from rcilab.recording.client_motions import ClientMotions, MotionPart
 
@@ -27,18 +27,6 @@ _DISPLAY_LAG = 5  # [cycles] The command for a row this old has arrived, or it i
 _SILENCE = 0.5  # [s] Without a new cycle, after which the process is looked for.
 _RATE_WINDOW = 1.0  # [s]
 _RESPONSES = 4096  # Newest ones, for the percentiles.
-
-
-def parse_simulation_port(address: str) -> tuple[str, int]:
-    """Returns host and port of a simulation port, HOST:PORT.
-
-    Raises:
-        InvalidValueError: It is not an address.
-    """
-    host, colon, port = address.rpartition(":")
-    if not colon or not host or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise InvalidValueError("address", address, "needs HOST:PORT, such as 127.0.0.2:40123")
-    return host, int(port)
 
 
 class WatchedController:

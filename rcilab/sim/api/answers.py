@@ -100,6 +100,11 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
         TypeError: A name is unknown or missing.
     """
     checked = dict(content)
+    known, needed = {item.name for item in fields(WorldStatus)} | {"remark"}, ("model", "plant", "cycle", "phase")
+    wrong = [*(f"{name} is missing" for name in needed if name not in checked)]
+    wrong += [f"{name} is unknown" for name in sorted(checked.keys() - known)]
+    if wrong:
+        raise TypeError(wrong[0])
     for name in _COUNTS:
         if name in checked:
             checked[name] = as_integer(checked[name], name, 0, _LARGEST_COUNT)
@@ -129,7 +134,7 @@ def _reason(sentence: object, coded: object) -> str:
     try:
         return _text(sentence) if coded is None else Remark.from_dict(cast("dict[str, Any]", coded))
     except (AttributeError, LookupError, RecursionError) as error:
-        raise TypeError(f"{coded!r} is not a remark") from error
+        raise TypeError("the remark on the last fault is not valid") from error
 
 
 def _text(value: object) -> str:

@@ -87,6 +87,7 @@ def _request(content: dict[str, Any]) -> WorldRequest:
         raise DecodeError(f"{name}: {error}") from error
 
 
+_LONGEST_REASON = 200  # [characters] A wrong value may be as long as the line.
 _SEPARATE_FIELDS = ("auto_limit",)
 """Fields that were added to the status later, and are sent outside of it."""
 
@@ -122,11 +123,13 @@ def decode_world_answer(line: bytes) -> tuple[int, WorldAnswer]:
         raise DecodeError("an answer needs ok: true or false")
     if "status" not in content:
         return request_id, Done()
+    if not isinstance(content["status"], dict):
+        raise DecodeError("status: not a JSON object")
     try:
         separate = {name: content[name] for name in _SEPARATE_FIELDS if name in content}
-        return request_id, status_from_dict(content["status"] | separate)
+        return request_id, status_from_dict({**content["status"], **separate})
     except (InvalidValueError, TypeError, ValueError) as error:
-        raise DecodeError(f"status: {error}") from error
+        raise DecodeError(f"status: {str(error)[:_LONGEST_REASON]}") from error
 
 
 def _refused(content: dict[str, Any]) -> Refused:
