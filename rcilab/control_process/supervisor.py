@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +16,6 @@ from rcilab.control_process.launch import require_plant
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Counter
 from rcilab.control_process.messages import (
     Configure,
-    Connect,
     Execute,
     Jog,
     ReadInputs,
@@ -33,15 +30,15 @@ from rcilab.control_process.messages import (
     WorkerSettings,
 )
 from rcilab.control_process.motion_upload import SharedRows, require_admissible, require_ready
-from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT, ProcessSupervisor
-from rcilab.control_process.requests import PendingRequest, RequestClient
+from rcilab.control_process.process_monitor import ProcessMonitor
+from rcilab.control_process.requests import PendingRequest
 from rcilab.control_process.snapshot import Snapshot
-from rcilab.control_process.status import MESSAGES, Incident, Phase, SupervisorStatus
-from rcilab.control_process.status_reader import RoundTrip, StatusReader
+from rcilab.control_process.status import SupervisorStatus
+from rcilab.control_process.status_reader import RoundTrip
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.cycle_ring import RingReader
-from rcilab.core.errors import ConnectionLostError, ControlError, ModelError, RcilabError, UsageError
+from rcilab.core.errors import UsageError
 from rcilab.core.memory import memory_needed
 from rcilab.core.state import Mode
 from rcilab.execution.guiding import require_guidable
@@ -49,7 +46,7 @@ from rcilab.execution.jog import JogKind, build_jog
 from rcilab.execution.speed_override import SpeedOverride
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, parse_address, require_signal
-from rcilab.makers.maker import capabilities_of, maker_of, require_driver, require_feature, require_parts
+from rcilab.makers.maker import capabilities_of, require_driver, require_feature, require_parts
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
 
@@ -61,16 +58,13 @@ if TYPE_CHECKING:
 __all__ = ["PendingRequest", "Supervisor"]
 
 VIRTUAL = "virtual"
-_PERIOD = 0.02  # [s] Of the monitoring thread.
-_LOSS_PERIODS = 3  # Periods with a lost connection until it is reported, 0.06 s.
 
 
 class Supervisor(Closeable):
     """Runs motions in a separate process, so that the page cannot delay a cycle.
 
     All methods may be called from any thread. Requests return a `PendingRequest` at once; only `start()`, `restart()`
-    and `close()` wait for the robot. A `ProcessSupervisor` owns the processes and a `RequestClient` the pending
-    requests; a thread of this object monitors both.
+    and `close()` wait for the robot. A `ProcessMonitor` owns the processes and their shared memory.
 
     Args:
         model: The arm.
@@ -103,18 +97,11 @@ class Supervisor(Closeable):
             setup = standard_setup(self.model, is_virtual=self._target == VIRTUAL)
         self.model = require_parts(self.model, setup).applied_to(self.model)
         self._setup = ConfigurationSync(setup)
-        self._plant = plant
+        address = None if self._target == VIRTUAL else self._target
+        self._monitor = ProcessMonitor(plant, address, self._setup, auto_restart=auto_restart)
+        self._lock = self._monitor.lock
         self._stop_without_operator = stop_without_operator
-        self._auto_restart = auto_restart
-        self._lock = threading.RLock()  # Guards everything below; held for long only while the processes end.
-        self._block: ControlBlock | None = None  # None while not running; what uses the block is created with it.
-        self._connecting: PendingRequest | None = None
         self._jogging: PendingRequest | None = None
-        self._crash: tuple[str, str] | None = None
-        self._incident: Incident | None = None
-        self._loss_periods = 0  # Consecutive periods with a lost connection.
-        self._monitor_thread: threading.Thread | None = None
-        self._is_closing = threading.Event()
 
     def start(self, timeout: float = 20.0) -> None:
         """Starts the processes and returns once states arrive or the connection has failed.
@@ -129,31 +116,21 @@ class Supervisor(Closeable):
             UsageError: It was started before, or memory is short.
         """
         with self._lock:
-            if self._block is not None:
+            if self._monitor.block is not None:
                 raise UsageError("the supervisor has been started already; use restart(), or create another one")
         try:
             with memory_needed():
                 with self._lock:
                     self._open()
-                    thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
-                    thread.start()
-                    self._monitor_thread = thread
-                self._await_connection(timeout)
+                    self._monitor.launch()
+                self._monitor.await_connection(timeout)
         except BaseException:
             self.close()
             raise
 
     def close(self) -> None:
         """Stops a running motion, ends the processes and frees the shared memory. May be called twice."""
-        self._is_closing.set()
-        thread, self._monitor_thread = self._monitor_thread, None
-        if thread is not None and thread is not threading.current_thread():
-            thread.join()
-        with self._lock:
-            if self._block is not None:
-                self._end_processes(ConnectionLostError("the supervisor was closed"))
-                self._block.close()
-                self._block = None
+        self._monitor.close()
 
     def restart(self, timeout: float = 20.0) -> None:
         """Ends the processes in any state, starts them again and returns once states arrive.
@@ -165,32 +142,30 @@ class Supervisor(Closeable):
             ConnectionLostError: A process could not be started; the message contains its output.
             UsageError: It was never started.
         """
-        with self._lock:
-            self._require_block()
-            self._end_processes(ConnectionLostError("the control process was restarted"))
-            self._processes.launch()
-        self._await_connection(timeout)
+        self._monitor.restart()
+        self._monitor.await_connection(timeout)
 
     def status(self) -> SupervisorStatus:
         """Returns a snapshot; cheap enough for the display's frame rate."""
         with self._lock:
-            if self._block is None:
-                return SupervisorStatus(target=self._target, incident=self._incident)
-            shown = self._reader.read_snapshot()
-            phase, code, message = self._find_phase(shown)
-            fields = self._reader.read_fields(shown)
+            monitor = self._monitor
+            if monitor.block is None:
+                return SupervisorStatus(target=self._target, incident=monitor.incident)
+            shown = monitor.reader.read_snapshot()
+            phase, code, message = monitor.find_phase(shown)
+            fields = monitor.reader.read_fields(shown)
             if phase in ("crashed", "lost", "starting"):
                 fields |= {"rate_hz": 0.0, "robot_mode": None, "controller_mode": None}  # No longer reported.
             return SupervisorStatus(
                 phase=phase,
                 code=code,
                 message=message,
-                incident=self._incident,
+                incident=monitor.incident,
                 target=self._target,
-                address=self._processes.address,
-                world_address=self._processes.world_address,
-                controller_pid=self._processes.controller_pid,
-                worker_pid=self._processes.worker_pid,
+                address=monitor.processes.address,
+                world_address=monitor.processes.world_address,
+                controller_pid=monitor.processes.controller_pid,
+                worker_pid=monitor.processes.worker_pid,
                 setup=self._setup.acknowledged,
                 setup_times=self._setup.connections,
                 **fields,
@@ -204,17 +179,7 @@ class Supervisor(Closeable):
         Raises:
             UsageError: There is no controller to connect to: the virtual one has ended; `restart()` restarts it.
         """
-        with self._lock:
-            self._require_block()
-            address = self._processes.address
-            if address is None:
-                raise UsageError("there is no controller to connect to; restart() restarts the virtual one").coded(
-                    "not_connected"
-                )
-            requested = self._setup.requested
-            pending = self._send("reconnect", Connect(address=address, timeout=ANSWER_TIMEOUT, configuration=requested))
-            self._setup.track(pending, requested, is_new_connection=True)
-            return pending
+        return self._monitor.connect()
 
     def set_operator_present(self, present: bool) -> None:
         """Reports whether an operator is present; call it with True at least once a second while one is.
@@ -224,9 +189,10 @@ class Supervisor(Closeable):
         be reloaded within 2 s.
         """
         with self._lock:
-            if self._block is None or not self._stop_without_operator:
+            block = self._monitor.block
+            if block is None or not self._stop_without_operator:
                 return
-            counters = self._block.counters
+            counters = block.counters
             if present or counters[Counter.OPERATOR_HEARTBEAT] == 0:
                 counters[Counter.OPERATOR_HEARTBEAT] = time.monotonic_ns()
 
@@ -258,7 +224,8 @@ class Supervisor(Closeable):
     def stops(self) -> int:
         """Number of calls of `stop` since `start`: a request for motion made before the last of them is refused."""
         with self._lock:
-            return 0 if self._block is None else self._block.counters[Counter.STOPS_REQUESTED]
+            block = self._monitor.block
+            return 0 if block is None else block.counters[Counter.STOPS_REQUESTED]
 
     def execute(
         self,
@@ -400,8 +367,8 @@ class Supervisor(Closeable):
     def release_jog(self) -> None:
         """Stops a jog."""
         with self._lock:
-            if self._block is not None:
-                release_jog(self._block.counters)
+            if self._monitor.block is not None:
+                release_jog(self._monitor.block.counters)
 
     def start_guiding(
         self, space: GuideSpace = "joint", kind: GuideKind = "free", *, stops: int | None = None
@@ -505,133 +472,29 @@ class Supervisor(Closeable):
         self.start()
         return self
 
-    def _send(self, what: str, request: Request) -> PendingRequest:
-        """Sends a request to the control process."""
-        with self._lock:
-            self._require_block()
-            if self._processes.worker_pid is None:
-                raise UsageError(f"the control process is not running; restart() restarts it (request: {what})").coded(
-                    "not_connected"
-                )
-            return self._client.send(what, request)
-
     def _open(self) -> None:
-        """Creates the shared block and its users, and starts the processes."""
-        block = ControlBlock.create(self.model.n, build_settings(self.model))
-        address = None if self._target == VIRTUAL else self._target
-        maker = maker_of(self.model)
-        assert maker is not None  # It has a driver.
-        try:
-            self._processes = ProcessSupervisor(
-                block, self.model.name, self._plant, address, auto_restart=self._auto_restart
-            )
-            self._client = RequestClient(block)
-            self._rows = SharedRows(
-                block, self._lock, self._require_cycle, lambda request: self._send("change of speed", request)
-            )
-            self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
-            self._reader, self._ring = StatusReader(block, maker), block.open_reader()
-        except BaseException:
-            block.close()
-            raise
-        self._is_closing.clear()
-        self._block = block
-        try:
-            self._processes.launch()
-        except BaseException:
-            self.close()
-            raise
-
-    def _await_connection(self, timeout: float) -> None:
-        deadline = time.monotonic() + timeout
-        while (status := self.status()).phase in ("starting", "connecting"):
-            if time.monotonic() > deadline:
-                raise ConnectionLostError(
-                    f"not ready after {timeout:g} s ({status.message}); try again when the machine is less busy"
-                ).coded("slow_start", seconds=f"{timeout:g}")
-            time.sleep(_PERIOD / 2)
-        if status.phase == "crashed":
-            raise ConnectionLostError(status.message)
-
-    def _monitor(self) -> None:
-        """The monitoring thread: heartbeats, replies, processes that ended. It never blocks."""
-        while not self._is_closing.wait(_PERIOD):
-            with self._lock:
-                if self._block is None:
-                    return
-                self._block.counters[Counter.SUPERVISOR_HEARTBEAT] = time.monotonic_ns()
-                self._collect_replies()
-                self._handle_exits()
-                self._check_for_loss()
-                if self._connecting is None and self._processes.is_ready:
-                    with suppress(UsageError):  # The process has just ended; the next period detects it.
-                        self._connecting = self.reconnect()
-
-    def _collect_replies(self) -> None:
-        errors = self._client.collect()
-        self._setup.collect()
-        for error in errors:
-            if self._crash is None and isinstance(error, ConnectionLostError | ControlError | ModelError):
-                shown = self._reader.read_snapshot()
-                if shown.phase in ("lost", "fault"):
-                    self._record_incident(shown.code, str(error))
-
-    def _handle_exits(self) -> None:
-        for exited in self._processes.reap():
-            self._connecting = None
-            self._crash = exited.code, exited.message
-            self._record_incident(*self._crash, is_restarted=exited.is_restarted)
-            if exited.is_worker:
-                self._client.fail_all(ConnectionLostError(exited.message))
-
-    def _check_for_loss(self) -> None:
-        """Records a connection loss without a pending request as an incident, unless a process exit explains it.
-
-        The exit of a controller is detected slightly later than the end of its connection: hence several periods.
-        """
-        shown = self._reader.read_snapshot()
-        is_lost = (
-            shown.code in ("lost.unreachable", "lost.closed") and self._crash is None and self._connecting is not None
+        """Creates the shared block and what uses it here."""
+        block = self._monitor.open(self.model, build_settings(self.model))
+        self._rows = SharedRows(
+            block, self._lock, self._require_cycle, lambda request: self._send("change of speed", request)
         )
-        self._loss_periods = self._loss_periods + 1 if is_lost else 0
-        if self._loss_periods == _LOSS_PERIODS:
-            self._record_incident(shown.code, shown.message)
+        self._override, self._round_trip = SpeedOverride(self._rows), RoundTrip(block)
+        self._ring = block.open_reader()
 
-    def _find_phase(self, shown: Snapshot) -> tuple[Phase, str, str]:
-        """Returns phase, code and message: the state of the processes has precedence over the snapshot."""
-        if self._is_closing.is_set():
-            return "closed", "closed", MESSAGES["closed"]
-        if self._connecting is not None and self._connecting.done:
-            self._crash = None
-            return shown.phase, shown.code, shown.message
-        if self._crash is not None:
-            return "crashed", *self._crash
-        if self._processes.address is None:
-            return "starting", "starting.controller", MESSAGES["starting.controller"]
-        if self._connecting is None:
-            return "starting", "starting", MESSAGES["starting"]
-        return "connecting", "connecting", MESSAGES["connecting"].format(address=self._processes.address)
+    def _send(self, what: str, request: Request) -> PendingRequest:
+        return self._monitor.send(what, request)
 
-    def _record_incident(self, code: str, message: str, *, is_restarted: bool = False) -> None:
-        number = 1 if self._incident is None else self._incident.number + 1
-        self._incident = Incident(number=number, code=code, message=message, is_restarted=is_restarted)
-        self._loss_periods = _LOSS_PERIODS  # A loss is reported once.
-
-    def _end_processes(self, reason: RcilabError) -> None:
-        """Stops the arm, ends the processes, and fails all pending requests."""
-        if self._processes.worker_pid is not None:
-            self._client.send_end()
-        self._processes.end()
-        self._client.fail_all(reason)
-        self._connecting, self._crash = None, None
+    def _require_block(self) -> ControlBlock:
+        return self._monitor.require_block()
 
     def _motion_cycle(self) -> int | None:
         with self._lock:
             self._require_block()
-            shown = self._reader.read_snapshot()
+            reader = self._monitor.reader
+            shown = reader.read_snapshot()
             if shown.phase != "moving" or shown.motion_duration is None or shown.code not in ("moving", "moving.held"):
                 return None
-            return self._reader.read_cycle()
+            return reader.read_cycle()
 
     def _read_override(self, shown: Snapshot) -> dict[str, Any]:
         scaled = self._override.motion
@@ -642,13 +505,9 @@ class Supervisor(Closeable):
 
     def _is_operator_overdue(self) -> bool:
         with self._lock:
-            heartbeat = self._block.counters[Counter.OPERATOR_HEARTBEAT] if self._block is not None else 0
+            block = self._monitor.block
+            heartbeat = 0 if block is None else block.counters[Counter.OPERATOR_HEARTBEAT]
         return heartbeat != 0 and time.monotonic_ns() - heartbeat > OPERATOR_TIMEOUT * 1e9
-
-    def _require_block(self) -> ControlBlock:
-        if self._block is None:
-            raise UsageError("the supervisor is not running: start() it first").coded("not_connected")
-        return self._block
 
 
 def build_settings(model: RobotModel) -> WorkerSettings:
