@@ -20,7 +20,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer, as_joints
 
-_LARGEST = 10_000  # [bytes] Ten times a full set-up file; of the worst content, 40 000 bytes take 5 s to parse.
+_LARGEST = 10_000  # [bytes] Ten times a full configuration file; of the worst content, 40 000 bytes take 5 s to parse.
 _LARGEST_NUMBER = 2**31
 _Read = Callable[[Any, str], object]
 

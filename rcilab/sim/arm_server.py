@@ -154,9 +154,7 @@ class ArmServer:
             on_ready: Called once, after the first state was sent.
         """
         if not ipaddress.ip_address(self.host).is_loopback:
-            text = (
-                f"warning: {self.host} is reachable from outside this machine; anyone there can move this virtual arm"
-            )
+            text = f"warning: {self.host} is reachable from outside this machine, where others can move this arm"
             self._log.write("warning", text, host=self.host)
         use_realtime = self.config.realtime and not self.config.lockstep
         if use_realtime:

@@ -74,7 +74,7 @@ class CycleCapture:
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
-        self._received = self._duplicates = 0
+        self._received = 0  # Commands of this motion.
         controller.arm.on_command = self._take
 
     def connect(self, client: str) -> None:

@@ -95,6 +95,13 @@ def test_the_arm_is_placed_and_a_motion_starts_there(robot):
     robot.world.place_arm(home)
 
 
+def test_what_the_arm_does_without_commands_is_chosen_by_name(robot):
+    robot.world.set_on_loss("bridge")
+    with pytest.raises(UsageError, match="known: hold, bridge"):
+        robot.world.set_on_loss("panic")
+    robot.world.set_on_loss("hold")
+
+
 def test_the_status_counts_and_names(robot):
     status = robot.world.status()
     assert (status.model, status.plant, status.button) == ("xMatePro7", "ideal", "none")
