@@ -199,12 +199,17 @@ class Run:
         return float(self.t[-1]) if len(self.t) else 0.0
 
     @property
+    def has_playout(self) -> bool:
+        """Whether a virtual controller recorded which command it played in which cycle: `PLAYOUT_FIELDS`."""
+        return "played" in (self.cycles.dtype.names or ())
+
+    @property
     def delay(self) -> int:
         """Cycles between a command and the state that reports it as commanded; found by comparison, usually 1.
 
-        A virtual controller records which command it played in which cycle; then it is the usual distance of both.
+        With a recorded play-out it is the usual distance of both.
         """
-        if "played" in (self.cycles.dtype.names or ()):
+        if self.has_playout:
             return playout_delay(self.cycles)
         reference = self.command
         if self.plan is not None and not np.isfinite(reference).any():  # Poses were sent: take the planned angles.
@@ -261,14 +266,14 @@ class Run:
         """Returns the motion that the controller reports as commanded, on the 1 ms grid, without the play-out delay.
 
         Used in place of a plan, for drawing and checking, if a callback moved the arm. Lost cycles are interpolated
-        linearly. Where a virtual controller recorded which commands it played, these are taken, then its own stop.
+        linearly. With a recorded play-out the played commands are taken, then the controller's own stop.
 
         Raises:
             UsageError: No cycle was recorded.
         """
         if not len(self.t):
             raise UsageError("this run has no cycle: nothing was commanded")
-        if "played" in (self.cycles.dtype.names or ()):
+        if self.has_playout:
             return Motion.from_cycles(played_joints(self.cycles))
         times = self.t - self.delay * CYCLE_TIME
         grid = CYCLE_TIME * np.arange(max(round(float(times[-1]) / CYCLE_TIME), 0) + 1)
@@ -333,8 +338,10 @@ class Run:
                 lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
             )  # fmt: skip
         steps = np.diff(sent["message_id"].astype(np.int64))
-        is_played = "missed" in (self.cycles.dtype.names or ())  # There a number may have several commands.
-        lost = self.cycles["missed"].sum() if is_played else (steps // state_cycles(self.cycles) - 1).sum()
+        if self.has_playout:  # There a number may have several commands.
+            lost = self.cycles["missed"].sum()
+        else:
+            lost = (steps // state_cycles(self.cycles) - 1).sum()
         period = np.diff(sent["received_ns"]) * 1e-9
         response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
         lateness = sent["lateness"]

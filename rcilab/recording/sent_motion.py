@@ -38,7 +38,7 @@ def sent_motion(run: Run) -> Motion:
         UsageError: Nothing was commanded, or torques were: see `sent_torques`.
     """
     rows = run.cycles
-    is_played = "played" in (rows.dtype.names or ())
+    is_played = run.has_playout
     if np.isfinite(rows["command_pose"]).any():
         return Motion.from_cycles(checked_joints(rows)) if is_played else run.commanded()
     period = 1 if is_played else state_cycles(rows)

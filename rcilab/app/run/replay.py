@@ -39,7 +39,7 @@ def require_replayable(run: Run) -> RobotModel:
 def replayed(state: UiState, run: Run) -> UiState:
     """Returns a state that shows a run."""
     model = require_replayable(run)
-    if "played" in (run.cycles.dtype.names or ()):
+    if run.has_playout:
         report = check_client(run)
         motion = report.motion
     else:
