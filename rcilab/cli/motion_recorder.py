@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import cast
 
@@ -25,6 +25,7 @@ from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.sim.log_entry import LogEntry, LogFormat
 
+_SILENT_WAIT = 1.0  # [s]
 _END_TIMEOUT = 60.0  # [s] For the report on a long motion.
 _PERIOD = 0.1  # [s] Between two looks at the record.
 _NICENESS = 10  # The client's program and the controller come first.
@@ -40,7 +41,8 @@ def show_entry(form: LogFormat, cycle: Callable[[], int]) -> Callable[[str, str]
 
     def show(kind: str, text: str) -> None:
         entry = LogEntry(kind=kind, text=text, cycle=cycle(), wall=time.time())
-        print(entry.written(form), file=sys.stderr, flush=True)
+        with suppress(OSError):  # The files are written, also where nobody reads the log any more.
+            print(entry.written(form), file=sys.stderr, flush=True)
 
     return show
 
@@ -81,11 +83,25 @@ def recorder_process(folder: Path, ring: CycleRing, form: LogFormat, cycle: Call
         ending.set()
         process.stdin.close()
         process.stdout.close()
-        try:
-            process.wait(_END_TIMEOUT)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            show("not_recorded", "the report on the last motion was not done in time; its cycles are in its file")
+        _await_end(process, show)
+
+
+def _await_end(process: subprocess.Popen[bytes], show: Callable[[str, str], None]) -> None:
+    """Waits until the recorder has written everything; Ctrl-C ends it at once."""
+    try:
+        process.wait(_SILENT_WAIT)
+        return
+    except subprocess.TimeoutExpired:
+        text = f"waiting for the recorder (process {process.pid}) and its last report; Ctrl-C ends without them"
+        show("recorder_waits", text)
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process.wait(_END_TIMEOUT)
+    except (subprocess.TimeoutExpired, KeyboardInterrupt):
+        process.kill()
+        show("not_recorded", "the recorder was ended before its last report; the cycles so far are in their file")
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 def main(arguments: Sequence[str]) -> int:

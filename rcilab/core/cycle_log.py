@@ -27,6 +27,9 @@ OTHER_STATE_FIELDS = (
 PLAYOUT_FIELDS = ("motion", "played", "age", "queued", "missed", "late")
 """Further fields of a row that a virtual controller records: what it did with the commands of its client."""
 
+NOT_RECORDED = 2**64 - 1
+"""The `age` of a played command that is in no row."""
+
 _POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
 _SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
 _SCREWS = {
@@ -69,13 +72,15 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
     ======================  ==================================================================================
     motion                  number of the motion of its client, from 1; 0 outside
     played                  1: a command was played in this cycle
-    age                     number of rows from the one with that command to this one; 0: it was not recorded
+    age                     number of rows from the one with that command to this one; `NOT_RECORDED`: no row has it
     queued                  commands left in the queue
     missed                  1: the motion was in progress and no command was there for this cycle
     late                    commands of this motion so far that came after their cycle and were dropped
     ======================  ==================================================================================
 
-    There, received_ns is when the state was sent, sent_ns when its answer arrived, and lateness the time between them.
+    There, received_ns is when the state was sent, sent_ns when the command of the row arrived, and lateness the time
+    between the state with its number and its arrival. The command is the answer to the state of the row; only where a
+    client repeated a number, or uses its own, one that came before or after it.
 
     Args:
         n: Number of joints.

@@ -1,12 +1,13 @@
 """A ring of recorded cycles in shared memory: one process writes it, others read it.
 
 The writer stores a row before the counter that announces it, and never waits for a reader: a reader that is too slow
-loses the oldest rows and counts them.
+loses the oldest rows and counts them. (Only in lock-step, where time has no meaning, a controller waits for its
+recorder.)
 
 The ring of a virtual controller, `CycleRing`, is an unnamed file of these parts:
 
     header      magic, version, number of joints, size of a row, capacity
-    counters    rows and events written so far, 8 bytes each
+    counters    rows and events written so far, and rows that a recorder has read, 8 bytes each
     facts       JSON: what the reader must know about the controller
     events      ring of lines of JSON: the motions of its client, from their beginning to their end
     rows        ring of cycles, with `PLAYOUT_FIELDS`
@@ -19,7 +20,7 @@ import mmap
 import os
 import struct
 from enum import IntEnum
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,8 @@ CAPACITY = 16384
 _MAGIC = b"RCILABCY"
 _VERSION = 1
 _HEADER = struct.Struct("<8sIIII")
-_EVENT_SLOTS, _EVENT_SIZE = 64, 4 * PAGE
+_EVENT_SLOTS, _EVENT_SIZE = 512, 2 * PAGE  # Of 256 motions: the shortest ones within the time of the rows.
+_MOST_JOINTS = 16
 _LENGTH = struct.Struct("<I")
 
 
@@ -42,6 +44,8 @@ class RingCounter(IntEnum):
 
     ROWS = 0
     EVENTS = 1
+    READ = 2
+    """Rows that the recorder has read; 0 without one."""
 
 
 class CycleRing:
@@ -51,20 +55,17 @@ class CycleRing:
         descriptor: Open file of the ring; this object owns and closes it.
 
     Raises:
+        UsageError: The file is not that of a ring.
         VersionMismatchError: It was made by another version of rcilab.
     """
 
     def __init__(self, descriptor: int) -> None:
         self.descriptor = descriptor
         try:
-            size = os.fstat(descriptor).st_size
-            # Populated, because a page that is touched for the first time would delay a cycle.
-            self._map = mmap.mmap(descriptor, size, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE)
-            header = _HEADER.unpack_from(self._map, 0) if size >= _HEADER.size else (b"", 0, 0, 0, 0)
-            magic, version, self.n, row_size, capacity = header
+            self.n = _read_joints(descriptor)
             dtype = cycle_dtype(self.n, complete=True, playout=True)
-            if (magic, version, row_size, capacity) != (_MAGIC, _VERSION, dtype.itemsize, CAPACITY):
-                raise VersionMismatchError("shared memory of the controller", version, _VERSION)
+            # Populated, because a page that is touched for the first time would delay a cycle.
+            self._map = mmap.mmap(descriptor, 0, flags=mmap.MAP_SHARED | mmap.MAP_POPULATE)
         except BaseException:
             os.close(descriptor)
             raise
@@ -87,10 +88,9 @@ class CycleRing:
         Raises:
             UsageError: Memory is short.
         """
-        row_size = cycle_dtype(n, complete=True, playout=True).itemsize
-        size = 3 * PAGE + _EVENT_SLOTS * _EVENT_SIZE + whole_pages(CAPACITY * row_size)
-        descriptor = open_shared_memory(size, "the record of the controller")
+        descriptor = open_shared_memory(_size(n), "the record of the controller")
         text = json.dumps(facts).encode()
+        row_size = cycle_dtype(n, complete=True, playout=True).itemsize
         os.pwrite(descriptor, _HEADER.pack(_MAGIC, _VERSION, n, row_size, CAPACITY), 0)
         os.pwrite(descriptor, _LENGTH.pack(len(text)) + text, 2 * PAGE)
         return cls(descriptor)
@@ -116,8 +116,18 @@ class CycleRing:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """The facts that it was created with."""
-        return json.loads(_read(self._facts))
+        """The facts that it was created with.
+
+        Raises:
+            UsageError: They are not readable.
+        """
+        try:
+            facts = json.loads(_read(self._facts))
+        except ValueError:
+            facts = None
+        if not isinstance(facts, dict):
+            raise UsageError("the record of the controller is damaged: its facts are unreadable")
+        return cast("dict[str, Any]", facts)
 
     def add_event(self, event: dict[str, Any]) -> None:
         """Appends an event; only the writer calls it."""
@@ -127,12 +137,23 @@ class CycleRing:
         self._events[start : start + _LENGTH.size + len(text)] = _LENGTH.pack(len(text)) + text
         self.counters[RingCounter.EVENTS] = count + 1
 
-    def events(self, start: int) -> list[dict[str, Any]]:
-        """Returns the events from a number on, oldest first; of more than 64, the newest."""
+    def events(self, start: int) -> tuple[list[dict[str, Any]], int]:
+        """Returns the events from a number on, oldest first, and the number of the next one.
+
+        Those that were overwritten are missing: of more than 512, the oldest.
+
+        Raises:
+            UsageError: One is not readable.
+        """
         count = self.counters[RingCounter.EVENTS]
-        first = max(start, count - _EVENT_SLOTS)
-        slots = (number % _EVENT_SLOTS * _EVENT_SIZE for number in range(first, count))
-        return [json.loads(_read(self._events[slot : slot + _EVENT_SIZE])) for slot in slots]
+        numbers = range(max(start, count - _EVENT_SLOTS), count)
+        slots = [number % _EVENT_SLOTS * _EVENT_SIZE for number in numbers]
+        texts = [_read(self._events[slot : slot + _EVENT_SIZE]) for slot in slots]
+        first = self.counters[RingCounter.EVENTS] + 1 - _EVENT_SLOTS  # The one before may be half overwritten.
+        try:
+            return [json.loads(text) for number, text in zip(numbers, texts, strict=True) if number >= first], count
+        except ValueError as error:
+            raise UsageError("the record of the controller is damaged: an event of its client is unreadable") from error
 
     def open_reader(self) -> RingReader:
         """Returns a reader of the rows."""
@@ -166,6 +187,11 @@ class RingReader:
     def count(self) -> int:
         """Number of rows written so far."""
         return self._counters[self._index]
+
+    @property
+    def position(self) -> int:
+        """Number of the first row that the next `drain` returns, unless it is overwritten."""
+        return self._next
 
     def newest(self) -> NDArray[np.void] | None:
         """Returns a copy of the newest row, shape (1,), or None while the ring is empty; does not move the reader."""
@@ -208,6 +234,34 @@ class RingReader:
 
     def _copy(self, first: int, end: int) -> NDArray[np.void]:
         return self._rows[np.arange(first, end) % len(self._rows)]
+
+
+def _size(n: int) -> int:
+    """Returns the size of the file for an arm with n joints, [bytes]."""
+    row_size = cycle_dtype(n, complete=True, playout=True).itemsize
+    return 3 * PAGE + _EVENT_SLOTS * _EVENT_SIZE + whole_pages(CAPACITY * row_size)
+
+
+def _read_joints(descriptor: int) -> int:
+    """Returns the number of joints of the arm, from a file that has every part of a ring.
+
+    Raises:
+        UsageError: The file is another one.
+        VersionMismatchError: It was made by another version of rcilab.
+    """
+    try:
+        size, header = os.fstat(descriptor).st_size, os.pread(descriptor, _HEADER.size, 0)
+    except OSError:  # Of a socket or a pipe.
+        size, header = 0, b""
+    magic, version, n, row_size, capacity = _HEADER.unpack(header.ljust(_HEADER.size, b"\0"))
+    if magic != _MAGIC:
+        raise UsageError("that is not the record of a controller")
+    if version != _VERSION:
+        raise VersionMismatchError("shared memory of the controller", version, _VERSION)
+    is_valid = 1 <= n <= _MOST_JOINTS and capacity == CAPACITY and size == _size(n)
+    if not is_valid or row_size != cycle_dtype(n, complete=True, playout=True).itemsize:
+        raise UsageError("the record of the controller is damaged: its header does not belong to its size")
+    return n
 
 
 def _read(slot: memoryview) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.errors import UsageError
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.model.dynamics.payload import Payload
@@ -64,6 +65,28 @@ class MotionPart:
     cycles: NDArray[np.void]
     """From the state on that the first played command answers, with the time `t` since then, shape (N,)."""
     end: MotionEnd | None = None
+    skipped: int = 0
+    """Cycles of the motion right before these that were overwritten before they were read."""
+
+
+class _Facts(NamedTuple):
+    """What the controller says of itself."""
+
+    model: str
+    plant: str
+    url: str
+
+    @classmethod
+    def of(cls, ring: CycleRing) -> _Facts:
+        """Returns the facts of a record.
+
+        Raises:
+            UsageError: One is missing.
+        """
+        texts = [ring.facts.get(name) for name in cls._fields]
+        if not all(isinstance(text, str) for text in texts):
+            raise UsageError("the record of the controller is damaged: it does not name its arm, plant and address")
+        return cls(*map(str, texts))
 
 
 class ClientMotions:
@@ -72,51 +95,84 @@ class ClientMotions:
     Args:
         ring: The record.
         lag: Rows that are left for the next poll, see `LAG`; fewer for a display.
+
+    Raises:
+        UsageError: The record is not that of a known arm.
     """
 
     def __init__(self, ring: CycleRing, lag: int = LAG) -> None:
         self._ring, self._lag = ring, lag
         self._reader = ring.open_reader()
         self._reader.skip()
-        self._next_event = len(ring.events(0))
-        facts = ring.facts
-        self._model = load_model(facts["model"])
-        self._facts = facts
+        _, self._next_event = ring.events(0)
+        self._facts = _Facts.of(ring)
+        self._model = load_model(self._facts.model)
         self._waiting: NDArray[np.void] = np.zeros(0, cycle_dtype(ring.n, complete=True, playout=True))
+        self._first = self._reader.position  # Number of the first waiting row.
         self._motion: ClientMotion | None = None
-        self._cycle = -1  # Of the next row since the first command; -1 before it is known.
+        self._row = 0  # Number of the first row of the motion.
+        self._origin: int | None = None  # Number of its row with t = 0.
+        self._is_resumed = False  # Its rows before the waiting ones were overwritten.
+        self._gap = range(0)  # Numbers of the rows that were overwritten and are not yet reported.
 
     @property
-    def overrun(self) -> int:
-        """Cycles that were overwritten before they were read."""
-        return self._reader.overrun
+    def position(self) -> int:
+        """Number of rows that were read so far."""
+        return self._reader.position
 
     @property
     def model(self) -> RobotModel:
         """The arm, without tool and load."""
         return self._model
 
-    def poll(self) -> list[MotionPart]:
-        """Returns the new parts of motions, oldest first."""
-        events = self._ring.events(self._next_event)
-        self._next_event += len(events)
-        ended = max((event["rows"] for event in events if event["event"] == "end"), default=0)
-        rows = self._reader.drain(max(self._reader.count - self._lag, ended))
-        self._waiting = np.concatenate([self._waiting, rows])
+    def poll(self, *, is_last: bool = False) -> list[MotionPart]:
+        """Returns the new parts of motions, oldest first.
+
+        Args:
+            is_last: Whether no row is left for another poll.
+        """
         parts: list[MotionPart] = []
+        events, self._next_event = self._ring.events(self._next_event)
+        self._read(events, 0 if is_last else self._lag, parts)
         for event in events:
             if event["event"] == "begin":
-                self._motion, self._cycle = self._begun(event), -1
+                self._begin(event)
             elif self._motion is not None and event["motion"] == self._motion.number:
-                parts.append(MotionPart(motion=self._motion, cycles=self._take(), end=_end(event)))
+                parts.append(self._part(_end(event), event["row"]))
                 self._motion = None
         if self._motion is not None:
-            cycles = self._take()
-            if len(cycles):
-                parts.append(MotionPart(motion=self._motion, cycles=cycles))
+            part = self._part()
+            if len(part.cycles):
+                parts.append(part)
         else:
-            self._waiting = self._waiting[-_BEFORE:]
+            self._drop(len(self._waiting) - _BEFORE)
         return parts
+
+    def _read(self, events: list[dict[str, Any]], lag: int, parts: list[MotionPart]) -> None:
+        """Reads new rows. After a gap the waiting ones are a part of their own."""
+        ended = max((event["row"] for event in events if event["event"] == "end"), default=0)
+        expected = self._reader.position
+        rows = self._reader.drain(max(self._reader.count - lag, ended))
+        first = self._reader.position - len(rows)
+        if first == expected:
+            self._waiting = np.concatenate([self._waiting, rows])
+            return
+        if self._motion is not None:
+            part = self._part()
+            if len(part.cycles):
+                parts.append(part)
+        self._waiting, self._first = rows, first
+        self._gap, self._is_resumed = range(expected, first), True
+
+    def _part(self, end: MotionEnd | None = None, row: int | None = None) -> MotionPart:
+        """Returns the next part of the motion, of which `row` is the first one after its end."""
+        assert self._motion is not None
+        cycles = self._take()
+        skipped = 0
+        if len(cycles) or end is not None:
+            skipped = len(range(max(self._gap.start, self._row), min(self._gap.stop, row or self._gap.stop)))
+            self._gap = range(0)
+        return MotionPart(motion=self._motion, cycles=cycles, end=end, skipped=skipped)
 
     def _take(self) -> NDArray[np.void]:
         """Returns the waiting rows of the motion, with their times."""
@@ -126,25 +182,35 @@ class ClientMotions:
         if not of_motion.size:
             return rows[:0]
         start, end = int(of_motion[0]), int(of_motion[-1]) + 1
-        if self._cycle < 0:
-            played = np.flatnonzero(rows["played"][:end])
-            played = played[played >= start]
-            if not played.size:
+        if self._origin is None or self._is_resumed:
+            played = start + np.flatnonzero(rows["played"][start:end])
+            sources = played - rows["age"][played].astype(np.intp)
+            is_there = (sources >= 0) & (sources <= played)
+            if not is_there.any():
                 return rows[:0]
-            first = int(played[0])
-            start, self._cycle = max(first - int(rows["age"][first]), 0), 0
+            start = int(sources[is_there][0])
+            self._origin = self._first + start if self._origin is None else self._origin
+            self._is_resumed = False
         taken = rows[start:end].copy()
-        taken["t"] = CYCLE_TIME * (self._cycle + np.arange(len(taken)))
-        self._cycle += len(taken)
-        self._waiting = rows[end:]
+        taken["t"] = CYCLE_TIME * (self._first + start - self._origin + np.arange(len(taken)))
+        self._drop(end)
         return taken
+
+    def _drop(self, count: int) -> None:
+        """Removes the oldest waiting rows."""
+        if count > 0:
+            self._waiting, self._first = self._waiting[count:], self._first + count
+
+    def _begin(self, event: dict[str, Any]) -> None:
+        self._motion, self._row, self._origin = self._begun(event), event["row"], None
+        self._is_resumed = self._row < self._first
 
     def _begun(self, event: dict[str, Any]) -> ClientMotion:
         mass, center, inertia = event["load"]
         load = Payload(mass=mass, center_of_mass=np.array(center), inertia=np.array(inertia))
         setup = Setup(
-            target=self._facts["url"],
-            plant=self._facts["plant"],
+            target=self._facts.url,
+            plant=self._facts.plant,
             mode=event["mode"],
             started_ns=event["wall_ns"],
             client=event["client"],

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
 from pathlib import Path
 
 from rcilab.core.atomic_file import replacing
 from rcilab.core.cycle_log import cycle_dtype
-from rcilab.core.cycle_ring import CycleRing
-from rcilab.core.errors import InvalidValueError
+from rcilab.core.cycle_ring import CycleRing, RingCounter
+from rcilab.core.errors import RcilabError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS
-from rcilab.recording.client_motions import ClientMotions, MotionEnd, MotionPart
+from rcilab.recording.client_motions import ClientMotion, ClientMotions, MotionEnd, MotionPart
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import load_run
 from rcilab.recording.run_file import ENDING, RunFile
 
 _LONGEST = DEFAULT_MAX_ROWS  # [cycles] A longer motion is continued in another file.
+_CUT = "this file ends here, the motion went on"
+_OVERWRITTEN = "overwritten before they were read: the recorder was stopped, or the machine too busy"
 
 
 class ClientRecorder:
-    """Writes the motions of a record. Owned by one thread.
+    """Writes the motions of a record. Owned by one thread; another one writes the reports.
 
     Args:
-        folder: Destination.
+        folder: Destination; created again if it is gone.
         ring: The record.
-        show: Called with every line for the log: "recorded" or "not_recorded", and a sentence.
+        show: Called with every line for the log, from both threads: "recorded" or "not_recorded", and a sentence.
     """
 
     def __init__(self, folder: Path, ring: CycleRing, show: Callable[[str, str], None]) -> None:
@@ -34,74 +38,106 @@ class ClientRecorder:
         self._motions = ClientMotions(ring)
         self._is_realtime = bool(ring.facts["realtime"])
         self._file: RunFile | None = None
-        self._written = self._part = 0
+        self._motion: ClientMotion | None = None
+        self._last = 0  # Number of the last motion that was seen.
+        self._written = self._part = 0  # Cycles in the file; files of this motion before it.
+        self._is_continued = False  # The file begins in mid-motion.
         self._failed = 0  # Number of the motion whose file cannot be written.
-        self._overrun = 0
+        self._reports = ThreadPoolExecutor(1, "reports")
 
     def poll(self) -> None:
         """Writes what is new."""
         for part in self._motions.poll():
             self._add(part)
-        if self._motions.overrun > self._overrun:
-            self._show(
-                "not_recorded",
-                f"{self._motions.overrun - self._overrun} cycles were not recorded: this machine was too busy",
-            )
-            self._overrun = self._motions.overrun
+        self._ring.counters[RingCounter.READ] = self._motions.position
 
     def close(self) -> None:
-        """Closes the file of a motion in progress."""
-        if self._file is not None:
-            self._file.close(stopped="the controller was ended")
-            self._file = None
+        """Writes the rest, also of a motion in progress, and waits for the reports."""
+        try:
+            for part in self._motions.poll(is_last=True):
+                self._add(part)
+            self._finish(stopped="the controller was ended")
+        except RcilabError as error:
+            self._show("not_recorded", str(error))
+        self._reports.shutdown()
 
     def _add(self, part: MotionPart) -> None:
-        number = part.motion.number
+        motion = part.motion
         try:
-            if len(part.cycles) and number != self._failed:
+            if motion is not self._motion:
+                self._finish(stopped=_CUT)
+                self._begin(motion)
+            if part.skipped:
+                self._finish(stopped=_CUT)
+                place = f"before {part.cycles['t'][0]:.3f} s" if len(part.cycles) else "at its end"
+                self._show(
+                    "not_recorded",
+                    f"motion {motion.number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}",
+                )
+            if len(part.cycles) and motion.number != self._failed:
                 if self._file is None:
-                    self._file = self._open(part)
+                    self._file = self._open(motion, is_continued=self._part > 0 or part.skipped > 0)
                 self._file.add(part.cycles)
                 self._written += len(part.cycles)
                 if self._written >= _LONGEST and part.end is None:
-                    self._finish(part, None)
-                    self._part += 1
+                    self._finish(stopped=_CUT)
             if part.end is not None:
-                if self._file is not None:
-                    self._finish(part, part.end)
-                elif number != self._failed:
+                if self._part == 0 and self._file is None and motion.number != self._failed and not part.skipped:
                     why = part.end.stopped or "no command was played"
-                    self._show("not_recorded", f"motion {number}, {part.motion.setup.mode}, is not recorded: {why}")
-                self._part = 0
-        except InvalidValueError as error:
-            self._file, self._failed = None, number
-            self._show("not_recorded", f"motion {number} is not recorded from here on: {error}")
+                    self._show("not_recorded", f"motion {motion.number}, {motion.setup.mode}, is not recorded: {why}")
+                self._finish(part.end, stopped=part.end.stopped)
+        except RcilabError as error:
+            self._file, self._failed = None, motion.number
+            self._show("not_recorded", f"motion {motion.number} is not recorded from here on: {error}")
 
-    def _open(self, part: MotionPart) -> RunFile:
-        motion = part.motion
+    def _begin(self, motion: ClientMotion) -> None:
+        between = range(self._last + 1, motion.number)
+        if self._last and between:
+            numbers = f"{between[0]} to {between[-1]}" if len(between) > 1 else str(between[0])
+            self._show("not_recorded", f"motion {numbers}: not recorded; the cycles were {_OVERWRITTEN}")
+        self._motion, self._last, self._part = motion, motion.number, 0
+
+    def _open(self, motion: ClientMotion, *, is_continued: bool) -> RunFile:
         stamp = time.strftime("%Y%m%d-%H%M%S", time.localtime(motion.setup.started_ns * 1e-9))
         suffix = f"-part{self._part + 1}" if self._part else ""
-        name = f"{stamp}-{motion.number:03d}-{motion.model.name}-{motion.setup.mode}{suffix}{ENDING}"
+        name = f"{stamp}-{motion.number:03d}-{motion.model.name}-{motion.setup.mode}{suffix}"
         self._written = 0
-        return RunFile(
-            self._folder / name,
-            cycle_dtype(self._ring.n, complete=True, playout=True),
-            plan=None,
-            model=motion.model,
-            setup=motion.setup,
-            realtime=self._is_realtime,
-        )
+        self._is_continued = is_continued
+        for copy in count(1):  # Another controller may record in this folder, too.
+            path = self._folder / f"{name}{f'-{copy}' if copy > 1 else ''}{ENDING}"
+            try:
+                return RunFile(
+                    path,
+                    cycle_dtype(self._ring.n, complete=True, playout=True),
+                    is_new=True,
+                    plan=None,
+                    model=motion.model,
+                    setup=motion.setup,
+                    realtime=self._is_realtime,
+                )
+            except FileExistsError:
+                continue
+        raise AssertionError
 
-    def _finish(self, part: MotionPart, end: MotionEnd | None) -> None:
+    def _finish(self, end: MotionEnd | None = None, *, stopped: str | None = None) -> None:
+        """Closes the file, if one is open, and has its report written."""
         file, self._file = self._file, None
-        assert file is not None
-        file.close(stopped=None if end is None else end.stopped)
-        run = load_run(file.path, max_rows=2 * _LONGEST)
-        found = report_on_client(run, end, f"motion {part.motion.number} of {part.motion.client}")
-        target = file.path.with_suffix(".txt")
+        if file is None or self._motion is None:
+            return
+        self._part += 1
+        name = f"motion {self._motion.number} of {self._motion.client}"
+        file.close(stopped=stopped, truncated=self._is_continued)
+        self._reports.submit(self._report, file.path, None if self._is_continued else end, name)
+
+    def _report(self, path: Path, end: MotionEnd | None, name: str) -> None:
         try:
+            found = report_on_client(load_run(path, max_rows=2 * _LONGEST), end, name)
+            target = path.with_suffix(".txt")
             with replacing(target) as stream:
                 stream.write(found.text.encode())
         except OSError as error:
-            self._show("not_recorded", f"{target} cannot be written: {error.strerror}")
-        self._show("recorded", f"{found.line}; {file.path}")
+            self._show("not_recorded", f"the report on {name} cannot be written: {error.strerror}; {path}")
+        except RcilabError as error:
+            self._show("not_recorded", f"there is no report on {name}: {error}")
+        else:
+            self._show("recorded", f"{found.line}; {path}")

@@ -11,11 +11,13 @@ import numpy as np
 from rcilab.conformance.advice import share
 from rcilab.conformance.check import check, check_torques
 from rcilab.conformance.report import Report
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
 from rcilab.model.robot_model import require_model
 from rcilab.recording.client_motions import MotionEnd
+from rcilab.recording.playout import played_commands
 from rcilab.recording.run import Run
 from rcilab.recording.sent_motion import sent_motion, sent_torques, start_of, with_stop
 
@@ -50,7 +52,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
     counts = f"{received} commands, {missed} cycles without one, {late} late"
-    line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
+    line = f"{name}, {run.setup.mode}, {_followed_time(run):.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
         lines += [str(report), ""]
@@ -81,16 +83,30 @@ def _check(run: Run) -> tuple[Report | None, str]:
     """Returns the check, or the reason why it is missing."""
     if len(run.cycles) < 2:
         return None, "; too short for a check"
+    unknown = _count_unknown(run)
+    if unknown:
+        return None, f"; not checked: {unknown} played commands are not in the record"
     try:
         return check_client(run), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
 
 
+def _followed_time(run: Run) -> float:
+    """Returns the time from the first played command to the last cycle that had or lacked one, [s]."""
+    followed = np.flatnonzero(run.cycles["played"] | run.cycles["missed"])
+    return CYCLE_TIME * float(followed[-1] - followed[0] + 1) if followed.size else 0.0
+
+
+def _count_unknown(run: Run) -> int:
+    """Returns the number of played commands that are not in the record, without those before its beginning."""
+    known, _ = played_commands(run.cycles)
+    played = np.flatnonzero(run.cycles["played"])
+    return int((played > known[0]).sum()) + 1 - len(known) if known.size else len(played)
+
+
 def _describe_nearest(report: Report) -> str:
-    usage = report.usage()
-    condition = usage.conditions[usage.row[usage.ratio.argmax()]]
-    row = next(row for row in report.rows if row.condition is condition)
+    row = report.worst
     verb = "nearest limit" if row.ok else "violates"
     return f"{verb}: {row.condition.quantity} of {row.location}, {share(row.ratio)} of its bound at {row.time:.3f} s"
 
@@ -125,7 +141,7 @@ def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str
         return [*lines, "  in lock-step, times have no meaning"] if not run.realtime else lines
     answered &= np.isfinite(run.cycles["lateness"])
     if not answered.any():
-        return [*lines, "  no command came after the state that it answers: a repeated number shifts all later ones"]
+        return [*lines, "  no command had the number of a recent state: there are no response times"]
     times = 1e3 * run.cycles["lateness"][answered]
     lines.append(
         f"  from state to command: median {np.median(times):.3f} ms, 99 % {np.percentile(times, 99):.3f} ms, "

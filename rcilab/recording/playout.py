@@ -65,5 +65,5 @@ def played_commands(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray
     """
     rows = np.flatnonzero(cycles["played"])
     sources = rows - cycles["age"][rows].astype(np.intp)
-    is_known = (sources >= 0) & (sources < rows)
+    is_known = (sources >= 0) & (sources <= rows)
     return rows[is_known], sources[is_known]

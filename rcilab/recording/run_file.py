@@ -174,19 +174,27 @@ class RunFile:
     Args:
         path: Destination; an existing file is replaced.
         dtype: Layout of one cycle.
+        is_new: Whether an existing file is an error.
         facts: `plan`, `model`, `setup`, `report`, `realtime` as for `RunWriter`.
 
     Raises:
+        FileExistsError: It exists, and `is_new`.
         InvalidValueError: The file cannot be written. The methods raise it too and keep the data written so far.
     """
 
-    def __init__(self, path: Path, dtype: np.dtype[np.void], **facts: Any) -> None:
+    def __init__(self, path: Path, dtype: np.dtype[np.void], *, is_new: bool = False, **facts: Any) -> None:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.unlink(missing_ok=True)
+            if not is_new:
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        try:
             self._stream = path.open("xb")  # Not through a link or a named pipe that someone put there meanwhile.
         except OSError as error:
+            if is_new and isinstance(error, FileExistsError):
+                raise
             raise _unwritable(path, error) from error
         try:
             self._writer = RunWriter(self._stream, dtype, **facts)

@@ -55,6 +55,7 @@ RESEND_TIME = 0.02  # [s] In lock-step a state is repeated after this time until
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
+_RECORDER_TIMEOUT = 5.0  # [s] In lock-step; then its motions have gaps.
 CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
 SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
 _MOST_VIOLATIONS = 3  # That the text of a fault names; the others are in its facts.
@@ -96,7 +97,7 @@ class ArmServer:
         self._clock = SystemClock()
         self._log = ControllerLog(log, self._clock.now, lambda: self.controller.cycle_number)
         self._timer = CycleTimer(self._clock.now())
-        self._is_ending = False
+        self._is_ending = self._recorder_is_lost = False
         self._next_check = 0.0
         self._cpu_latency_lock = CpuLatencyLock()
         self._missed_before = 0
@@ -231,6 +232,7 @@ class ArmServer:
                 if (not self.controller.is_moving and notice_left < 0) or self._clock.now() > end_deadline:
                     return
             if self.config.lockstep and self.controller.wants_commands:
+                self._await_recorder()
                 self._await_command()
                 self._timer.restart(self._clock.now())
             else:
@@ -294,6 +296,17 @@ class ArmServer:
             elif self._clock.now() >= deadline:
                 self._has_timed_out = True
                 return
+
+    def _await_recorder(self) -> None:
+        """Waits, in lock-step, until the recorder has read the oldest rows; not for one that was stopped or killed."""
+        if self._capture is None or self._recorder_is_lost:
+            return
+        deadline = self._clock.now() + _RECORDER_TIMEOUT
+        while not self._capture.has_room and not self._is_ending:
+            if self._clock.now() > deadline:
+                self._recorder_is_lost = True
+                return
+            self._clock.sleep_until(self._clock.now() + CYCLE_TIME)
 
     @property
     def _command_timeout(self) -> float:

@@ -1,8 +1,9 @@
 """The record of a virtual controller: every cycle, with the command of its client, in a ring that others read.
 
 A row is written when the state of its cycle is sent; the command that answers it is added when it arrives. A client
-that received no state in time, or old ones again, repeats numbers (see `jitter_buffer`): such a command is added to the
-next row without one, also to one that is yet to come.
+that received no state in time, or old ones again, repeats numbers, and one may have restarted its numbering (see
+`jitter_buffer`): such a command is added to the next row without one, also to one that is yet to come, at the latest
+that in which it is played.
 The rows of a motion have its number; two events, `begin` and `end`, have its client, its settings and its end.
 """
 
@@ -14,11 +15,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
+from rcilab.core.cycle_log import NOT_RECORDED, OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
 from rcilab.core.state import RobotState
 from rcilab.i18n.translator import Remark
@@ -36,7 +37,18 @@ _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
 _ARRAYS = STATE_FIELDS + OTHER_STATE_FIELDS[:-4]
 _POSE, _POSE_C = _ARRAYS.index("T_base_tool"), _ARRAYS.index("T_base_tool_c")
 _ROWS = int(RingCounter.ROWS)
-_FARTHEST = 256  # [rows] A command for a state before or after so many others is not recorded: no queue is longer.
+_RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
+_FARTHEST = 256  # [rows] Whose commands may be added; then readers take the row. No queue of commands is longer.
+
+
+class _Arrival(NamedTuple):
+    """A command that arrived."""
+
+    time_ns: int
+    """[ns]"""
+    lateness: float
+    """Time since its state was sent, [s]; NaN if its number is that of no recent state."""
+    command: ArmCommand
 
 
 class CycleCapture:
@@ -63,19 +75,26 @@ class CycleCapture:
         self._is_moving = False
         self._client = ""
         self._lost_client = ""
-        self._rows: dict[int, int] = {}  # Row of each recent message id.
+        self._rows: dict[int, int] = {}  # Row of each recent message id since the end of the last motion.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
-        self._waiting: deque[tuple[int, ArmCommand]] = deque()  # Time of arrival, [ns]; for rows to come.
+        self._waiting: deque[_Arrival] = deque(maxlen=_FARTHEST)  # For rows to come; the queue drops the oldest, too.
         self._arrays_of = attrgetter(*_ARRAYS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
-        self._answer = self._find_answer(controller.arm.mode)
+        self._mode = controller.arm.mode
+        self._answer = self._find_answer(self._mode)
         self._modes: tuple[object, ...] = ()
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
-        self._received = 0  # Commands of this motion.
+        self._received = self._late = 0  # Commands of this motion, and those of them that came late.
         controller.arm.on_command = self._take
+
+    @property
+    def has_room(self) -> bool:
+        """Whether the recorder, if there is one, has read what the next rows overwrite."""
+        read = self._counters[RingCounter.READ]
+        return not read or self._count - read < CAPACITY - _RESERVE
 
     def connect(self, client: str) -> None:
         """Stores the address of the client."""
@@ -93,11 +112,15 @@ class CycleCapture:
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
         played = age = missed = 0
+        arrival: _Arrival | None = None
         if playback is not None:
             missed = int(playback.is_lost)
             if not missed and playback.command is not None:
                 played = 1
-                age = self._count - self._commands.pop(id(playback.command), self._count)
+                row = self._commands.pop(id(playback.command), -1)
+                if row < 0:
+                    arrival = self._pop_waiting(playback.command)
+                age = self._count - row if row >= 0 else 0 if arrival else NOT_RECORDED
         motion = self._motion if self._is_moving else 0
         row = self._pack(state, (motion, played, age, len(playout), missed, playout.late))
         start = self._count % CAPACITY * self._size
@@ -105,37 +128,57 @@ class CycleCapture:
         self._rows.setdefault(state.message_id, self._count)
         self._rows.pop(state.message_id - _FARTHEST, None)
         self._count += 1
-        if self._waiting:
-            self._add(self._count - 1, *self._waiting.popleft())
+        if arrival is not None:
+            self._add(self._count - 1, arrival)
+            self._commands.pop(id(arrival.command), None)
+        elif self._waiting:
+            self._add(self._count - 1, self._waiting.popleft())
         self._counters[_ROWS] = self._count
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = time.monotonic_ns()
+        if self._arm.mode is not self._mode:
+            self._mode = self._arm.mode
+            self._answer = self._find_answer(self._mode)
         self._received += 1
         self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
-        row = self._rows.get(command.number)
-        if row is None:
+        answered = self._rows.get(command.number)
+        lateness, row = math.nan, max(self._count - 1, 0)
+        if answered is not None:
+            sent, _ = _STAMPS.unpack_from(self._memory, answered % CAPACITY * self._size + self._stamps)
+            lateness, row = 1e-9 * (now - sent), answered
+        arrival = _Arrival(now, lateness, command)
+        late, self._late = self._late, self._playout.late
+        if self._late > late:  # It is not played, and must not take the place of one that is.
+            if answered is not None:
+                self._add(answered, arrival)
             return
         if not self._waiting:
             for free in range(row, self._count):
-                if self._add(free, now, command):
+                if self._add(free, arrival):
                     return
-        if len(self._waiting) < _FARTHEST:
-            self._waiting.append((now, command))
+        self._waiting.append(arrival)
 
-    def _add(self, row: int, arrived: int, command: ArmCommand) -> bool:
+    def _add(self, row: int, arrival: _Arrival) -> bool:
         """Adds a command to a row unless it has one; returns whether it was added."""
         memory, start = self._memory, row % CAPACITY * self._size
-        received, answered = _STAMPS.unpack_from(memory, start + self._stamps)
-        if answered:
+        if _STAMPS.unpack_from(memory, start + self._stamps)[1]:
             return False
-        lateness = 1e-9 * (arrived - received) if arrived >= received else math.nan  # NaN: it was there before.
-        _ANSWERED.pack_into(memory, start + self._stamps + 8, arrived, lateness)
+        time_ns, lateness, command = arrival
+        _ANSWERED.pack_into(memory, start + self._stamps + 8, time_ns, lateness)
         pack, offset, numbers_of = self._answer
         pack(memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
         return True
+
+    def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
+        """Removes a command from those that wait for a row, and returns it; None if it is not among them."""
+        for arrival in self._waiting:
+            if arrival.command is command:
+                self._waiting.remove(arrival)
+                return arrival
+        return None
 
     def _find_answer(self, mode: MotionMode) -> tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]:
         """Returns how a command of this mode is stored: the packer, its offset in a row, and its numbers."""
@@ -156,15 +199,13 @@ class CycleCapture:
         arm = controller.arm
         if is_moving:
             self._motion += 1
-            self._answer = self._find_answer(arm.mode)
-            self._lost_client, self._received = "", 0
-            self._commands.clear()
-            self._waiting.clear()
+            self._lost_client = ""
             load = arm.model.load
             self._ring.add_event(
                 {
                     "event": "begin",
                     "motion": self._motion,
+                    "row": self._count,
                     "mode": state.controller_mode.name.lower(),
                     "client": self._client,
                     "wall_ns": time.time_ns(),
@@ -180,7 +221,7 @@ class CycleCapture:
             {
                 "event": "end",
                 "motion": self._motion,
-                "rows": self._count,
+                "row": self._count,
                 "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
                 "lost": playout.lost,
@@ -190,6 +231,11 @@ class CycleCapture:
                 "duplicates": playout.duplicates,
             }
         )
+        # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
+        self._received = self._late = 0
+        self._rows.clear()
+        self._commands.clear()
+        self._waiting.clear()
 
     def _pack(self, state: RobotState, playout: tuple[int, ...]) -> bytes:
         modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode

@@ -60,6 +60,7 @@ class JitterBuffer:
     """The queue between network and cycle. Owned by the controller's loop.
 
     Attributes:
+        cycles: Cycles of this motion since its first command was played, the lost ones among them.
         lost: Lost cycles of this motion.
         consecutive_lost: Lost cycles since the last command.
         max_consecutive_lost: Largest number of consecutive lost cycles of this motion.
@@ -96,9 +97,10 @@ class JitterBuffer:
         self._surplus = 0  # Commands with a repeated id, right before the next one in the queue.
         self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still arrive.
         self._cycles_waited = 0
+        self._played: deque[ArmCommand] = deque(maxlen=LONGEST_GAP)  # The last ones.
         self.is_playing = False
         self.is_finished = False
-        self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
+        self.cycles = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
         self.late = self.dropped = self.duplicates = 0
 
     def clear(self) -> None:
@@ -128,11 +130,11 @@ class JitterBuffer:
         is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
         if not is_reordered:
             self._newest = command
-        if self._is_late(command):
-            self.late += 1
-        elif is_reordered and command in queue:
+        elif command in self._played or command in queue:
             self.duplicates += 1
             return False
+        if self._is_late(command):
+            self.late += 1
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
@@ -239,6 +241,7 @@ class JitterBuffer:
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
         self._queue.remove(command)  # The first one, except for a reordered command.
         self._advance_to(command.number)
+        self._played.append(command)
         self.consecutive_lost = 0
         self.is_finished = command.finished
         self._count(True)
@@ -267,6 +270,7 @@ class JitterBuffer:
         return playback
 
     def _count(self, played: bool) -> None:
+        self.cycles += 1
         outcomes = self._outcomes
         if len(outcomes) == WINDOW:
             self._played_in_window -= outcomes[0]

@@ -10,7 +10,7 @@ import pytest
 
 from rcilab.cli import main
 from rcilab.recording.run import load_run
-from tests.peers import programs
+from tests.peers import programs, wire
 from tests.peers.arena import Process
 from tests.peers.robot import PATIENCE, Robot
 from tests.waiting import wait_for
@@ -54,3 +54,40 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, capsys: py
     assert "--record" in (line := capsys.readouterr().err)
     assert "is not a folder that can be written to: Not a directory" in line
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == handlers
+
+
+def moving_client(controller: Process) -> Robot:
+    """A client in mid-motion, after 400 commands."""
+    robot = Robot(controller.host, controller.port, start_sleep=0.0, receive_timeout=PATIENCE, first_timeout=PATIENCE)
+    robot.set_motor_power(1)
+    robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+    state = robot.receive_fresh_state()
+    for _ in range(400):
+        robot.send_raw(wire.pack_command(state.message_id, programs.START[7]))
+        state = robot.next_state(state.message_id)
+    return robot
+
+
+def test_the_last_motion_is_whole_although_the_controller_was_killed(tmp_path: Path) -> None:
+    with Process("--record", str(tmp_path), "--lockstep") as controller:
+        robot = moving_client(controller)
+        controller.process.kill()
+        robot.close()
+        wait_for(lambda: list(tmp_path.glob("*.txt")), what="the report")
+    (file,) = tmp_path.glob("*.rcirun")
+    run = load_run(file)
+    assert run.stopped == "the controller was ended"
+    assert int((run.cycles["sent_ns"] != 0).sum()) == 400
+
+
+def test_a_second_interrupt_ends_the_wait_for_a_recorder_that_was_stopped(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with Process("--record", str(tmp_path / "runs"), "--lockstep", log=log) as controller:
+        children = Path(f"/proc/{controller.process.pid}/task/{controller.process.pid}/children")
+        (child,) = children.read_text().split()
+        os.kill(int(child), signal.SIGSTOP)
+        controller.process.terminate()
+        wait_for(lambda: "waiting for the recorder" in log.read_text(), what="the line in the log")
+        controller.process.send_signal(signal.SIGINT)
+        assert controller.process.wait(PATIENCE) == 0
+    assert "the recorder was ended before its last report" in log.read_text()

@@ -8,7 +8,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -79,11 +79,14 @@ def arena(**options: Any) -> Iterator[Arena]:
 
 
 class Process:
-    """`rcilab controller` in a process of its own."""
+    """`rcilab controller` in a process of its own; its log goes to stderr, or to a file."""
 
-    def __init__(self, *arguments: str, model: str = "xMatePro7") -> None:
+    def __init__(self, *arguments: str, model: str = "xMatePro7", log: Path | None = None) -> None:
         command = [sys.executable, "-m", "rcilab.cli", "controller", "--model", model, "--port", "0", *arguments]
-        self.process = subprocess.Popen([*command, "--exit-with-parent"], stdout=subprocess.PIPE, text=True)
+        with nullcontext() if log is None else log.open("w") as stderr:
+            self.process = subprocess.Popen(
+                [*command, "--exit-with-parent"], stdout=subprocess.PIPE, stderr=stderr, text=True
+            )
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
         found = re.match(r"listening rci://([\d.]+):(\d+) ", line)

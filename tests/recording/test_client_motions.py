@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,10 +15,11 @@ import numpy as np
 import pytest
 
 from rcilab.conformance.check import check
-from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
 from rcilab.core.errors import UsageError, VersionMismatchError
 from rcilab.model.robot_model import load_model
-from rcilab.recording.client_motions import ClientMotions, MotionPart
+from rcilab.recording.client_motions import LAG, ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import Run, build_run, load_run
@@ -242,6 +245,184 @@ def test_duplicates_do_not_displace_other_commands() -> None:
     assert (sources < played).all()
     different = [data for data, before in zip(sent, [b"", *sent], strict=False) if data != before]
     assert [row.tobytes() for row in run.command[sources]] == [data[8:64] for data in different]
+
+
+def sine(step: int, count: int) -> tuple[float, ...]:
+    """A gentle motion that begins and ends at rest, [rad]; no two commands are equal."""
+    offset = 0.01 * (1.0 - np.cos(2.0 * np.pi * step / (count - 1))) + 1e-12 * step
+    return tuple(angle + offset for angle in programs.START[7])
+
+
+@pytest.mark.parametrize(
+    "number_of",
+    [
+        pytest.param(lambda number, step: step + 10, id="its own numbers"),
+        pytest.param(lambda number, step: number - 300, id="old numbers"),
+        pytest.param(lambda number, step: 0x7F000000 + step, id="numbers of no state"),
+        pytest.param(lambda number, step: number if step < 300 else step - 300, id="numbers that begin again"),
+        pytest.param(lambda number, step: max(number - 400, 0) if step < 90 else number, id="old numbers at first"),
+    ],
+)
+def test_commands_with_other_numbers_than_those_of_the_states_are_recorded_as_played(
+    number_of: Callable[[int, int], int],
+) -> None:
+    count = 800
+    with watched() as (place, motions), place.connect() as robot:
+        robot.set_motor_power(1)
+        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+        sent = [sine(step, count) for step in range(count)]
+        state = robot.receive_fresh_state()
+        for step, q in enumerate(sent):
+            robot.send_raw(wire.pack_command(number_of(state.message_id, step) & 0xFFFFFFFF, q))
+            state = robot.next_state(state.message_id)
+        robot.stop_move()
+        parts = collect(motions, 1)[0]
+    run, end = as_run(parts), parts[-1].end
+    played = np.flatnonzero(run.cycles["played"])
+    sources = played - run.cycles["age"][played].astype(int)
+    assert [tuple(row) for row in run.command[sources].tolist()] == sent
+    assert run.cycles["sent_ns"][sources].all()
+    assert end is not None
+    assert (end.lost, end.late) == (0, 0)
+    found = report_on_client(run, end)
+    assert "conforms" in found.text
+    assert f"{count} commands, 0 cycles without one, 0 late" in found.line
+
+
+def synthetic_rows(ring: CycleRing, first: int, count: int, motion: int = 1) -> None:
+    """Writes cycles in which the command of the one before is played."""
+    rows = np.zeros(count, cycle_dtype(ring.n, complete=True, playout=True))
+    rows["message_id"] = rows["sent_ns"] = np.arange(first, first + count) + 1
+    rows["motion"], rows["played"], rows["age"] = motion, 1, 1
+    for row, data in zip(rows, range(first, first + count), strict=True):
+        start = data % CAPACITY * rows.itemsize
+        ring.memory[start : start + rows.itemsize] = row.tobytes()
+        ring.counters[RingCounter.ROWS] = data + 1
+
+
+def begin_event(motion: int, row: int) -> dict[str, Any]:
+    tool, load = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], [0.0, [0.0] * 3, [[0.0] * 3] * 3]
+    event = {"event": "begin", "motion": motion, "row": row, "mode": "joint_position", "client": "127.0.0.1"}
+    return {**event, "wall_ns": 0, "tool": tool, "load": load, "settings": {}}
+
+
+def end_event(motion: int, row: int) -> dict[str, Any]:
+    counts = dict.fromkeys(("received", "lost", "most_lost", "late", "dropped", "duplicates"), 0)
+    return {"event": "end", "motion": motion, "row": row, "stopped": None, **counts}
+
+
+@pytest.fixture
+def ring() -> Iterator[CycleRing]:
+    found = CycleRing.create(7, {"model": "xMatePro7", "plant": "ideal", "url": "rci://127.0.0.1", "realtime": True})
+    yield found
+    found.close()
+
+
+def test_overwritten_cycles_are_a_gap_with_its_size(ring: CycleRing) -> None:
+    motions = ClientMotions(ring)
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 1000)
+    (before,) = motions.poll()
+    assert (before.cycles["message_id"][0], len(before.cycles), before.skipped) == (1, 1000 - LAG, 0)
+    written = 1000 + CAPACITY + 500
+    synthetic_rows(ring, 1000, CAPACITY + 500)
+    ring.add_event(end_event(1, written))
+    (after,) = motions.poll()
+    assert after.end is not None
+    first = int(after.cycles["message_id"][0]) - 1
+    assert after.skipped == first - (1000 - LAG)
+    assert first > written - CAPACITY
+    np.testing.assert_allclose(after.cycles["t"], 1e-3 * np.arange(first, written), rtol=0, atol=1e-9)
+
+
+def test_a_motion_with_a_gap_is_two_runs_and_neither_is_judged_across_it(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 1000)
+    recorder.poll()
+    synthetic_rows(ring, 1000, CAPACITY + 500)
+    ring.add_event(end_event(1, 1500 + CAPACITY))
+    recorder.poll()
+    recorder.close()
+    first, second = (load_run(path) for path in sorted(tmp_path.glob("*.rcirun"), reverse=True))
+    assert (first.truncated, second.truncated) == (False, True)
+    assert first.stopped == "this file ends here, the motion went on"
+    assert second.t[0] > first.t[-1] + 0.5
+    assert sum("cycles before" in line and "are not recorded" in line for line in lines) == 1
+
+
+def test_motions_whose_events_were_overwritten_are_named(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    for motion in range(1, 602):
+        ring.add_event(begin_event(motion, motion - 1))
+        synthetic_rows(ring, motion - 1, 1, motion)
+        ring.add_event(end_event(motion, motion))
+        if motion == 1:
+            recorder.poll()
+    ring.add_event(begin_event(602, 601))
+    synthetic_rows(ring, 601, 600, 602)
+    ring.add_event(end_event(602, 1201))
+    recorder.poll()
+    recorder.close()
+    assert any(line.startswith("motion 2 to ") and "not recorded" in line for line in lines)
+    assert len(list(tmp_path.glob("*-602-*.rcirun"))) == 1
+
+
+def test_two_recorders_share_a_folder(tmp_path: Path) -> None:
+    with arena(is_recorded=True) as place:
+        assert place.server.ring is not None
+        recorders = [ClientRecorder(tmp_path, place.server.ring, lambda kind, text: None) for _ in range(2)]
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=1.0)
+        for recorder in recorders:
+            recorder.close()
+    first, second = (load_run(path) for path in tmp_path.glob("*.rcirun"))
+    assert first.cycles.tobytes() == second.cycles.tobytes()
+    assert len(list(tmp_path.glob("*.txt"))) == 2
+
+
+def test_the_next_motion_is_recorded_after_the_folder_was_removed(tmp_path: Path) -> None:
+    folder, lines = tmp_path / "runs", list[str]()
+    with arena(is_recorded=True) as place:
+        assert place.server.ring is not None
+        recorder = ClientRecorder(folder, place.server.ring, lambda kind, text: lines.append(text))
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=1.0)
+            wait_for(lambda: (recorder.poll(), len(lines) == 1)[1])
+            shutil.rmtree(folder)
+            programs.joint_sine(robot, SECONDS, period=SECONDS)
+        recorder.close()
+    (path,) = folder.glob("*-002-*.rcirun")
+    assert load_run(path).is_complete
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(b"", id="empty"),
+        pytest.param(b"x" * 10_000, id="another file"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 1, 7, 1400, CAPACITY) + bytes(4000), id="cut"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 1, 2**31, 1400, CAPACITY) + bytes(4000), id="joints"),
+    ],
+)
+def test_a_file_that_is_no_record_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with path.open("rb+") as file, pytest.raises(UsageError, match="the record of"):
+        CycleRing.attach(os.getpid(), file.fileno())
+
+
+def test_damaged_facts_and_events_are_refused(ring: CycleRing) -> None:
+    motions = ClientMotions(ring)
+    ring.counters[RingCounter.EVENTS] = 2**40
+    with pytest.raises(UsageError, match="an event of its client is unreadable"):
+        motions.poll()
+    other = CycleRing.create(7, {"model": 7})
+    with pytest.raises(UsageError, match="does not name its arm"):
+        ClientMotions(other)
+    other.close()
 
 
 def test_tool_load_and_settings_in_force_are_recorded() -> None:

@@ -197,6 +197,16 @@ def test_a_copy_made_by_the_network_is_dropped(order: tuple[int, ...]) -> None:
     assert (len(playout), playout.duplicates, playout.lost) == (0, 3, 0)
 
 
+def test_a_late_copy_of_a_played_command_is_a_copy() -> None:
+    playout = JitterBuffer(prefill=0)
+    commands = [command(k) for k in (5, 6)]
+    for each in commands:
+        playout.push(each)
+    assert take_ids(playout, 2) == [5, 6]
+    assert not playout.push(commands[0])
+    assert (len(playout), playout.duplicates, playout.late) == (0, 1, 0)
+
+
 def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
     playout = JitterBuffer(prefill=0)
     first = command(5)

@@ -54,7 +54,7 @@ class WatchActions:
             self._shown = time.monotonic()
 
     def _add(self, part: MotionPart) -> None:
-        if self._motion is not part.motion:
+        if self._motion is not part.motion or part.skipped:
             self._motion, self._rows, self._count = part.motion, [], 0
         if len(part.cycles):
             self._rows.append(part.cycles)

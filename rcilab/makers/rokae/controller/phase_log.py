@@ -23,8 +23,6 @@ class Situation(NamedTuple):
     faults: tuple[Fault, ...]
     controller_mode: ControllerMode
     """As shown in the states."""
-    cycle: int
-    """Number of the last state."""
 
 
 class PhaseLog:
@@ -37,7 +35,6 @@ class PhaseLog:
 
     def __init__(self, playout: JitterBuffer, log: Callable[..., None]) -> None:
         self._playout, self._log = playout, log
-        self._first_cycle = 0
 
     def record(self, before: Situation, after: Situation) -> None:
         """Logs what changed; called after every transition."""
@@ -45,14 +42,13 @@ class PhaseLog:
             self._log(kind, text, phase=after.phase.name.lower())
         was_moving, is_moving = before.phase in _IN_MOTION, after.phase in _IN_MOTION
         if is_moving and not was_moving:
-            self._first_cycle = after.cycle
             mode = after.controller_mode.name.lower()
             self._log("motion_started", f"motion started: {mode.replace('_', ' ')}", mode=mode)
         elif was_moving and not is_moving:
             self._log_end(before, after)
 
     def _log_end(self, before: Situation, after: Situation) -> None:
-        cycles, playout = after.cycle - self._first_cycle, self._playout
+        playout, cycles = self._playout, self._playout.cycles
         is_fault = after.faults != before.faults or after.phase is not Phase.IDLE
         figures = f"{cycles} cycles, {playout.lost} commands lost, {playout.late} late"
         self._log(

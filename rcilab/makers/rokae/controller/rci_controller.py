@@ -396,7 +396,7 @@ class RciController:
 
     @property
     def _situation(self) -> Situation:
-        return Situation(self.phase, self.faults, self._shown[0], self._message_id)
+        return Situation(self.phase, self.faults, self._shown[0])
 
     def _act(self, action: Action, request: rci.Request | None, faults: tuple[Fault, ...]) -> None:
         match action:

@@ -98,9 +98,9 @@ def test_a_program_can_be_followed_by_its_log() -> None:
     assert started.text == "motion started: joint position"
     cycles = len(MOTION.q)
     assert ended.facts["lost"] == ended.facts["late"] == 0
-    assert cycles <= ended.facts["cycles"] <= cycles + 400, "the commands, and the end of the arm's motion"
+    assert ended.facts["cycles"] == cycles
     assert ended.facts["duration"] == pytest.approx(ended.facts["cycles"] * CYCLE_TIME)
-    assert ended.cycle - started.cycle == ended.facts["cycles"]
+    assert ended.cycle - started.cycle >= ended.facts["cycles"], "the state before the first command, and the end"
     fault, stopped, refused = found.entries[5:8]
     assert "kCommandJointVelocityLimitsViolation" in fault.text
     assert "kCommandJointVelocityLimitsViolation" in fault.facts["faults"]
