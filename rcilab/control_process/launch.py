@@ -7,24 +7,13 @@ import time
 from collections.abc import Sequence
 
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
-from rcilab.core.errors import ConnectionLostError, InvalidValueError
-from rcilab.sim.controller_config import PLANT_KINDS
+from rcilab.core.errors import ConnectionLostError
 
 START_TIMEOUT = (
     20.0  # [s] Python with its numerical libraries takes about 1 s from a cold disk; more on a busy machine.
 )
 _LISTENING = re.compile(r"^listening ([a-z]+://\S+)( |$)")
 _WORLD = re.compile(r"^world (\S+)$", re.MULTILINE)
-
-
-def require_plant(plant: object) -> None:
-    """Requires a plant of the virtual controller.
-
-    Raises:
-        InvalidValueError: The plant is unknown; the message lists the plants.
-    """
-    if plant not in PLANT_KINDS:
-        raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
 
 
 class VirtualController(ManagedProcess):

@@ -6,19 +6,27 @@ import weakref
 
 import numpy as np
 
-from rcilab.control_process.launch import require_plant, start_controller
+from rcilab.control_process.launch import start_controller
 from rcilab.execution.session import RobotSession, open_session
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
+from rcilab.sim.controller_config import require_plant
+from rcilab.sim.streamed_motion import require_loss_behaviour
 
 ANSWER_TIMEOUT = 10.0  # [s] The controller is on this machine: if it is slow, the machine is busy.
 STATE_TIMEOUT_IN_LOCKSTEP = 5.0  # [s] A busy machine may pause a controller without deadlines for seconds.
 
 
 def simulate(
-    model: RobotModel, *, plant: str = "ideal", lockstep: bool = True, record_all: bool = False
+    model: RobotModel,
+    *,
+    plant: str = "ideal",
+    lockstep: bool = True,
+    record_all: bool = False,
+    realism: str = "off",
+    on_loss: str = "hold",
 ) -> RobotSession:
     """Returns a session with a simulated arm; the simulation ends when the session is closed or garbage-collected.
 
@@ -28,15 +36,18 @@ def simulate(
         lockstep: True: each simulated millisecond waits for its command, so that a run has the same result to the last
             bit on any machine. False: the controller runs freely at 1 kHz, like a real one.
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
+        realism: "real": the joints of the MuJoCo plant have the friction and torque sensors of real ones; or "off".
+        on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap.
 
     Raises:
-        InvalidValueError: `model` is not a robot model, or the plant is unknown.
+        InvalidValueError: `model` is not a robot model, or another value is unknown.
         ModelError: The arm has no virtual controller.
         ConnectionLostError: The virtual controller did not start; the message contains its output.
     """
     require_simulator(require_model(model))
-    require_plant(plant)
-    controller = start_controller(model.name, plant, lockstep)
+    require_plant(plant, realism)
+    require_loss_behaviour(on_loss)
+    controller = start_controller(model.name, plant, lockstep, ["--realism", realism, "--on-loss", on_loss])
     try:
         assert controller.address is not None  # Set by start_controller.
         session = open_session(

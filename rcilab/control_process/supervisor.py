@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from rcilab.conformance.speed_scaling_check import plan_start_with_override
 from rcilab.control_process.configuration_sync import ConfigurationSync, standard_setup
 from rcilab.control_process.jog_record import hold_jog, release_jog
-from rcilab.control_process.launch import require_plant
 from rcilab.control_process.layout import OPERATOR_TIMEOUT, ControlBlock, Counter
 from rcilab.control_process.messages import (
     Configure,
@@ -49,6 +48,7 @@ from rcilab.makers.driver import ExpectedArm, GuideKind, GuideSpace, parse_addre
 from rcilab.makers.maker import capabilities_of, require_driver, require_feature, require_parts
 from rcilab.model.robot_model import require_model
 from rcilab.motion.speed_scaling import SpeedScaledMotion, require_speed_override
+from rcilab.sim.controller_config import require_plant
 
 if TYPE_CHECKING:
     from rcilab.conformance.certificate import Certificate

@@ -51,11 +51,8 @@ from rcilab.sim.api import (
     Release,
     RemoveBox,
     SafetyButton,
-    SetBox,
     SetInput,
-    SetLoad,
     SetSoftLimits,
-    SetTool,
     StallClock,
     Walls,
     WorldAnswer,
@@ -64,6 +61,7 @@ from rcilab.sim.api import (
     decode_world_answer,
     encode_world_request,
 )
+from rcilab.sim.setup_requests import box_request, load_request, tool_request
 
 TIMEOUT = LONGEST_STALL + 5.0  # [s] A stalled controller responds after the stall, on a busy machine later.
 
@@ -215,17 +213,15 @@ class SimulationControl(Closeable):
 
     def set_tool(self, tool: Pose) -> None:
         """Sets the tool as on the teach pendant, by its pose in the flange frame; a session's model keeps its own."""
-        tool = as_pose(tool)
-        self.ask(SetTool(tuple(tool.position.tolist()), tuple(tool.wxyz.tolist())))
+        self.ask(tool_request(as_pose(tool)))
 
     def set_load(self, load: Payload) -> None:
         """Sets the load as on the teach pendant; a session's model keeps its own."""
-        self.ask(SetLoad(load.mass, tuple(load.center_of_mass.tolist()), tuple(load.inertia.ravel().tolist())))
+        self.ask(load_request(load))
 
     def set_box(self, box: SafetyBox) -> None:
         """Sets the safety box as on the teach pendant; an inactive one is not enforced."""
-        pose = box.T_base_box
-        self.ask(SetBox(box.size, tuple(pose.position.tolist()), tuple(pose.wxyz.tolist()), box.active))
+        self.ask(box_request(box))
 
     def set_soft_limits(self, lower: ArrayLike, upper: ArrayLike) -> None:
         """Sets the soft limits of the joints as on the teach pendant, shape (n,) each, [rad]."""

@@ -115,6 +115,7 @@ class ArmServer:
             self._clock,
             lambda: ServerCounters(self.missed, self.bad_datagrams, self._endpoint.unknown_senders),
             lambda: -1 if self.ring is None else self.ring.descriptor,
+            self._log.write,
         )
         self.ring: CycleRing | None = None
         self._capture: CycleCapture | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 _DISTANCE_RATIO = 4.0  # Between the nearer and the farther prediction, so that a jerk is not decisive; a tuning value.
+_LONGEST = 50  # [cycles] The longest gap in which a cubic follows a motion; the way over a longer one is straight.
 
 
 class CommandExtrapolator:
@@ -45,6 +46,24 @@ class CommandExtrapolator:
         share = steps * (steps + 1) * (steps + 2) / (target_steps * (target_steps + 1) * (target_steps + 2))
         at_target = self.predict(target_steps)
         return [x + share * (goal - y) for x, goal, y in zip(extrapolated, target, at_target, strict=True)]
+
+    def bridge(self, target: Sequence[float], steps: int) -> list[list[float]]:
+        """Takes and returns the commands between the last one and a known one, `_LONGEST` at most.
+
+        Args:
+            target: The known command; it is left to `take`.
+            steps: Cycles from the last command to it.
+        """
+        if steps <= _LONGEST:
+            between = [self.predict(step, target, steps) for step in range(1, steps)]
+        else:
+            velocity = [(x - y) / steps for x, y in zip(target, self.last, strict=True)]
+            between = [
+                [x - left * v for x, v in zip(target, velocity, strict=True)] for left in range(_LONGEST - 1, 0, -1)
+            ]
+        for values in between:
+            self.take(values)
+        return between
 
     def is_next(self, values: Sequence[float], steps: int, in_doubt: bool = False) -> bool:
         """Returns whether a command continues the stream by one step rather than by `steps`.

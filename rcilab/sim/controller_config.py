@@ -40,6 +40,20 @@ VENDOR_MODE_DELAY = 1.05
 FEWEST_LOST, MOST_LOST = 10, 20  # Manual 4.6: the packet-loss threshold is usually 10 to 20.
 
 
+def require_plant(plant: object, realism: object = "off") -> None:
+    """Requires a plant of the virtual controller, and that it has joints of this realism.
+
+    Raises:
+        InvalidValueError: One is unknown, and the message lists the known ones; or they do not go together.
+    """
+    if plant not in PLANT_KINDS:
+        raise InvalidValueError("plant", plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
+    if realism not in REALISMS:
+        raise InvalidValueError("realism", realism, f"is unknown; known: {', '.join(REALISMS)}")
+    if realism != "off" and plant != "mujoco":
+        raise InvalidValueError("realism", realism, "needs the plant mujoco: the ideal one has no friction")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerConfig:
     """All options of a virtual controller.
@@ -128,16 +142,11 @@ class ControllerConfig:
                 raise InvalidValueError(name, port, f"is not a valid port; must be {lowest} to 65535")
         if not self.host:
             raise InvalidValueError("host", self.host, "is not a valid address; use 127.0.0.2 for this machine only")
-        if self.plant not in PLANT_KINDS:
-            raise InvalidValueError("plant", self.plant, f"is unknown; known: {', '.join(PLANT_KINDS)}")
+        require_plant(self.plant, self.realism)
         if self.force_sign not in FORCE_SIGNS:
             raise InvalidValueError("force_sign", self.force_sign, f"is unknown; known: {', '.join(FORCE_SIGNS)}")
         if self.log_format not in LOG_FORMATS:
             raise InvalidValueError("log_format", self.log_format, f"is unknown; known: {', '.join(LOG_FORMATS)}")
-        if self.realism not in REALISMS:
-            raise InvalidValueError("realism", self.realism, f"is unknown; known: {', '.join(REALISMS)}")
-        if self.realism != "off" and self.plant != "mujoco":
-            raise InvalidValueError("realism", self.realism, "needs the plant mujoco: the ideal one has no friction")
         require_loss_behaviour(self.on_loss)
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import asdict, dataclass
 
 from rcilab.core.clock import Clock
 from rcilab.core.errors import RcilabError, UsageError
 from rcilab.core.safety_box import SafetyBox, active_box
 from rcilab.core.spatial import Pose
-from rcilab.model.dynamics.payload import Payload
 from rcilab.sim.api import (
     AutoLimit,
     Done,
@@ -45,11 +42,11 @@ from rcilab.sim.api import (
     WorldRequest,
     WorldStatus,
 )
-from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.force_profile import ForceProfile
 from rcilab.sim.maker_server import SimulatedController
+from rcilab.sim.setup_requests import SetupInForce, as_setup, describe_setup
 from rcilab.sim.streamed_motion import require_loss_behaviour
 
 
@@ -72,6 +69,7 @@ class Environment:
         clock: Clock for the stalls.
         counters: Returns the counters of the server.
         record: Returns the descriptor of the record of all cycles; -1 without one.
+        log: Takes an entry of the log: kind, text and facts; None: there is no log.
     """
 
     def __init__(
@@ -82,6 +80,7 @@ class Environment:
         clock: Clock,
         counters: Callable[[], ServerCounters],
         record: Callable[[], int] = lambda: -1,
+        log: Callable[..., None] | None = None,
     ) -> None:
         self._controller = controller
         self._plant = controller.arm.plant
@@ -89,7 +88,9 @@ class Environment:
         self._stalls = stalls
         self._clock = clock
         self._counters = counters
-        self._record = record
+        self._record, self._log = record, log
+        self._parameters = controller.arm.parameters
+        self._setup = SetupInForce.of(self._parameters)  # Kept, because it takes longer than the rest of a status.
         self._push = ForceProfile()
         self._has_walls = False
         self._walls: SafetyBox | None = None
@@ -153,18 +154,12 @@ class Environment:
                 self._plant.set_walls(self._active_box() if on else None)
                 self._has_walls, self._walls = on, self._active_box()
             case Mount():
-                self._plant.mount(None if request.mass is None else _payload(request, request.mass))
-            case PlaceArm(q):
-                self._controller.set_up(ArmSetup(q=q))
-            case SetTool(position, wxyz):
-                self._controller.set_up(ArmSetup(T_flange_tool=Pose(position, wxyz)))
-            case SetLoad(mass):
-                self._controller.set_up(ArmSetup(load=_payload(request, mass)))
-            case SetBox(size, position, wxyz, active):
-                box = SafetyBox(size=size, T_base_box=Pose(position, wxyz), active=active)
-                self._controller.set_up(ArmSetup(safety_box=box))
-            case SetSoftLimits(lower, upper):
-                self._controller.set_up(ArmSetup(soft_limits=(lower, upper)))
+                load = SetLoad(request.mass or 0.0, request.center_of_mass, request.inertia)
+                self._plant.mount(None if request.mass is None else as_setup(load).load)
+            case PlaceArm() | SetTool() | SetLoad() | SetBox() | SetSoftLimits():
+                self._controller.set_up(as_setup(request))
+                if self._log is not None:
+                    self._log("set_up", describe_setup(request), request=request.name, **asdict(request))
             case GetStatus():
                 pass  # Answered before; it changes nothing.
 
@@ -174,6 +169,9 @@ class Environment:
     def _status(self) -> WorldStatus:
         controller, counters = self._controller, self._counters()
         commands, states = self._network.faults
+        if controller.arm.parameters is not self._parameters:
+            self._parameters, self._setup = controller.arm.parameters, SetupInForce.of(controller.arm.parameters)
+        setup = self._setup
         return WorldStatus(
             model=controller.arm.model.name,
             plant=self._plant.kind,
@@ -197,9 +195,9 @@ class Environment:
             states=states,
             pid=os.getpid(),
             record=self._record(),
+            tool=setup.tool,
+            load=setup.load,
+            box=setup.box,
+            soft_limits=setup.soft_limits,
+            inputs=controller.inputs,
         )
-
-
-def _payload(request: Mount | SetLoad, mass: float) -> Payload:
-    inertia = np.array(request.inertia).reshape(3, 3)
-    return Payload(mass=mass, center_of_mass=np.array(request.center_of_mass), inertia=inertia)

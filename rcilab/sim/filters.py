@@ -66,6 +66,11 @@ class PoseLowPass:
         self._pose = pose
         self._psi = psi
 
+    @property
+    def is_on(self) -> bool:
+        """Whether it changes poses."""
+        return self._gain < 1.0
+
     def step(self, pose: Pose, psi: float) -> tuple[Pose, float]:
         """Returns the filtered pose and arm angle of this cycle."""
         gain = self._gain

@@ -13,10 +13,12 @@ import numpy as np
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.spatial import rotation_between
+from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.plant import Measurement, Setpoint
 from rcilab.sim.tool_kinematics import ToolKinematics
+from rcilab.sim.violations import ArmCondition, ArmViolation, Violations
 
 _STILL = 0.01  # [rad/s] Below it a joint that friction holds is stationary; a tuning value.
 _SLACK = 1.1  # Between the friction and the torque that it holds; noise and the creep of simulated friction.
@@ -30,12 +32,16 @@ _SWINGS = 6  # Swings in a row that are ringing.
 class FrictionWatch:
     """Observes an arm with known friction in its compliant motions. Owned by the virtual arm.
 
+    Attributes:
+        has_held: Whether friction held the arm off the commands at the end of the last compliant motion.
+
     Args:
         friction: Coulomb friction of the joints, n numbers, [N m].
     """
 
     def __init__(self, friction: Sequence[float]) -> None:
         self._friction = list(friction)
+        self.has_held = False
         self.begin()
 
     def begin(self) -> None:
@@ -56,11 +62,13 @@ class FrictionWatch:
         law = self._law
         if law is None:
             return []
+        self.has_held = False
         ringing = [(number, joint) for number, joint in enumerate(self._joints, 1) if joint.amplitude > 0.0]
         found = [_describe_ringing(number, joint, law) for number, joint in ringing]
         if not ringing and law is not ControlLaw.TORQUE and self._is_held():
             is_joint = law is ControlLaw.JOINT_IMPEDANCE
             held = self._describe_joint(parameters) if is_joint else self._describe_tool()
+            self.has_held = held is not None
             found += [] if held is None else [held]
         self.begin()
         return found
@@ -91,6 +99,21 @@ class FrictionWatch:
             f"the tool ended {1e3 * distance:.2g} mm and {degrees(turn):.2g} deg off its command: this stiffness does "
             f"not overcome the friction of the joints, {min(self._friction):g} to {max(self._friction):g} N m"
         )
+
+
+def blame_friction(violations: Violations) -> Violations:
+    """Returns the violations of a first command after a compliant motion, with friction as the cause of the offset."""
+    return tuple(
+        ArmViolation(violation.condition, _held_off(violation.remark))
+        if violation.condition is ArmCondition.START_TOLERANCE
+        else violation
+        for violation in violations
+    )
+
+
+def _held_off(jump: Remark) -> Remark:
+    sentence = f"{jump} (friction held the compliant arm off the commands of its last motion)"
+    return Remark(sentence, "held_by_friction", reason=jump)
 
 
 class _Swings:

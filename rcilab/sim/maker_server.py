@@ -102,6 +102,11 @@ class SimulatedController(Protocol):
         """
         ...
 
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """Numbers of the digital inputs that are high."""
+        ...
+
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input."""
         ...

@@ -24,7 +24,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import Actuator, ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
-from rcilab.sim.friction_watch import FrictionWatch
+from rcilab.sim.friction_watch import FrictionWatch, blame_friction
 from rcilab.sim.generators import build_generator
 from rcilab.sim.generators.generator import blame_lost_commands
 from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
@@ -274,7 +274,11 @@ class VirtualArm:
             output = self._motion.step()
             self.playback = self._motion.playback
             if output is not None and output.violations:
-                result = StepResult(command_violations=output.violations)
+                violations = output.violations
+                watch = self._friction_watch
+                if watch is not None and watch.has_held and self._last_compliance is not None:
+                    violations = blame_friction(violations)
+                result = StepResult(command_violations=violations)
                 self._react()
             elif output is not None:
                 has_moved = True

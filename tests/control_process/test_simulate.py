@@ -214,6 +214,33 @@ def test_an_unknown_plant_or_model_is_refused_before_anything_starts(monkeypatch
         simulate("xMatePro7")
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"realism": "real"}, "realism needs the plant mujoco: the ideal one has no friction"),
+        ({"plant": "mujoco", "realism": "rough"}, "realism: 'rough' is unknown; known: off, real"),
+        ({"on_loss": "pray"}, "on_loss: 'pray' is unknown; known: hold, bridge"),
+    ],
+)
+def test_realism_and_behaviour_are_checked_before_anything_starts(options, words):
+    with pytest.raises(InvalidValueError, match=words):
+        simulate(load_model("xMatePro7"), **options)
+
+
+def test_a_simulated_arm_can_have_real_joints_and_bridge_pauses(monkeypatch):
+    started = []
+
+    def start(*arguments):
+        started.append(arguments)
+        return start_controller(*arguments)
+
+    monkeypatch.setattr("rcilab.control_process.simulate.start_controller", start)
+    with simulate(load_model("xMatePro7"), plant="mujoco", realism="real", on_loss="bridge") as robot:
+        steps = robot.state.tau[0] / 0.0488
+        assert steps == pytest.approx(round(steps), abs=1e-6)
+    assert started == [("xMatePro7", "mujoco", True, ["--realism", "real", "--on-loss", "bridge"])]
+
+
 def test_closing_ends_the_private_controller():
     robot = simulate(MODEL)
     address = robot.address

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, TypeAlias, cast
 
 from rcilab.i18n.translator import Remark
 from rcilab.sim.api.faults import NetworkFaults
 from rcilab.sim.api.fields import as_flag, as_float, as_floats, as_integer
+from rcilab.sim.api.requests import SetBox, SetLoad, SetSoftLimits, SetTool
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +78,28 @@ class WorldStatus:
     record: int = -1
     """Its descriptor of the record of all cycles, see `rcilab.core.cycle_ring`; -1: it keeps none."""
 
+    tool: SetTool | None = None
+    """The set-up in force, each as the request that sets it; None: an older controller does not report it."""
+    load: SetLoad | None = None
+    box: SetBox | None = None
+    """None: there is no safety box."""
+    soft_limits: SetSoftLimits | None = None
+    inputs: tuple[int, ...] | None = None
+    """Numbers of the digital inputs that are high."""
+
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
 
 _COUNTS = ("cycle", "lost", "lost_in_row", "missed", "bad_datagrams", "unknown_senders", "ignored", "stalls", "pid")
 _LARGEST_COUNT = 2**63
+_SETUP = {"tool": SetTool, "load": SetLoad, "box": SetBox, "soft_limits": SetSoftLimits}
+_MOST_INPUTS = 32
 
 
 def status_as_dict(status: WorldStatus) -> dict[str, Any]:
     """Returns a status as a JSON object."""
     content = {item.name: getattr(status, item.name) for item in fields(status)}
+    content |= {name: asdict(content[name]) for name in _SETUP if content[name] is not None}
     if isinstance(status.reason, Remark) and status.reason.code:
         content["remark"] = status.reason.as_dict()
     return content | {"commands": status.commands.as_dict(), "states": status.states.as_dict()}
@@ -124,6 +137,11 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
         checked["pushed"] = as_flag(checked["pushed"], "pushed")
     if checked.get("auto_limit") is not None:
         checked["auto_limit"] = as_flag(checked["auto_limit"], "auto_limit")
+    for name, kind in _SETUP.items():
+        if checked.get(name) is not None:
+            checked[name] = kind(**checked[name])
+    if checked.get("inputs") is not None:
+        checked["inputs"] = tuple(as_integer(n, "inputs", 0, _MOST_INPUTS) for n in _items(checked["inputs"]))
     for name in ("commands", "states"):
         if name in checked:
             checked[name] = NetworkFaults(**checked[name])

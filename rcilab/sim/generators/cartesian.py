@@ -2,7 +2,8 @@
 
 A commanded pose passes the pose filter and the conditions of the tool, then the inverse kinematics on the present
 branch, then the soft-limit governor if enabled, and finally the conditions of the joint angles. A lost cycle continues
-with the acceleration of the last poses, or holds the joint angles of the last one.
+with the acceleration of the last poses, or holds the joint angles of the last one; then the filter takes the way over
+the pause once the next pose is there.
 
 The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is held: from the start of the motion,
 or from the last command with one. The vendor's client cannot command an arm angle of exactly zero (it is sent as "not
@@ -12,6 +13,7 @@ valid"); therefore an arm angle that is not valid counts as zero while the arm a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from math import dist, hypot, pi, remainder, tau
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
@@ -59,6 +61,7 @@ class CartesianGenerator:
         self._pose = pose
         self._monitor = self._monitor_from(pose, self._psi)
         self._start: StartMonitor[CartesianMonitor] | None = None
+        self._before_pause: CommandExtrapolator | None = None  # While the last command is held.
         self._gap = MissedCycles()
         self._reference = JointReference(bounds, q, checks_box=False)
         self._reference_has_begun = False
@@ -73,6 +76,9 @@ class CartesianGenerator:
         """Processes the pose of this cycle, or bridges a cycle without one."""
         command, is_lost = playback.command, playback.is_lost
         cycles = self._gap.step(playback)
+        is_held = cycles == 0 and self._bounds.servos is not None
+        if is_held and self._before_pause is None:
+            self._before_pause = copy(self._stream)
         if command is None:
             values = self._stream.predict(1)
         else:
@@ -88,15 +94,28 @@ class CartesianGenerator:
                 values = self._stream.predict(1, values, playback.steps)
         if not self._has_begun:
             self._begin(values)
+        if is_held:  # The servo continues from the last joint angles.
+            self._stream.take(values)
+            return self._reference.hold()
+        between = self._end_pause(values, cycles)
         self._stream.take(values)
         self._psi = remainder(values[7], tau) if command is None or is_lost else self._arm_angle(command)
         self._had_psi |= command is not None and command.has_psi
         try:
-            pose = Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
-            pose, psi = self._filter.step(pose, self._psi)
+            for earlier in between:
+                self._filter.step(_pose(earlier), remainder(earlier[7], tau))
+            pose, psi = self._filter.step(_pose(values), self._psi)
         except InvalidValueError as error:  # Extreme numbers, from which bridge or filter gave no pose.
             return _invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
         return self._check(pose, psi, cycles)
+
+    def _end_pause(self, values: list[float], cycles: int) -> list[list[float]]:
+        """Returns the poses on the way over a pause, for the filter if it is on; none without a pause."""
+        if self._before_pause is None:
+            return []
+        self._stream, self._before_pause = self._before_pause, None
+        between = self._stream.bridge(values, cycles)
+        return between if self._filter.is_on else []
 
     def _check(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
         if cycles > 0:
@@ -104,8 +123,6 @@ class CartesianGenerator:
             if violations:
                 return GeneratorOutput(violations=with_jump(self._jump, violations))
             self._jump = None
-        elif self._bounds.servos is not None:  # The servo continues from the last joint angles.
-            return self._reference.hold()
         try:
             q = self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
@@ -189,6 +206,10 @@ class CartesianGenerator:
         # The vendor's client marks an arm angle of exactly zero as not valid.
         passes_zero = self._had_psi and command.psi == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
+
+
+def _pose(values: Sequence[float]) -> Pose:
+    return Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
 
 
 def _invalid_pose(remark: Remark) -> GeneratorOutput:

@@ -2,12 +2,13 @@
 
 The commanded angles pass the joint filter, then the soft-limit governor if enabled, and then the conditions of joint
 angles. A lost cycle continues with the acceleration of the last commands, or, if a later command is already known, on
-the cubic to it; where the last command is held, this only continues filter and governor. The conditions apply to the
-received commands, over the cycles between them.
+the cubic to it. Where the last command is held instead, the filter waits, and takes the cubic once the next command is
+there. The conditions apply to the received commands, over the cycles between them.
 """
 
 from __future__ import annotations
 
+from copy import copy
 from math import isfinite
 
 from rcilab.i18n.translator import Remark
@@ -34,6 +35,7 @@ class JointGenerator:
         self._has_begun = False
         self._stream = CommandExtrapolator(q)
         self._filter = LowPass(bounds.parameters.joint_filter, q)
+        self._before_pause: CommandExtrapolator | None = None  # While the last command is held.
         self._gap = MissedCycles()
         self._reference = JointReference(bounds, q, checks_box=True)
 
@@ -45,6 +47,9 @@ class JointGenerator:
         """Processes the angles of this cycle, or bridges a cycle without any."""
         command = playback.command
         cycles = self._gap.step(playback)
+        is_held = cycles == 0 and self._bounds.servos is not None
+        if is_held and self._before_pause is None:
+            self._before_pause = copy(self._stream)
         if command is None:
             q = self._stream.predict(1)
         else:
@@ -56,6 +61,13 @@ class JointGenerator:
             return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
         if not self._has_begun:
             self._begin(q)
+        if is_held:
+            self._stream.take(q)
+            return self._reference.hold()
+        if self._before_pause is not None:
+            self._stream, self._before_pause = self._before_pause, None
+            for between in self._stream.bridge(q, cycles):
+                self._filter.step(between)
         self._stream.take(q)
         return self._reference.step(self._filter.step(q), cycles)
 

@@ -38,6 +38,10 @@ def row(item: st.SearchStrategy[float], count: int) -> st.SearchStrategy[tuple[f
     return st.tuples(*[item] * count)
 
 
+TOOLS = st.builds(world.SetTool, row(st.floats(-1, 1), 3), row(st.floats(0.1, 1), 4))
+LOADS = st.builds(world.SetLoad, st.floats(0, 10), row(length, 3), row(length, 9))
+BOXES = st.builds(world.SetBox, row(length, 3), row(length, 3), row(st.floats(0.1, 1), 4), st.booleans())
+SOFT_LIMITS = st.builds(world.SetSoftLimits, row(length, 7), row(length, 7))
 REQUESTS = st.one_of(
     st.builds(
         world.Push,
@@ -62,10 +66,10 @@ REQUESTS = st.one_of(
     st.builds(world.Walls, st.booleans()),
     st.builds(world.Mount, st.none() | st.floats(0, 10), row(length, 3), row(length, 9)),
     st.builds(world.PlaceArm, row(st.floats(-1, 1), 7)),
-    st.builds(world.SetTool, row(st.floats(-1, 1), 3), row(st.floats(0.1, 1), 4)),
-    st.builds(world.SetLoad, st.floats(0, 10), row(length, 3), row(length, 9)),
-    st.builds(world.SetBox, row(length, 3), row(length, 3), row(st.floats(0.1, 1), 4), st.booleans()),
-    st.builds(world.SetSoftLimits, row(length, 7), row(length, 7)),
+    TOOLS,
+    LOADS,
+    BOXES,
+    SOFT_LIMITS,
     st.just(world.GetStatus()),
 )
 ANSWERS = st.one_of(
@@ -83,6 +87,13 @@ ANSWERS = st.one_of(
         success_rate=share,
         missed=st.integers(0, 2**40),
         auto_limit=st.none() | st.booleans(),
+        pid=st.integers(0, 2**31),
+        record=st.integers(-1, 1000),
+        tool=st.none() | TOOLS,
+        load=st.none() | LOADS,
+        box=st.none() | BOXES,
+        soft_limits=st.none() | SOFT_LIMITS,
+        inputs=st.none() | st.lists(st.integers(0, 31)).map(tuple),
         commands=FAULTS,
         states=FAULTS,
     ),

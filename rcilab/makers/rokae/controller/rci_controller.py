@@ -225,6 +225,11 @@ class RciController:
         self.settings = replace(self.settings, auto_limit=on)
         self.arm.configure(self.settings)
 
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """Numbers of the digital inputs that are high."""
+        return tuple(signal for signal, level in enumerate(self.settings.inputs) if level)
+
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -183,3 +183,25 @@ def test_a_line_of_the_tool_is_held_in_its_joints(make_hand) -> None:
     speeds = np.linalg.norm(np.diff(around, axis=0), axis=1) * 1000.0
     assert speeds.min() < 0.5 * speeds.max()
     assert np.abs(hand.state.T_base_tool_c.matrix - T).max() < 1e-9
+
+
+@pytest.mark.parametrize("cut_off", [30.0, 100.0, 300.0])
+@pytest.mark.parametrize("pose", [False, True])
+def test_a_pause_in_which_the_arm_begins_to_brake_breaks_nothing_with_a_filter_on(
+    make_hand, cut_off: float, pose: bool
+) -> None:
+    """The filter continues on the way that the commands took meanwhile, not on that of the last commands before."""
+    hand = make_hand()
+    assert hand.ask(rci.SetFilters(cut_off, cut_off, 1000.0)) == 0
+    hand.start(int(pose), 2 if pose else 1)
+    rows = plan_joint(hand.model, hand.model.home, hand.model.home + 0.4 * np.eye(7)[0], speed=0.5).q
+    speed = np.abs(np.diff(rows[:, 0]))
+    begins = int(np.flatnonzero(speed > 0.999 * speed.max())[-1]) - 5
+    for k, row in enumerate(rows[: begins + 60]):
+        fields: dict[str, Any] = {"q_c": tuple(row)}
+        if pose:
+            T, psi = hand.model.forward(row).matrix, hand.model.arm_angle(row)
+            fields = {"T_base_tool_c": tuple(T.ravel().tolist()), "psi_valid": True, "psi_c": psi}
+        if not begins <= k < begins + 22:
+            hand.cycle.receive(rci.CommandPacket(hand.state.message_id, **fields))
+        assert hand.step().faults == (), (k - begins, hand.cycle.reason)

@@ -175,3 +175,18 @@ def test_realism_needs_the_plant_that_has_it_and_figures_of_the_arm() -> None:
         build_plant("mujoco", load_model("Panda"), "real")
     server = build_virtual_controller(ControllerConfig(model=NAME, port=0, plant="mujoco", realism="real"))
     server.close()
+
+
+@pytest.mark.parametrize("realism", ["real", "off"])
+def test_a_first_command_off_a_compliant_arm_that_friction_holds_is_refused_with_that_cause(realism: Realism) -> None:
+    hand = real_hand(realism)
+    hand.ask(rci.SetJointImpedance((100.0,) * 7))
+    hand.start(2, 1)
+    first = hand.state.q_c
+    move_by(hand, 0.3)
+    hand.start(2, 1)
+    for _ in range(3):
+        hand.command(first.tolist())
+    assert "the first command of the motion is" in hand.cycle.reason
+    named = "(friction held the compliant arm off the commands of its last motion)" in hand.cycle.reason
+    assert named is (realism == "real")

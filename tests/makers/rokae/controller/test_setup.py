@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 
 import numpy as np
 import pytest
@@ -11,14 +12,16 @@ import pytest
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
-from rcilab.execution.simulation_control import SimulationControl
+from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import load_model
-from rcilab.sim.api import Done, PlaceArm, PlaceBox, Refused
+from rcilab.sim.api import Done, PlaceArm, PlaceBox, Refused, SetBox, SetLoad, SetSoftLimits, SetTool
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.log_entry import LogEntry
+from rcilab.sim.setup_requests import as_setup
 from tests.makers.rokae.controller.test_environment import Place
 from tests.makers.rokae.controller.test_server import MODEL, MOTION, Peer, Running, running
 from tests.makers.rokae.controller.test_simulation_port import Guest
@@ -197,3 +200,48 @@ def test_every_arm_can_be_set_up(name: str) -> None:
         assert tuple(server.controller.arm.commanded.q) == q
     finally:
         server.close()
+
+
+def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it() -> None:
+    entries: list[LogEntry] = []
+    config = ControllerConfig(model=MODEL.name, port=0, udp_port=0, lockstep=True, inputs=(0, 3), realtime=False)
+    server = build_virtual_controller(config, log=entries.append)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        assert server.world_address is not None
+        with SimulationControl(*parse_simulation_port(server.world_address)) as world:
+            before = world.status()
+            world.place_arm(Q)
+            world.set_tool(TOOL)
+            world.set_load(LOAD)
+            world.set_box(BOX)
+            world.set_soft_limits(*SOFT)
+            with pytest.raises(UsageError):
+                world.set_load(Payload(mass=50.0))
+            status = world.status()
+    finally:
+        server.request_stop()
+        thread.join()
+    lower, upper = (tuple(bound.tolist()) for bound in (MODEL.limits.joint.lower, MODEL.limits.joint.upper))
+    assert (before.tool, before.load, before.box) == (SetTool((0.0,) * 3), SetLoad(0.0), None)
+    assert before.soft_limits == SetSoftLimits(lower, upper)
+    assert before.inputs == (0, 3)
+    assert status.q == Q
+    assert status.tool is not None
+    tool = as_setup(status.tool).T_flange_tool
+    assert tool is not None
+    assert tool.is_close(TOOL)
+    assert status.load == SetLoad(2.0, (0.0, 0.0, 0.05))
+    assert status.box == SetBox(BOX.size, (0.4, 0.0, 0.6))
+    assert status.soft_limits == SetSoftLimits(*SOFT)
+    texts = [entry.text for entry in entries if entry.kind == "set_up"]
+    assert texts == [
+        "arm placed at 5.73, 35.73, 5.73, 65.73, 5.73, 95.73, 5.73 deg, by the simulation port",
+        "tool set at 0, 10, 120 mm from the flange, by the simulation port",
+        "load set to 2 kg, by the simulation port",
+        "safety box set, by the simulation port",
+        "soft limits of the joints set, by the simulation port",
+    ]
+    placed = next(entry for entry in entries if entry.kind == "set_up")
+    assert placed.facts == {"request": "place_arm", "q": Q}
