@@ -129,10 +129,10 @@ class CycleCapture:
         self._rows.pop(state.message_id - _FARTHEST, None)
         self._count += 1
         if arrival is not None:
-            self._add(self._count - 1, arrival)
+            self._add(self._count - 1, *arrival)
             self._commands.pop(id(arrival.command), None)
         elif self._waiting:
-            self._add(self._count - 1, self._waiting.popleft())
+            self._add(self._count - 1, *self._waiting.popleft())
         self._counters[_ROWS] = self._count
 
     def _take(self, command: ArmCommand) -> None:
@@ -143,34 +143,30 @@ class CycleCapture:
             self._answer = self._find_answer(self._mode)
         self._received += 1
         self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
-        answered = self._rows.get(command.number)
-        lateness, row = math.nan, max(self._count - 1, 0)
-        if answered is not None:
-            sent, _ = _STAMPS.unpack_from(self._memory, answered % CAPACITY * self._size + self._stamps)
-            lateness, row = 1e-9 * (now - sent), answered
-        arrival = _Arrival(now, lateness, command)
         late, self._late = self._late, self._playout.late
+        row, lateness = self._rows.get(command.number), math.nan
+        if row is not None:
+            sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
+            lateness = 1e-9 * (now - sent)
+            if not (answered or self._waiting):
+                self._add(row, now, lateness, command)
+                return
         if self._late > late:  # It is not played, and must not take the place of one that is.
-            if answered is not None:
-                self._add(answered, arrival)
             return
         if not self._waiting:
-            for free in range(row, self._count):
-                if self._add(free, arrival):
+            for free in range(max(self._count - 1, 0) if row is None else row, self._count):
+                if not _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
+                    self._add(free, now, lateness, command)
                     return
-        self._waiting.append(arrival)
+        self._waiting.append(_Arrival(now, lateness, command))
 
-    def _add(self, row: int, arrival: _Arrival) -> bool:
-        """Adds a command to a row unless it has one; returns whether it was added."""
-        memory, start = self._memory, row % CAPACITY * self._size
-        if _STAMPS.unpack_from(memory, start + self._stamps)[1]:
-            return False
-        time_ns, lateness, command = arrival
-        _ANSWERED.pack_into(memory, start + self._stamps + 8, time_ns, lateness)
+    def _add(self, row: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
+        """Adds a command to a row without one."""
+        start = row % CAPACITY * self._size
+        _ANSWERED.pack_into(self._memory, start + self._stamps + 8, time_ns, lateness)
         pack, offset, numbers_of = self._answer
-        pack(memory, start + offset, *numbers_of(command))
+        pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
-        return True
 
     def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
         """Removes a command from those that wait for a row, and returns it; None if it is not among them."""
