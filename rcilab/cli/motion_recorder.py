@@ -41,7 +41,7 @@ def show_entry(form: LogFormat, cycle: Callable[[], int]) -> Callable[[str, str]
 
     def show(kind: str, text: str) -> None:
         entry = LogEntry(kind=kind, text=text, cycle=cycle(), wall=time.time())
-        with suppress(OSError):  # The files are written, also where nobody reads the log any more.
+        with suppress(OSError):  # The files are written, also if the log is not read.
             print(entry.written(form), file=sys.stderr, flush=True)
 
     return show

@@ -9,7 +9,6 @@ from rcilab.execution.simulation_control import SimulationControl
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from tests.peers import programs
 from tests.peers.arena import Process
-from tests.peers.robot import PATIENCE, Robot
 
 NEAR = tuple(angle + 0.1 for angle in programs.START[7])  # [rad]
 
@@ -29,9 +28,7 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             tab.wait_for_function("() => !!window.__viserMutable?.nodeRefFromName?.['/live']", timeout=40_000)
             close_toasts(tab)
-            with Robot(
-                controller.host, controller.port, start_sleep=0.0, receive_timeout=PATIENCE, first_timeout=PATIENCE
-            ) as robot:
+            with controller.connect() as robot:
                 programs.prepare(robot, NEAR, factor=1.0)
                 page.wait(lambda: "Motion 1 of 127.0.0.1 has ended" in toast(tab), "the end of the motion")
                 q = np.array(robot.receive_fresh_state().q[:7])

@@ -21,9 +21,7 @@ NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad]
 def test_the_last_motion_is_written_before_the_command_ends(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "runs"
     with Process("--record", str(folder), "--lockstep") as controller:
-        with Robot(
-            controller.host, controller.port, start_sleep=0.0, receive_timeout=PATIENCE, first_timeout=PATIENCE
-        ) as robot:
+        with controller.connect() as robot:
             programs.prepare(robot, NEAR, factor=1.0)
     (file,) = folder.glob("*.rcirun")
     run = load_run(file)
@@ -39,9 +37,7 @@ def test_the_arm_goes_on_without_the_recorder(tmp_path: Path) -> None:
         (child,) = children.read_text().split()
         os.kill(int(child), signal.SIGKILL)
         wait_for(lambda: not children.read_text().split(), what="the end of the recorder")
-        with Robot(
-            controller.host, controller.port, start_sleep=0.0, receive_timeout=PATIENCE, first_timeout=PATIENCE
-        ) as robot:
+        with controller.connect() as robot:
             programs.prepare(robot, NEAR, factor=1.0)
             assert not any(state.errors for state in robot.states)
     assert not list(tmp_path.iterdir())
@@ -58,7 +54,7 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, capsys: py
 
 def moving_client(controller: Process) -> Robot:
     """A client in mid-motion, after 400 commands."""
-    robot = Robot(controller.host, controller.port, start_sleep=0.0, receive_timeout=PATIENCE, first_timeout=PATIENCE)
+    robot = controller.connect()
     robot.set_motor_power(1)
     robot.start_move(wire.JOINT_POSITION, wire.JOINT)
     state = robot.receive_fresh_state()

@@ -59,9 +59,7 @@ class Arena:
 
     def connect(self, **options: Any) -> Robot:
         """Returns a robot object that waits for its states patiently and does not dawdle after StartMove."""
-        settings: dict[str, Any] = {"start_sleep": 0.0, "receive_timeout": PATIENCE, "first_timeout": PATIENCE}
-        settings["axes"] = self.cycle.model.n
-        return Robot(self.host, self.port, **{**settings, **options})
+        return _connect(self.host, self.port, **{"axes": self.cycle.model.n, **options})
 
 
 @contextmanager
@@ -94,6 +92,10 @@ class Process:
         self.host, self.port = found[1], int(found[2])
         self.world_port = int(self.process.stdout.readline().rpartition(":")[2])
 
+    def connect(self, **options: Any) -> Robot:
+        """Returns a robot object like that of `Arena.connect`."""
+        return _connect(self.host, self.port, **options)
+
     def memory(self) -> int:
         """Returns the resident memory, [bytes]."""
         pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
@@ -107,3 +109,8 @@ class Process:
         self.process.wait(PATIENCE)
         assert self.process.stdout is not None
         self.process.stdout.close()
+
+
+def _connect(host: str, port: int, **options: Any) -> Robot:
+    settings: dict[str, Any] = {"start_sleep": 0.0, "receive_timeout": PATIENCE, "first_timeout": PATIENCE}
+    return Robot(host, port, **{**settings, **options})

@@ -335,7 +335,7 @@ def test_overwritten_cycles_are_a_gap_with_its_size(ring: CycleRing) -> None:
     np.testing.assert_allclose(after.cycles["t"], 1e-3 * np.arange(first, written), rtol=0, atol=1e-9)
 
 
-def test_a_motion_with_a_gap_is_two_runs_and_neither_is_judged_across_it(ring: CycleRing, tmp_path: Path) -> None:
+def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: CycleRing, tmp_path: Path) -> None:
     lines: list[str] = []
     recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
     ring.add_event(begin_event(1, 0))
