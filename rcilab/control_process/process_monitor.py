@@ -28,8 +28,7 @@ _LOSS_PERIODS = 3  # Periods with a lost connection until it is reported, 0.06 s
 class ProcessMonitor:
     """Owns the shared block; a `ProcessSupervisor` owns the processes, a `RequestClient` the pending requests.
 
-    A thread of this object monitors both. Methods may be called from any thread; those without a lock of their own say
-    so.
+    A thread of this object monitors both. Methods may be called from any thread.
 
     Attributes:
         lock: Guards everything here, and what its owner adds; held for long only while the processes end.

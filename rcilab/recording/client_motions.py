@@ -70,7 +70,7 @@ class MotionPart:
 
 
 class _Facts(NamedTuple):
-    """What the controller says of itself."""
+    """The controller, as its record describes it."""
 
     model: str
     plant: str

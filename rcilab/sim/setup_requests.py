@@ -1,4 +1,4 @@
-"""The set-up of an arm at the simulation port: requests to set it, and the same as the status reports it."""
+"""The configuration of an arm at the simulation port: requests to set it, and the same as the status reports it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SetupRequest: TypeAlias = PlaceArm | SetTool | SetLoad | SetBox | SetSoftLimits
 
 
 class SetupInForce(NamedTuple):
-    """The set-up of an arm, each part as the request that sets it."""
+    """The configuration of an arm, each part as the request that sets it."""
 
     tool: SetTool
     load: SetLoad
@@ -28,7 +28,7 @@ class SetupInForce(NamedTuple):
 
     @classmethod
     def of(cls, parameters: ArmParameters) -> Self:
-        """Returns the set-up in an arm's configuration."""
+        """Returns what is in force."""
         return cls(
             tool_request(parameters.T_flange_tool),
             load_request(parameters.load),

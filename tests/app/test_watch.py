@@ -171,7 +171,7 @@ def test_a_true_answer_is_understood() -> None:
 
 
 @pytest.mark.parametrize(
-    ("answer", "words"),
+    ("answer", "expected"),
     [
         (status(pid=2**22 + 1), "process 4194305) cannot be opened: No such file or directory"),
         (status(record=10_000), "cannot be opened: No such file or directory"),
@@ -189,10 +189,12 @@ def test_a_true_answer_is_understood() -> None:
         (b"", "it closed the connection"),
     ],
 )
-def test_what_is_no_controller_or_says_what_is_not_so_is_refused_in_one_sentence(answer: bytes, words: str) -> None:
+def test_what_is_not_a_controller_or_contradicts_itself_is_refused_in_one_sentence(
+    answer: bytes, expected: str
+) -> None:
     with pytest.raises((ConnectionLostError, ProtocolError, UsageError)) as raised:
         WatchedController(lie(answer))
-    assert words in str(raised.value)
+    assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 400
 

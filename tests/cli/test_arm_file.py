@@ -218,7 +218,7 @@ def test_a_value_that_cannot_be_names_its_option_or_its_key(
 @pytest.mark.parametrize(
     "arguments", [["--box", "1,1,1@0,0,3"], ["--soft-limits=-60:60,-10:10,-60:60,-60:60,-60:60,-60:60,-60:60deg"]]
 )
-def test_an_arm_that_cannot_stand_in_its_home_pose_is_refused_without_a_word_about_a_start_that_was_not_given(
+def test_an_arm_that_cannot_stand_in_its_home_pose_is_refused_and_a_start_that_was_not_given_is_not_mentioned(
     capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
     assert main(["controller", "--model", "xMatePro7", "--port", "0", *arguments]) == 2

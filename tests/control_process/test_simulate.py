@@ -215,15 +215,15 @@ def test_an_unknown_plant_or_model_is_refused_before_anything_starts(monkeypatch
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "expected"),
     [
         ({"realism": "real"}, "realism needs the plant mujoco: the ideal one has no friction"),
         ({"plant": "mujoco", "realism": "rough"}, "realism: 'rough' is unknown; known: off, real"),
         ({"on_loss": "pray"}, "on_loss: 'pray' is unknown; known: hold, bridge"),
     ],
 )
-def test_realism_and_behaviour_are_checked_before_anything_starts(options, words):
-    with pytest.raises(InvalidValueError, match=words):
+def test_realism_and_behaviour_are_checked_before_anything_starts(options, expected):
+    with pytest.raises(InvalidValueError, match=expected):
         simulate(load_model("xMatePro7"), **options)
 
 

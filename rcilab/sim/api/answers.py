@@ -79,7 +79,7 @@ class WorldStatus:
     """Its descriptor of the record of all cycles, see `rcilab.core.cycle_ring`; -1: it keeps none."""
 
     tool: SetTool | None = None
-    """The set-up in force, each as the request that sets it; None: an older controller does not report it."""
+    """The configuration in force, each as the request that sets it; None: an older controller does not report it."""
     load: SetLoad | None = None
     box: SetBox | None = None
     """None: there is no safety box."""
