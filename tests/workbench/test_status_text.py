@@ -8,6 +8,7 @@ from typing import cast
 
 import pytest
 
+from rcilab.app.control_lock import ControlLock
 from rcilab.app.planning import Plan, make_plan
 from rcilab.app.robot_connection import RobotConnection
 from rcilab.app.run.readiness import obstacle
@@ -30,6 +31,7 @@ from rcilab.makers.rokae.driver.address import parse_address
 from rcilab.makers.rokae.faults import Fault
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.health import health_html
+from rcilab.workbench.panels.jog import note_html
 from rcilab.workbench.panels.status import status_values
 
 CALLS = ("()", "load_model", "error.run", "restart", "reconnect", "recover leads", "COMMAND_")
@@ -199,6 +201,18 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
     bar = status_values(state, died, Text("en"), 1.0)
     assert any(chip["value"] == "virtual controller stopped unexpectedly" for chip in bar["chips"])
     assert Text("en").render(reason).startswith("The virtual controller stopped unexpectedly")
+
+
+@pytest.mark.parametrize(
+    ("language", "holder", "note"),
+    [("en", "its client", "this page moves no robot"), ("zh", "其客户端", "本页不驱动任何机器人")],
+)
+def test_a_page_that_watches_does_not_claim_to_move_the_arm(language: str, holder: str, note: str):
+    state = replace(initial_state(), watched="rci://127.0.0.2:1337", control_lock=ControlLock((1,), 1))
+    chips = {chip["id"]: chip for chip in status_values(state, status(), Text(language), 1.0)["chips"]}
+    assert chips["controls"]["value"] == holder
+    assert "of" not in chips["controls"]
+    assert note in note_html(state, Text(language))
 
 
 def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_after_it():

@@ -153,7 +153,7 @@ def note_html(state: UiState, text: Text) -> str:
         return f'<p class="rl-verdict rl-warn" role="alert">{esc(asked)}</p>'
     if state.jog.robot:
         return f'<p class="rl-verdict rl-warn rl-slim">{esc(text("jog.live"))}</p>'
-    return f'<p class="rl-note">{esc(text("jog.note"))}</p>'
+    return f'<p class="rl-note">{esc(text("jog.note_watched" if state.watched else "jog.note"))}</p>'
 
 
 def speed_value_html(speed: float, text: Text) -> str:

@@ -80,7 +80,9 @@ def _chips(state: UiState, status: SupervisorStatus, text: Text) -> list[dict[st
         _chip(text, "mode", mode),
         _chip(text, "rate", f"{status.rate_hz:.0f} Hz" if connected else "—"),
         _chip(text, "success", f"{100.0 * status.success_rate:.0f} %" if is_moving(status) else "—"),
-        {**_chip(text, "controls", _holder(lock, text)), "of": _seen_by_pages(lock, text)},
+        _chip(text, "controls", text("bar.its_client"))
+        if state.watched
+        else {**_chip(text, "controls", _holder(lock, text)), "of": _seen_by_pages(lock, text)},
         _chip(text, "faults", faults, "bad" if status.faults else "", wide=True),
     ]
 

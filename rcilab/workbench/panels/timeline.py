@@ -92,6 +92,8 @@ class TimelinePanel:
             why = state.no_plan
             if status.code == "moving.guided" or (state.jog.robot and is_moving(status)):
                 sentence = text("timeline.by_hand")
+            elif state.watched:
+                sentence = text("timeline.watched")
             elif why is None or why.code == "plan.here":
                 sentence = text("timeline.jog" if state.jog.robot else "timeline.nothing")
             else:
