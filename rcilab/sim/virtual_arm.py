@@ -307,6 +307,7 @@ class VirtualArm:
         Only after a cycle with unchanged signals, and with `has_settled`: `step` would then compute the same setpoint,
         and the same signals unless the measurement changes.
         """
+        self.playback = None
         assert self._setpoint is not None
         measured = self.plant.step(self._setpoint)
         if measured is self.measured_state.measured:
