@@ -16,14 +16,17 @@ from rcilab.core.fault import name_faults
 from rcilab.i18n.locale import LANGUAGES
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rcilab.conformance.report import Report
     from rcilab.conformance.time_scaling import SlowDown
-    from rcilab.core.arrays import Array, JointVector
     from rcilab.core.safety_box import SafetyBox
     from rcilab.core.spatial import Pose
     from rcilab.core.state import Mode
     from rcilab.model.dynamics.payload import Payload
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion, Program
+    from rcilab.recording.run import Run
 
 
 def add_parser(subparsers: Any) -> None:
@@ -33,7 +36,7 @@ def add_parser(subparsers: Any) -> None:
         help="check a saved motion, program or recorded run by the robot's conditions",
         description="Prints the report on a motion (.npz from Motion.save, .csv with times and joint angles), on the "
         "motion of a program (.json from Program.save), or on what the client of a recorded run (.rcirun) commanded: "
-        "the joint angles or torques as sent, or for poses the angles that the controller commanded. Exit code: 0 it "
+        "the joint angles, poses or torques as sent, up to the last or a refused one. Exit code: 0 it "
         "conforms, or the written motion does; 1 it does not; 2 the file or the model name is not valid, or the "
         "program cannot be planned.",
     )
@@ -83,7 +86,6 @@ def run(args: Namespace) -> int:
 
 def _run(args: Namespace) -> int:
     from rcilab.cli.report_json import as_json_text, report_as_json
-    from rcilab.conformance.check import check, check_torques
 
     out: Path | None = args.slow_down
     if out is not None and os.path.realpath(out) == os.path.realpath(args.file):
@@ -91,15 +93,11 @@ def _run(args: Namespace) -> int:
     show_note = (lambda line: None) if args.json else show
     subject = _read_run(args) if args.file.suffix.lower() == ".rcirun" else _read_motion(args)
     model = subject.model
-    motion = as_motion(subject.found, model, args.file, show=show_note, max_rows=args.max_rows)
+    report, to_slow = _check(subject, args, show_note)
     arm = describe_arm(model, subject.box)
     for line in filter(None, (arm, subject.note)):
         show_note(f"note: {line}")
-    if subject.torques is None:
-        report = check(motion, model, start=subject.start, box=subject.box, mode=subject.mode)
-    else:
-        report = check_torques(motion, subject.torques, model, start=subject.start, box=subject.box)
-    slowed = None if out is None else report.slow_down()
+    slowed = None if out is None else to_slow.slow_down()
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)
     if args.json:
@@ -115,18 +113,34 @@ def _run(args: Namespace) -> int:
     return 0 if conforms else 1
 
 
+def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None]) -> tuple[Report, Report]:
+    """Returns the report, and that on the motion to slow down, which must end at rest; shows the motion's notes."""
+    from rcilab.conformance.check import check
+    from rcilab.recording.run import Run
+    from rcilab.recording.sent_motion import check_sent, recorded_mode, start_of, with_stop
+
+    found, model, box, mode = subject.found, subject.model, subject.box, subject.mode
+    if not isinstance(found, Run):
+        motion = as_motion(found, model, args.file, show=show_note, max_rows=args.max_rows)
+        report = check(motion, model, box=box, mode=mode)
+        return report, report
+    report = check_sent(found, model, box=box, mode=mode)
+    for note in report.motion.notes:
+        show_note(f"note: {note}")
+    if args.slow_down is None or recorded_mode(found) == "torque":
+        return report, report
+    motion = with_stop(report.motion, model, mode)
+    return report, check(motion, model, start=start_of(found), box=box, mode=mode)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Subject:
     """What is checked, and for which arm."""
 
-    found: Motion | Program
+    found: Motion | Program | Run
     model: RobotModel
     box: SafetyBox | None
     mode: Mode
-    start: JointVector | None = None
-    """Commanded joint angles before the first command, [rad]; None: those of the motion's start."""
-    torques: Array | None = None
-    """Commanded torques, one row for each of the motion, [N m]."""
     note: str = ""
 
 
@@ -150,14 +164,16 @@ def _read_motion(args: Namespace) -> _Subject:
         raise UsageError("a motion file does not name its arm: add --model NAME, such as --model xMatePro7")
     else:
         model = load_model(args.model, tool=tool, load=load)
+        if found.n != model.n and args.file.suffix.lower() == ".csv":
+            problem = f"has {found.n} joints after the time, {model.name} has {model.n}; is there a column t [s]?"
+            raise InvalidValueError("motion file", args.file.name, problem)
     return _Subject(found=found, model=model, box=box, mode=args.mode or "joint_position")
 
 
 def _read_run(args: Namespace) -> _Subject:
-    from rcilab.core.state import MODES
     from rcilab.model.robot_model import load_model
     from rcilab.recording.run import load_run
-    from rcilab.recording.sent_motion import sent_motion, sent_torques, start_of, with_stop
+    from rcilab.recording.sent_motion import recorded_mode
 
     run = load_run(args.file, max_rows=args.max_rows)
     tool, load, box = _arm_options(args)
@@ -169,22 +185,21 @@ def _read_run(args: Namespace) -> _Subject:
         model = load_model(args.model, **own)
     model = model if tool is None else model.with_tool(tool)
     model = model if load is None else model.with_load(load)
-    recorded = run.setup.mode if run.setup.mode in MODES else "joint_position"
-    motion, torques = sent_torques(run) if recorded == "torque" else (sent_motion(run), None)
+    notes: list[str] = []
+    if run.model is not None and run.model.name != model.name:
+        notes.append(f"the run is of the {run.model.name}, checked as one of the {model.name}")
     ended = str(run.stopped or name_faults(run.faults))
-    notes = [f"the run ended early: {ended}"] if ended else []
-    if torques is None and (continued := with_stop(motion, model, recorded)) is not motion:
-        notes.append(f"after its last command at t = {motion.duration:.3f} s, which still moves, a stop is added")
-        motion = continued
+    if ended:
+        notes.append(f"the run ended early: {ended}")
+    if not run.is_complete:
+        notes.append("the end of its file is missing")
     if run.truncated:
         notes.append("the beginning of the run is missing, so that the motion begins with a jump")
     return _Subject(
-        found=motion,
+        found=run,
         model=model,
         box=run.setup.safety_box if box is None else box,
-        mode=args.mode or recorded,
-        start=start_of(run),
-        torques=torques,
+        mode=args.mode or recorded_mode(run),
         note="; ".join(notes),
     )
 

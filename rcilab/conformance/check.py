@@ -16,7 +16,7 @@ from rcilab.conformance.common_conditions import condition_table
 from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
-from rcilab.conformance.signals import MotionSignals
+from rcilab.conformance.signals import MotionSignals, Record
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
@@ -105,6 +105,36 @@ def check_torques(
     return _check(motion, model, start, box, distance, "torque", rows)
 
 
+def check_commands(
+    motion: Motion,
+    model: RobotModel,
+    record: Record,
+    *,
+    start: ArrayLike | StartState | None = None,
+    box: SafetyBox | None = None,
+    distance: ClearanceLimit | None = STANDARD_DISTANCE,
+    mode: Mode = "joint_position",
+) -> Report:
+    """Checks the commands of a recorded motion, up to the last one.
+
+    `check` holds the arm at the last row; here the controller has stopped it, in its own way. A first command within
+    one cycle's jerk of the arm is the first step of the motion. The report has no certificate.
+
+    Args:
+        motion: The commands.
+        model: The arm.
+        record: What else is known of them; where the motion was stopped, its end need not be a standstill.
+        start: As for `check`, also for the others.
+        box: The safety box.
+        distance: Required distances of the links.
+        mode: Mode of the motion.
+
+    Raises:
+        InvalidValueError: As for `check`.
+    """
+    return _check(motion, model, start, box, distance, mode, record=record)
+
+
 def _check(
     motion: Motion,
     model: RobotModel,
@@ -113,6 +143,7 @@ def _check(
     distance: ClearanceLimit | None,
     mode: Mode,
     torques: Array | None = None,
+    record: Record | None = None,
 ) -> Report:
     require_motion(motion)
     require_model(model)
@@ -128,7 +159,11 @@ def _check(
     rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
-    return _report(motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques)
+    if record is not None and record.was_stopped:
+        rows = tuple(row for row in rows if row.stage != "end")
+    return _report(
+        motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
+    )
 
 
 def _report(
@@ -141,9 +176,10 @@ def _report(
     distance: ClearanceLimit | None,
     mode: Mode,
     torques: Array | None = None,
+    record: Record | None = None,
 ) -> Report:
     """Returns the report on a motion by some of the conditions."""
-    checker = _MotionChecker(motion, model, start, box, distance, mode, torques)
+    checker = _MotionChecker(motion, model, start, box, distance, mode, torques, record)
     results = [checker.evaluate(row) for row in rows]
     found = sorted((v for _, violations in results for v in violations), key=lambda v: -v.ratio)
     facts = {"model": model.name, "law": motion.law, "duration": f"{motion.duration:.3f}", "speed": f"{motion.speed:g}"}
@@ -156,16 +192,16 @@ def _report(
         start=start,
         measure=partial(checker.usage, rows),
         issue=_issue_none
-        if torques is not None
+        if torques is not None or record is not None
         else partial(issue_certificate, motion, model, start, box, distance, mode),
         check_again=_refuse_other_motion
         if torques is not None
-        else partial(_report, model=model, start=start, box=box, distance=distance, mode=mode),
+        else partial(_report, model=model, start=start, box=box, distance=distance, mode=mode, record=record),
     )
 
 
 def _issue_none() -> None:
-    """Commanded torques have no certificate: `execute` would compute others."""
+    """Recorded commands have no certificate: `execute` would stop after them, or compute other torques."""
 
 
 def _refuse_other_motion(motion: Motion, rows: tuple[Condition, ...]) -> Report:
@@ -184,10 +220,11 @@ class _MotionChecker:
         distance: ClearanceLimit | None,
         mode: Mode,
         torques: Array | None = None,
+        record: Record | None = None,
     ) -> None:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
-        self._signals = MotionSignals(motion, model, start, box, distance, mode, torques)
+        self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:

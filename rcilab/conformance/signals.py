@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +38,16 @@ _INTERPOLATED_PART = 0.8
 """Part of a torque bound up to which interpolation is sufficient; rows beyond it are computed."""
 
 
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What is known of recorded commands beyond their joint angles."""
+
+    was_stopped: bool = False
+    """Whether something other than the client ended the motion."""
+    refused_pose: bool = False
+    """Whether a pose followed the last row that has no joint angles on this branch."""
+
+
 class MotionSignals:
     """The signals of one motion, each a table with one row per cycle.
 
@@ -48,6 +59,7 @@ class MotionSignals:
         distance: Required distances of the links from each other and from the floor, or None.
         mode: Mode of the motion. Commanded torques are computed in every row, as the controller checks each.
         torques: Commanded torques, shape (N, n), [N m]; None: those of the motion.
+        record: Of recorded commands, which are not continued after the last row; None: a motion to come.
     """
 
     def __init__(
@@ -59,15 +71,18 @@ class MotionSignals:
         distance: ClearanceLimit | None = None,
         mode: Mode = "joint_position",
         torques: Array | None = None,
+        record: Record | None = None,
     ) -> None:
         self._motion = motion
+        self._record = record
         self._commanded_torques = torques
         self._model = model
         self._start = start
         self._box = box
         self._distance = distance
         self._mode: Mode = mode
-        self._differences = _backward_differences(motion.q, start)
+        hold = HOLD_SAMPLES if record is None else max(HOLD_SAMPLES - len(motion.q), 0)
+        self._differences = _backward_differences(motion.q, start, hold)
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
     def table(self, condition: Condition) -> tuple[Array, float]:
@@ -76,7 +91,12 @@ class MotionSignals:
             return self._throughout(condition), 0.0
         if condition.stage == "end":
             return self._end_values(condition), self._motion.duration
-        return self._at_start(condition)[np.newaxis] if condition.order == 0 else self._end_values(condition), 0.0
+        if condition.order:
+            return self._end_values(condition), 0.0
+        values = self._at_start(condition)[np.newaxis]
+        if self._record is None or condition.necessity == "necessary":
+            return values, 0.0
+        return above_resolution(values, condition, self._model.limits), 0.0  # It may be the first step of the motion.
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns the two links of the distance in a row of a table; None for other conditions."""
@@ -92,7 +112,9 @@ class MotionSignals:
         if condition.signal in ("translation", "rotation", "arm_angle"):
             return self._tool.differences(condition.signal)[condition.order]
         if condition.signal == "frame":
-            return self._tool.singularity
+            closeness = self._tool.singularity
+            is_refused = self._record is not None and self._record.refused_pose
+            return np.concatenate((closeness[: len(self._motion.q)], [[np.inf]])) if is_refused else closeness
         if condition.signal == "elbow_sign":
             return self._tool.elbow_side
         if condition.signal == "position":
@@ -198,15 +220,15 @@ def _with_previous_rows(rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return found
 
 
-def _backward_differences(q: Array, start: StartState) -> tuple[Array, Array, Array, Array]:
-    """Returns angles, velocity, acceleration and jerk in every cycle, with the hold, each of shape (N + 3, n).
+def _backward_differences(q: Array, start: StartState, hold: int) -> tuple[Array, Array, Array, Array]:
+    """Returns angles, velocity, acceleration and jerk in every cycle, with the hold, each of shape (N + hold, n).
 
     Successive divisions by the cycle time, as in the monitor, give results equal to the last bit. The values of a joint
     are contiguous in memory, which makes operations per joint several times faster.
     """
     commands = (q[1:] if start.moving else q).T
-    hold = np.repeat(q[-1:].T, HOLD_SAMPLES, axis=1)
-    path = np.concatenate((start.q[:, np.newaxis], commands, hold), axis=1)
+    held = np.repeat(q[-1:].T, hold, axis=1)
+    path = np.concatenate((start.q[:, np.newaxis], commands, held), axis=1)
     dq = np.concatenate((start.dq[:, np.newaxis], np.diff(path) / CYCLE_TIME), axis=1)
     ddq = np.concatenate((start.ddq[:, np.newaxis], np.diff(dq) / CYCLE_TIME), axis=1)
     jerk = np.diff(ddq) / CYCLE_TIME

@@ -16,18 +16,20 @@ def resolution(condition: Condition, limits: AnyLimits, cycles: int = 1) -> Arra
     commands, cannot distinguish a smaller difference from standstill, so no condition requires one.
 
     Args:
-        condition: A row on the velocity or acceleration at the start or the end.
+        condition: A row on the position, velocity or acceleration at the start or the end.
         limits: Limits of the arm.
         cycles: Number of cycles of the difference, 1 or more.
 
     Returns:
         Shape (n,), or (1,) for a row on the tool, in the condition's unit.
     """
-    jerk = (
-        joint_limits(limits).jerk
-        if condition.is_per_joint
-        else np.array([getattr(all_limits(limits).cartesian, f"{condition.signal}_jerk")])
-    )
+    if condition.is_per_joint:
+        jerk = joint_limits(limits).jerk
+    elif condition.signal == "arm_angle":
+        arm_angle = all_limits(limits).arm_angle
+        jerk = np.array([0.0 if arm_angle is None else arm_angle.jerk])
+    else:
+        jerk = np.array([getattr(all_limits(limits).cartesian, f"{condition.signal}_jerk")])
     return jerk * (cycles * CYCLE_TIME) ** (3 - condition.order)
 
 

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import remainder, tau
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rcilab.core.arrays import Array, as_vector, readonly_copy
+from rcilab.core.arrays import Array, as_number, as_vector, readonly_copy
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.robots import DhRow, RobotDescription, describe_robot
@@ -25,6 +26,9 @@ from rcilab.robots import DhRow, RobotDescription, describe_robot
 FORMAT, VERSION = "rcilab arm", 1
 ENDING = ".json"
 _LARGEST = 100_000  # [bytes] An arm has 3000.
+_LENGTH, _ANGLE = 0.1, 0.2  # [m], [rad] Largest differences from the named arm: a calibration is some millimetres.
+_MASS, _FARTHEST, _INERTIA = 1000.0, 10.0, 1000.0  # [kg], [m], [kg m^2] Of a link.
+_LARGEST_FRICTION = 1e5  # [N m], [N m s/rad]
 
 
 def save_arm(arm: RobotDescription, file: str | Path, source: str = "") -> None:
@@ -79,7 +83,7 @@ def load_arm(file: str | Path) -> RobotDescription:
     text = read_limited(path, "arm file", lambda size: _require_size(size, path))
     try:
         content: Any = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidValueError("arm file", path.name, f"is not valid JSON: {error}") from error
     return build_arm(content, path.name)
 
@@ -113,17 +117,19 @@ _FRICTION = ("viscous", "coulomb", "offset")
 def _build_arm(nominal: RobotDescription, content: dict[str, Any], name: str) -> RobotDescription:
     n, source = nominal.n, str(content.get("source", name))
     rows, links = _list(content, "dh", n, name), _list(content, "links", n, name)
-    numbers = [as_vector(row, 4, f"{name}, dh row {i}", "m, rad").tolist() for i, row in enumerate(rows, 1)]
+    dh = tuple(
+        _row(row, own, f"{name}, dh row {i}") for i, (row, own) in enumerate(zip(rows, nominal.dh, strict=True), 1)
+    )
     friction = content.get("friction")
     return replace(
         nominal,
-        dh=tuple(DhRow(a=a, alpha=alpha, d=d, theta_offset=theta) for a, alpha, d, theta in numbers),
+        dh=dh,
         dh_source=source,
         links=tuple(
             replace(
                 own,
-                mass=float(link["mass"]),
-                center_of_mass=as_vector(link["center_of_mass"], 3, f"{name}, link {i}, center_of_mass", "m"),
+                mass=_mass(link["mass"], f"{name}, link {i}, mass"),
+                center_of_mass=_vector(link["center_of_mass"], 3, f"{name}, link {i}, center_of_mass", "m", _FARTHEST),
                 inertia=_tensor(link["inertia"], f"{name}, link {i}, inertia"),
                 source=source,
             )
@@ -132,9 +138,9 @@ def _build_arm(nominal: RobotDescription, content: dict[str, Any], name: str) ->
         friction=None
         if friction is None
         else (
-            as_vector(friction["viscous"], n, f"{name}, friction, viscous", "N m s/rad"),
-            as_vector(friction["coulomb"], n, f"{name}, friction, coulomb", "N m"),
-            as_vector(friction["offset"], n, f"{name}, friction, offset", "N m"),
+            _vector(friction["viscous"], n, f"{name}, friction, viscous", "N m s/rad", _LARGEST_FRICTION),
+            _vector(friction["coulomb"], n, f"{name}, friction, coulomb", "N m", _LARGEST_FRICTION),
+            _vector(friction["offset"], n, f"{name}, friction, offset", "N m", _LARGEST_FRICTION),
         ),
         nominal=nominal,
     )
@@ -147,8 +153,32 @@ def _list(content: dict[str, Any], key: str, count: int, name: str) -> list[Any]
     return found
 
 
+def _row(value: Any, own: DhRow, name: str) -> DhRow:
+    a, alpha, d, theta = as_vector(value, 4, name, "m, rad").tolist()
+    lengths, angles = (a - own.a, d - own.d), (alpha - own.alpha, theta - own.theta_offset)
+    if max(map(abs, lengths)) > _LENGTH or max(abs(remainder(angle, tau)) for angle in angles) > _ANGLE:
+        here = [own.a, own.alpha, own.d, own.theta_offset]
+        problem = f"is not near {here} of the named arm: within {_LENGTH:g} m and {_ANGLE:g} rad"
+        raise InvalidValueError(name, [a, alpha, d, theta], problem)
+    return DhRow(a=a, alpha=alpha, d=d, theta_offset=theta)
+
+
+def _mass(value: Any, name: str) -> float:
+    mass = as_number(value, name, "kg")
+    if not 0.0 <= mass <= _MASS:
+        raise InvalidValueError(name, mass, f"must be in 0 to {_MASS:g} kg")
+    return mass
+
+
+def _vector(value: Any, n: int, name: str, unit: str, most: float) -> Array:
+    found = as_vector(value, n, name, unit)
+    if np.abs(found).max() > most:
+        raise InvalidValueError(name, found.tolist(), f"must be within {most:g} {unit}")
+    return found
+
+
 def _tensor(value: Any, name: str) -> Array:
-    inertia = as_vector(np.ravel(value), 9, name, "kg m^2").reshape(3, 3)
+    inertia = _vector(np.ravel(value), 9, name, "kg m^2", _INERTIA).reshape(3, 3)
     if np.abs(inertia - inertia.T).max() > 1e-12 * max(1.0, float(np.abs(inertia).max())):
         raise InvalidValueError(name, inertia.tolist(), "must be symmetric")
     return readonly_copy(inertia)

@@ -382,11 +382,12 @@ def motion_through(times: ArrayLike, q: ArrayLike) -> Motion:
 
 
 def _through_samples(times: Array, q: JointPath, max_rows: int, file: str | PathLike[str]) -> Motion:
-    motion = replace(motion_through(times, q), notes=notes_on(times))
+    notes = notes_on(times)
     try:
+        motion = replace(motion_through(times, q), notes=notes)
         require_rows(len(motion), max_rows, "samples", Path(file).name)
     except InvalidValueError as error:
-        requirement = "; ".join((error.requirement, *motion.notes))
+        requirement = "; ".join((error.requirement, *notes))
         raise InvalidValueError(error.name, error.value, requirement).coded(error.code, **error.facts) from None
     return motion
 

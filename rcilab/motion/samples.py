@@ -103,6 +103,8 @@ def _from_csv(
             locations[0], "a single column", "needs a time and the joints; in Python, rate_hz replaces the time"
         )
     q = np.stack([table.column(i) for i in range(first, table.columns)], axis=1)
+    if not has_rate:
+        _require_times(table.column(0), locations, "; without a header the first column is the time: is it missing?")
     return None if has_rate else table.column(0), np.radians(q) if unit == "deg" else q, locations
 
 
@@ -172,7 +174,7 @@ def _require_shapes(shapes: Shapes, name: str, max_rows: int) -> None:
 _READERS = {".csv": _from_csv, ".npz": _from_npz}
 
 
-def _require_times(times: Array, locations: list[str]) -> None:
+def _require_times(times: Array, locations: list[str], hint: str = "") -> None:
     beyond = np.flatnonzero(np.abs(times) > _MAX_TIME)
     if beyond.size:
         i = int(beyond[0])
@@ -181,7 +183,7 @@ def _require_times(times: Array, locations: list[str]) -> None:
     not_later = np.flatnonzero(np.diff(times) <= 0.0)
     if not_later.size:
         i = int(not_later[0]) + 1
-        problem = f"s is not later than the sample before, {times[i - 1]:g} s"
+        problem = f"s is not later than the sample before, {times[i - 1]:g} s{hint}"
         raise InvalidValueError(locations[i], float(times[i]), problem).coded("table_order", before=f"{times[i - 1]:g}")
 
 

@@ -9,17 +9,15 @@ from typing import cast
 import numpy as np
 
 from rcilab.conformance.advice import share
-from rcilab.conformance.check import check, check_torques
 from rcilab.conformance.report import Report
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
-from rcilab.model.robot_model import require_model
 from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.playout import played_commands
 from rcilab.recording.run import Run
-from rcilab.recording.sent_motion import sent_motion, sent_torques, start_of, with_stop
+from rcilab.recording.sent_motion import check_sent
 
 _EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
 _BAR = 40  # Characters of the longest bar.
@@ -65,18 +63,12 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
 def check_client(run: Run) -> Report:
     """Returns the check of what a client commanded in a run, in its mode, without distances between links.
 
-    It ends with a command that the controller refused, and continues with a stop where it still moves.
-
     Raises:
         InvalidValueError: The run does not name its arm or mode.
         UsageError: Nothing was commanded.
     """
-    model, mode = require_model(run.model), require_mode(run.setup.mode)
-    start, box = start_of(run), run.setup.safety_box
-    if mode == "torque":
-        return check_torques(*sent_torques(run), model, start=start, box=box, distance=None)
-    motion = with_stop(sent_motion(run), model, mode)
-    return check(motion, model, start=start, box=box, distance=None, mode=mode)
+    require_mode(run.setup.mode)
+    return check_sent(run, distance=None)
 
 
 def _check(run: Run) -> tuple[Report | None, str]:

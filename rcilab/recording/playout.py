@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.arrays import JointPath
+from rcilab.core.clock import CYCLE_TIME
 
 
 def playout_delay(cycles: NDArray[np.void]) -> int:
@@ -18,43 +19,33 @@ def playout_delay(cycles: NDArray[np.void]) -> int:
     return max(int(np.median(rows - sources)), 1) if rows.size else 1
 
 
-def played_joints(cycles: NDArray[np.void], *, with_refused: bool = False) -> JointPath:
-    """Returns the joint angles of the played commands, from the first one to the last row, shape (M, n), [rad].
-
-    In cycles without a command, in those of the controller's own stop, and where poses or torques were commanded, they
-    are those that the controller reports as commanded.
+def played_duration(cycles: NDArray[np.void]) -> float:
+    """Returns the time from the first played command to the last one, [s].
 
     Args:
         cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
-        with_refused: Whether a command that the controller refused is included.
+    """
+    played = np.flatnonzero(cycles["played"])
+    return CYCLE_TIME * int(played[-1] - played[0]) if played.size else 0.0
+
+
+def played_joints(cycles: NDArray[np.void]) -> JointPath:
+    """Returns the joint angles of the played commands, from the first one to the last row, shape (M, n), [rad].
+
+    In cycles without a command or with a refused one, in those of the controller's own stop, and where poses or torques
+    were commanded, they are those that the controller reports as commanded.
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
     """
     rows, sources = played_commands(cycles)
     if not rows.size:
         return cycles["q_c"][:1].copy()
     q = cycles["q_c"].copy()
     sent = cycles["command"][sources]
-    has_angles = np.isfinite(sent).all(axis=1)
-    if not with_refused:
-        has_angles &= cycles["faults"][rows] == 0
+    has_angles = np.isfinite(sent).all(axis=1) & (cycles["faults"][rows] == 0)
     q[rows[has_angles]] = sent[has_angles]
     return q[rows[0] :]
-
-
-def checked_joints(cycles: NDArray[np.void]) -> JointPath:
-    """Returns the joint angles up to the last played command, or a refused one, shape (M, n), [rad].
-
-    Args:
-        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
-    """
-    q = played_joints(cycles, with_refused=True)
-    rows, _ = played_commands(cycles)
-    faulty = np.flatnonzero(cycles["faults"])
-    if not rows.size:
-        return q
-    end = (
-        int(min(rows[-1], faulty[0])) if faulty.size else int(rows[-1])
-    )  # Then come rows of the controller's own stop.
-    return q[: end - int(rows[0]) + 1]
 
 
 def played_commands(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -24,7 +24,7 @@ from rcilab.i18n.units import USUAL, Units
 from rcilab.motion.motion import Motion
 from rcilab.recording.data_frame import to_pandas
 from rcilab.recording.export import save_run
-from rcilab.recording.playout import played_joints, playout_delay
+from rcilab.recording.playout import played_duration, played_joints, playout_delay
 from rcilab.recording.run_file import decode_content, read_run
 from rcilab.recording.run_html import run_html
 from rcilab.recording.run_setup import Setup
@@ -195,7 +195,12 @@ class Run:
 
     @property
     def duration(self) -> float:
-        """Time from the first command to the last recorded cycle, [s]."""
+        """Time from the first command to the last recorded cycle, [s].
+
+        Where a virtual controller recorded which commands it played, to the last one of these, from the first.
+        """
+        if "played" in (self.cycles.dtype.names or ()):
+            return played_duration(self.cycles)
         return float(self.t[-1]) if len(self.t) else 0.0
 
     @property

@@ -39,9 +39,10 @@ from numpy.typing import NDArray
 
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
-from rcilab.core.file_bounds import require_bytes, require_max_rows, require_rows
+from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_bytes, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
 from rcilab.i18n.translator import Remark
 from rcilab.model.arm_file import arm_facts, build_arm
@@ -325,6 +326,7 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
     parts = [_decode_cycles(chunk.payload, dtype) for chunk in chunks if chunk.kind == "CYCL"]
     cycles = _to_current_layout(np.concatenate(parts) if parts else np.zeros(0, dtype))
     cycles.flags.writeable = False
+    _require_times(cycles["t"], max(max_rows, DEFAULT_MAX_ROWS))
     plans = [chunk.payload for chunk in chunks if chunk.kind == "PLAN"]
     tails = [chunk for chunk in chunks if chunk.kind == "TAIL"]
     tail = _decode_text(tails[-1]) if tails else {}
@@ -346,6 +348,18 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
         has_speed_override=bool(tail.get("paced", len(plans) > 1)),
         is_complete=bool(tails),
     )
+
+
+def _require_times(t: NDArray[np.float64], most: int) -> None:
+    """Requires ascending times that span no more cycles than a motion has.
+
+    Raises:
+        ValueError: They are not such.
+    """
+    if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
+        raise ValueError("its times do not ascend")
+    if t.size and t[-1] - t[0] > most * CYCLE_TIME:
+        raise ValueError(f"its times span {t[-1] - t[0]:g} s, the maximum is {most * CYCLE_TIME:g} s")
 
 
 def _decode_text(chunk: Chunk) -> Any:

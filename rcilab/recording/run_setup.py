@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+from rcilab.core.arrays import described
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 
@@ -51,5 +52,16 @@ class Setup:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Setup:
-        """Returns the setup from the data of `as_dict`; fields of a later version are ignored."""
-        return cls(**{item.name: values[item.name] for item in fields(cls) if item.name in values})
+        """Returns the setup from the data of `as_dict`; fields of a later version are ignored.
+
+        Raises:
+            TypeError: A value has another type.
+            LookupError: The safety box is not complete; also an InvalidValueError where it is not valid.
+        """
+        found = {item.name: values[item.name] for item in fields(cls) if item.name in values}
+        for name, value in found.items():
+            if not isinstance(value, {"started_ns": int, "settings": Mapping}.get(name, str)):
+                raise TypeError(f"{name} in its setup is {described(value)}")
+        setup = cls(**found)
+        _ = setup.safety_box
+        return setup

@@ -1,76 +1,127 @@
-"""What a client commanded in a recorded run, as a motion."""
+"""What a client commanded in a recorded run, as a motion, and its check."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, JointPath, JointVector
+from rcilab.conformance.check import check_commands, check_torques
+from rcilab.conformance.pose_validation import find_frame_error
+from rcilab.conformance.signals import Record
+from rcilab.core.arrays import Array, JointPath, JointVector, as_vector
+from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
-from rcilab.core.errors import UsageError
-from rcilab.core.state import COMPLIANT_MODES
+from rcilab.core.errors import PlanningError, UsageError
+from rcilab.core.state import COMPLIANT_MODES, MODES, Mode, require_mode
+from rcilab.model.robot_model import require_model
 from rcilab.motion.differences import derivatives_from_differences
+from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
-from rcilab.recording.playout import checked_joints, played_commands
+from rcilab.recording.playout import played_commands
 
 if TYPE_CHECKING:
+    from rcilab.conformance.report import Report
+    from rcilab.core.safety_box import SafetyBox
     from rcilab.model.robot_model import RobotModel
     from rcilab.recording.run import Run
 
-_FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
+_FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
+_FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
+_LARGEST = 1e100  # [rad] Of commanded angles: their differences remain finite.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SentCommands:
+    """The commands of a client, in its order."""
+
+    motion: Motion
+    """Joint angles as sent, or of the poses that were sent; a command that did not arrive is interpolated."""
+    was_refused: bool = False
+    """Whether a pose follows that has no joint angles: it is not one, out of reach or singular."""
 
 
 def sent_motion(run: Run) -> Motion:
-    """Returns the motion that a client commanded, on the grid of the controller's cycles.
+    """Returns the motion that a client commanded: its commands in its own order, one a cycle.
 
-    It has the joint angles as they were sent; if poses of the tool were sent, the joint angles that the controller
-    reports as commanded. A command that did not arrive is interpolated; `.notes` counts them: what the arm did in a
-    pause of the client is not the client's. Where a virtual controller recorded which commands it played, it has these
-    at the times when they were played, up to one that was refused.
+    It has the joint angles as they were sent, or those of the poses that were sent, on the branch on which the arm
+    stood. What the arm did in a pause of the client is not the client's: a command that came late counts at its place,
+    and one that did not arrive is interpolated; `.notes` counts these. Where a virtual controller recorded which
+    commands it played, it begins with the first one played and ends with the last, or with one that was refused.
 
     Raises:
         UsageError: Nothing was commanded, or torques were: see `sent_torques`.
     """
-    rows = run.cycles
+    return read_sent(run).motion
+
+
+def read_sent(run: Run) -> SentCommands:
+    """Returns what a client commanded, see `sent_motion`, and whether its last command was a pose without angles."""
+    cycles = run.cycles
     is_played = run.has_playout
-    if np.isfinite(rows["command_pose"]).any():
-        return Motion.from_cycles(checked_joints(rows)) if is_played else run.commanded()
-    period = 1 if is_played else state_cycles(rows)
-    index, q = _played_angles(rows) if is_played else _sent_angles(rows, period)
-    if not len(q):
-        what = "torques were sent, which have no path" if np.isfinite(rows["command_tau"]).any() else "nothing was sent"
+    of_poses = bool(np.isfinite(cycles["command_pose"]).any())
+    numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
+    sent = np.asarray(np.isfinite(numbers).all(axis=1), dtype=np.bool_)
+    period = 1 if is_played else state_cycles(cycles)
+    index, rows = _played_order(cycles, sent) if is_played else _answered_order(cycles, sent, period)
+    if not len(rows):
+        has_torques = np.isfinite(cycles["command_tau"]).any()
+        what = "torques were sent, which have no path" if has_torques else "nothing was sent"
         raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
+    q = _angles_of_poses(run, rows) if of_poses else np.clip(cycles["command"][rows], -_LARGEST, _LARGEST)
+    was_refused = len(q) < len(rows)
+    if not len(q):
+        return SentCommands(motion=Motion.from_cycles(cycles["q_c"][:1]), was_refused=True)
+    index = _without_pauses(index[: len(q)], q) if is_played else index[: len(q)]
     motion = Motion.from_cycles(_fill_gaps(index, q), period)
     lost = int(index[-1]) + 1 - len(index)
-    return replace(motion, notes=(f"{lost} commands did not arrive and are interpolated",)) if lost else motion
+    notes = (f"{lost} commands did not arrive and are interpolated",) if lost else ()
+    return SentCommands(motion=replace(motion, notes=notes), was_refused=was_refused)
 
 
-def _sent_angles(cycles: NDArray[np.void], period: int) -> tuple[NDArray[np.intp], JointPath]:
-    """Returns the sent joint angles, with their numbers on the grid of the states, from 0."""
-    sent = cycles[np.isfinite(cycles["command"]).all(axis=1)]
-    if not len(sent):
-        return np.zeros(0, np.intp), sent["command"]
-    index = np.rint((sent["t"] - sent["t"][0]) / (period * CYCLE_TIME)).astype(np.intp)
-    index, first = np.unique(index, return_index=True)
-    return index, sent["command"][first]
+def check_sent(
+    run: Run,
+    model: RobotModel | None = None,
+    *,
+    box: SafetyBox | None = None,
+    distance: ClearanceLimit | None = STANDARD_DISTANCE,
+    mode: Mode | None = None,
+) -> Report:
+    """Returns the check of what a client commanded in a run, up to its last command, or one that was refused.
+
+    Args:
+        run: The run.
+        model: The arm; None: that of the run.
+        box: The safety box; None: that of the run.
+        distance: Required distances of the links; None does not check them.
+        mode: The mode; None: that of the run.
+
+    Raises:
+        InvalidValueError: The run does not name its arm, or an argument is not valid for it.
+        UsageError: Nothing was commanded.
+    """
+    model = require_model(run.model if model is None else model)
+    box = run.setup.safety_box if box is None else box
+    recorded = recorded_mode(run)
+    if recorded == "torque":
+        return check_torques(*sent_torques(run), model, start=start_of(run), box=box, distance=distance)
+    sent = read_sent(run)
+    record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
+    return check_commands(
+        sent.motion, model, record, start=start_of(run), box=box, distance=distance, mode=mode or recorded
+    )
 
 
-def _played_angles(cycles: NDArray[np.void]) -> tuple[NDArray[np.intp], JointPath]:
-    """Returns the played joint angles, up to refused ones, with the numbers of their cycles, from 0."""
-    rows, sources = played_commands(cycles)
-    q = cycles["command"][sources]
-    is_checked = np.isfinite(q).all(axis=1)
-    faulty = np.flatnonzero(cycles["faults"])
-    if faulty.size:
-        is_checked &= rows <= faulty[0]
-    rows, q = rows[is_checked], q[is_checked]
-    return rows - rows[0] if rows.size else rows, q
+def recorded_mode(run: Run) -> Mode:
+    """Returns the mode of a run; joint_position where it does not name one."""
+    mode = run.setup.mode
+    return require_mode(mode) if mode in MODES else "joint_position"
 
 
 def sent_torques(run: Run) -> tuple[Motion, Array]:
@@ -102,14 +153,10 @@ def start_of(run: Run) -> JointVector | None:
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
-    """Returns a motion whose last row still moves, continued by a stop; one that ends at standstill as it is.
+    """Returns a motion whose last row still moves, continued by a stop, so that it can be run; one at rest as it is.
 
-    A check holds the arm at the last row. A client whose motion ended early did not command the jump of such an end,
-    and a controller stops the arm smoothly after the last command of a program that ends moving a little. Joints stop
-    as fast as their limits allow; where poses are commanded, on a course that the limits of the tool allow, too.
-
-    Raises:
-        PlanningError: The last rows are farther apart than any robot's.
+    Joints stop as fast as their limits allow; where poses are commanded, smoothly, on a course that the limits of the
+    tool allow, too. A motion that ends in a jump, from which no stop leads, is returned as it is.
     """
     q = motion.q
     if len(q) < 3:
@@ -118,16 +165,116 @@ def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
     if np.abs(dq).max() <= _STILL and np.abs(ddq).max() <= _STEADY:
         return motion
     if mode.startswith("cartesian"):
-        stop = q[-1] + _fade_out(dq, ddq)
+        stop = q[-1] + _fade_out(dq, ddq, _fade_time(dq, ddq, model))
     else:
-        stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq)).q[1:]
+        try:
+            stop = plan_stop(model.limits.joint, q[-1], *derivatives_from_differences(dq, ddq)).q[1:]
+        except PlanningError:
+            return motion
     return replace(Motion.from_cycles(np.concatenate((q, stop))), notes=motion.notes)
 
 
-def _fade_out(dq: Array, ddq: Array) -> JointPath:
-    """Returns the displacement in every cycle until standstill; velocity and acceleration vanish smoothly."""
-    s = CYCLE_TIME * np.arange(1, round(_FADE_TIME / CYCLE_TIME) + 1)[:, np.newaxis]
-    u = s / _FADE_TIME
+def _answered_order(
+    cycles: NDArray[np.void], sent: NDArray[np.bool_], period: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Returns the numbers of sent commands on the grid of the states, from 0, and their rows."""
+    rows = np.flatnonzero(sent)
+    t = cycles["t"][rows]
+    index, first = np.unique(np.rint((t - t[:1]) / (period * CYCLE_TIME)).astype(np.intp), return_index=True)
+    return index, rows[first]
+
+
+def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Returns the numbers of the commands up to a refused one, from 0, one a cycle, and their rows.
+
+    They are in the order in which they were played; those that came too late for it are at their place. Between two of
+    them, a number is missing for each cycle in which the controller had none to play and which none answers, and for
+    each command that is not in the record.
+    """
+    played, sources = played_commands(cycles)
+    faulty = np.flatnonzero(cycles["faults"])
+    is_counted = sent[sources] & (played <= (faulty[0] if faulty.size else len(cycles)))
+    played, sources = played[is_counted], sources[is_counted]
+    if not sources.size:
+        return sources, sources
+    newest = np.maximum.accumulate(sources)
+    is_late = sent.copy()
+    is_late[sources], is_late[: sources[0]], is_late[newest[-1] :] = False, False, False
+    late = np.flatnonzero(is_late)
+    place = np.searchsorted(newest, late) - 1  # Behind which of the played ones.
+    turn = np.concatenate((np.arange(len(played)), place))
+    rows = np.concatenate((sources, late))
+    order = np.lexsort((np.concatenate((np.full(len(played), -1), late)), turn))
+    rows, turn = rows[order], turn[order]
+    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - np.bincount(place, minlength=len(played))[:-1]
+    unknown = np.diff(np.cumsum(cycles["played"] != 0)[played]) - 1
+    unanswered = np.maximum(np.diff(np.cumsum(~sent)[rows]), 0)
+    steps = 1 + np.clip(missed[turn[:-1]], 0, unanswered) + np.where(np.diff(turn) > 0, unknown[turn[:-1]], 0)
+    return np.concatenate(([0], np.cumsum(steps))).astype(np.intp), rows
+
+
+def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
+    """Returns the numbers of commands without the gaps after which a client goes on from where it paused.
+
+    Only the values can tell: its velocities before and after a gap lead over one cycle or over all.
+    """
+    steps = np.diff(index)
+    for gap in np.flatnonzero(steps[1:-1] > 1) + 1:
+        if steps[gap - 1] > 1 or steps[gap + 1] > 1:
+            continue
+        way, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
+        if np.abs(way - velocity).sum() < np.abs(way - steps[gap] * velocity).sum():
+            steps[gap] = 1
+    return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
+
+
+def _angles_of_poses(run: Run, rows: NDArray[np.intp]) -> JointPath:
+    """Returns the joint angles of the poses in some rows, up to the first one that has none, shape (M, n), [rad]."""
+    model, cycles = require_model(run.model), run.cycles
+    start = as_vector(cycles["q_c"][0], model.n, "q_c of the run", "rad")
+    T = cycles["command_pose"][rows]
+    for row, pose in enumerate(T.reshape(-1, 16).tolist()):
+        if find_frame_error(pose) is not None:
+            T = T[:row]
+            break
+    psi = _arm_angles(model, start, cycles["command_psi"][rows[: len(T)]].tolist()) if model.redundancy else None
+    if not len(T):
+        return T.reshape(0, model.n)
+    q, end = inverse_path(model, T, psi, start)
+    return q if end is None else q[: end.row]
+
+
+def _arm_angles(model: RobotModel, start: JointVector, sent: list[float]) -> Array:
+    """Returns the arm angle of every pose, [rad], as a controller reads them: without one, the last is held.
+
+    The vendor's client cannot send exactly zero: without an arm angle it counts as zero while it passes zero.
+    """
+    limits = model.limits.arm_angle
+    smallest = 0.0 if limits is None else 2.0 * CYCLE_TIME * limits.velocity
+    found: list[float] = []
+    last, had_one = 0.0 if not sent or math.isfinite(sent[0]) else model.solver.redundancy_angle(start.tolist()), False
+    for psi in sent:
+        if math.isfinite(psi):
+            last, had_one = psi, True
+        elif had_one and abs(last) <= smallest:
+            last = 0.0
+        found.append(last)
+    return np.array(found)
+
+
+def _fade_time(dq: Array, ddq: Array, model: RobotModel) -> float:
+    """Returns how long the stop of `_fade_out` takes, [s]: whole cycles."""
+    limits = model.limits.joint
+    acceleration, jerk = _FADE_SHARE * limits.acceleration, _FADE_SHARE * limits.jerk
+    # Its largest acceleration is 1.5 dq / T, its jerk 6 dq / T^2 and 4 ddq / T.
+    times = (1.5 * np.abs(dq) / acceleration, np.sqrt(6.0 * np.abs(dq) / jerk), 4.0 * np.abs(ddq) / jerk)
+    return CYCLE_TIME * math.ceil(min(float(np.max(times)), _FADE_TIME) / CYCLE_TIME)
+
+
+def _fade_out(dq: Array, ddq: Array, duration: float) -> JointPath:
+    """Returns the way of every cycle until standstill; velocity and acceleration continue and vanish smoothly."""
+    s = CYCLE_TIME * np.arange(1, round(duration / CYCLE_TIME) + 1)[:, np.newaxis]
+    u = s / duration
     velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3
     return CYCLE_TIME * np.cumsum(velocity, axis=0)
 

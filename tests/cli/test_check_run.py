@@ -16,7 +16,7 @@ from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, Program, Waypoint, plan_joint
 from rcilab.motion.program import box_numbers
-from rcilab.recording.run import build_run
+from rcilab.recording.run import build_run, load_run
 from rcilab.recording.sent_motion import sent_motion
 from tests.recording.runs import MODEL, PLAN, SETUP, some_cycles, some_run
 
@@ -74,7 +74,7 @@ def test_the_first_command_is_compared_with_the_state_before_it(tmp_path, capsys
     assert report["violations"][0]["time"] <= 0.001
 
 
-def test_a_run_of_poses_is_checked_by_the_angles_that_the_controller_commanded(tmp_path, capsys):
+def test_a_run_of_poses_is_checked_by_the_poses_that_were_sent(tmp_path, capsys):
     model = load_model("xMatePro7")
     motion = plan_joint(model, model.home, model.home + 0.05, speed=0.1)
     with simulate(model) as robot:
@@ -85,6 +85,16 @@ def test_a_run_of_poses_is_checked_by_the_angles_that_the_controller_commanded(t
     assert code == 0
     assert "cartesian_position" in report["title"]
     assert row(report, "cartesian.velocity.translation")["value"] > 0.0
+    run = load_run(tmp_path / "a.rcirun")
+    cycles = run.cycles.copy()
+    cycles["command_pose"][0, 1, 3] += 0.1  # [m]
+    replace(run, cycles=cycles).save(tmp_path / "b.rcirun")
+    assert report_of(capsys, str(tmp_path / "b.rcirun"))[0] == 1
+    cycles["command_pose"][100, 0, 3] += 3.0
+    replace(run, cycles=cycles[1:]).save(tmp_path / "c.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "c.rcirun"))
+    assert code == 1
+    assert "cartesian.frame" in {violation["id"] for violation in report["violations"]}
 
 
 def test_a_run_of_torques_is_checked_by_the_torques_that_were_sent(tmp_path, capsys):
@@ -164,7 +174,8 @@ def test_a_run_that_ended_in_the_middle_is_not_blamed_for_a_jump_at_its_end(tmp_
     run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun")]) == 0
     said = capsys.readouterr().out
-    assert "the run ended early: an emergency stop was pressed; after its last command at t = 0.299 s, which" in said
+    assert "note: the run ended early: an emergency stop was pressed" in said
+    assert "motion samples of 0.299 s" in said
     spoiled = some_cycles()[:300].copy()
     spoiled["command"][150, 1] += 1e-4
     run_of(spoiled, stopped="joint 2: jump").save(tmp_path / "b.rcirun")
@@ -172,3 +183,43 @@ def test_a_run_that_ended_in_the_middle_is_not_blamed_for_a_jump_at_its_end(tmp_
     assert code == 1
     assert {violation["place"] for violation in report["violations"]} == {"joint 2"}
     assert all(0.149 < violation["worst_time"] < 0.154 for violation in report["violations"])
+
+
+def test_a_jump_at_the_end_of_a_run_is_a_violation_and_no_stop_is_written(tmp_path, capsys):
+    cycles = some_cycles()[:300].copy()
+    cycles["command"][-1, 1] += 1e12
+    run_of(cycles, stopped="joint 2: jump").save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 1
+    assert report["violations"][0]["place"] == "joint 2"
+    assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 1
+
+
+def test_a_slowed_run_ends_at_rest(tmp_path, capsys):
+    run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
+    assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 0
+    written = Motion.load(tmp_path / "b.npz")
+    assert written.duration > 0.3
+    assert np.abs(np.diff(written.q[-2:], axis=0)).max() < 1e-6
+
+
+def test_a_run_checked_as_one_of_another_arm_says_so(tmp_path, capsys):
+    run_of(some_cycles()).save(tmp_path / "a.rcirun")
+    main(["check", str(tmp_path / "a.rcirun"), "--model", "xMatePro3", "--load", "1@0,0,0"])
+    assert "note: the run is of the xMatePro7, checked as one of the xMatePro3" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([[k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
+        ([[1e5 * k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
+        (PLAN.q, "has 6 joints after the time, xMatePro7 has 7; is there a column t [s]?"),
+        (-PLAN.q, "the first column is the time: is it missing?"),
+    ],
+)
+def test_a_table_with_wrong_times_names_the_cause(tmp_path, capsys, rows, words):
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",")
+    main(["check", str(tmp_path / "a.csv"), "--model", "xMatePro7"])
+    said = capsys.readouterr()
+    assert words in said.out + said.err

@@ -7,7 +7,6 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from rcilab.recording.client_motions import LAG, ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import Run, build_run, load_run
-from rcilab.recording.sent_motion import sent_motion, with_stop
+from rcilab.recording.sent_motion import sent_motion
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
@@ -206,24 +205,6 @@ def test_commands_that_answer_one_state_again_are_all_recorded() -> None:
     assert run.timing.lost == 0
     assert sent_motion(run).notes == ()
     assert check(sent_motion(run), parts[0].motion.model, distance=None).ok
-
-
-def test_a_pause_of_the_client_is_not_blamed_on_the_commands_around_it() -> None:
-    with watched() as (place, motions), place.connect() as robot:
-        programs.prepare(robot, NEAR, factor=1.0)
-        programs.joint_sine(robot, SECONDS, period=SECONDS)
-        run = as_run(collect(motions, 2)[1])
-    cycles = run.cycles.copy()
-    pause = np.flatnonzero(cycles["played"])[300:320]
-    cycles["played"][pause], cycles["missed"][pause] = 0, 1
-    cycles["q_c"][pause] = cycles["q_c"][pause[0] - 1]  # The arm is held there.
-    paused = replace(run, cycles=cycles)
-    assert not check(paused.commanded(), MODEL, distance=None).ok
-    motion = with_stop(sent_motion(paused), MODEL, "joint_position")
-    assert motion.notes == ("20 commands did not arrive and are interpolated",)
-    assert check(motion, MODEL, distance=None).ok
-    np.testing.assert_allclose(sent_motion(paused).q, sent_motion(run).q, rtol=0, atol=1e-6)
-    assert "nearest limit" in report_on_client(paused).line
 
 
 def test_duplicates_do_not_displace_other_commands() -> None:

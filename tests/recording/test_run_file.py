@@ -20,7 +20,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, decode_chunks, encode_chunk, encode_header
 from rcilab.recording.live_recording import LiveRecording, RunFacts
-from rcilab.recording.run import Run, build_run, decode_run
+from rcilab.recording.run import Run, build_run, decode_run, load_run
 from rcilab.recording.run_file import CHUNK_CYCLES, RunFile, RunWriter, write_run
 from rcilab.recording.run_html import run_html
 from tests.recording.runs import MODEL, OFFSET, PLAN, SETUP, export_run, some_cycles, some_run
@@ -285,3 +285,24 @@ def test_a_run_is_not_written_through_what_someone_has_put_in_its_place(tmp_path
         assert (tmp_path / "a.rcirun").is_file()
     assert not (tmp_path / "a.rcirun").is_symlink()
     assert precious.read_text() == "mine"
+
+
+@pytest.mark.parametrize("last", [np.nan, -1.0, 1e9, 1e300])
+def test_times_that_no_motion_has_are_refused(tmp_path, last):
+    run = some_run()
+    cycles = run.cycles.copy()
+    cycles["t"][-1] = last
+    replace(run, cycles=cycles).save(tmp_path / "a.rcirun")
+    with pytest.raises(InvalidValueError, match="is damaged: its times"):
+        load_run(tmp_path / "a.rcirun")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"safety_box": 5}, {"safety_box": {"size": [1], "pose": "x", "active": 3}}, {"safety_box": {}}, 5, None],
+)
+def test_settings_that_are_none_are_refused(tmp_path, settings):
+    run = some_run()
+    replace(run, setup=replace(run.setup, settings=settings)).save(tmp_path / "a.rcirun")
+    with pytest.raises(InvalidValueError, match="is damaged"):
+        load_run(tmp_path / "a.rcirun")

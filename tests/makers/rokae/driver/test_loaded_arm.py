@@ -207,6 +207,11 @@ def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path)
         ({"links": None}, "links.* must be a list of 7 entries"),
         ({"friction": {"viscous": [0.0] * 7}}, "coulomb"),
         ({"friction": {"viscous": [0.0] * 6, "coulomb": [0.0] * 7, "offset": [0.0] * 7}}, "viscous.* needs .7,"),
+        ({"friction": {name: [1e308] * 7 for name in ("viscous", "coulomb", "offset")}}, "viscous must be within"),
+        ({"dh": [[0, 0, 0, 0]] * 7}, "dh row 1.* is not near"),
+        ({"links": [{"mass": 1e308, "center_of_mass": [0] * 3, "inertia": [0] * 9}] * 7}, "mass must be in 0 to"),
+        ({"links": [{"mass": 1, "center_of_mass": [1e9] * 3, "inertia": [0] * 9}] * 7}, "mass must be within 10 m"),
+        ({"links": [{"mass": 1, "center_of_mass": [0] * 3, "inertia": [1e300] * 9}] * 7}, "inertia must be within"),
     ],
 )
 def test_a_file_that_is_not_valid_is_refused_in_one_sentence(tmp_path: Path, change: dict, expected: str) -> None:
@@ -229,6 +234,7 @@ def test_a_missing_file_and_another_version_are_refused(tmp_path: Path) -> None:
     file.write_text(file.read_text().replace('"version": 2', '"version": 1').replace("xMatePro7", "kuka"))
     with pytest.raises(ModelError, match="known robots"):
         load_model(str(file))
-    file.write_text("{")
-    with pytest.raises(InvalidValueError, match="is not valid JSON"):
-        load_model(str(file))
+    for text in ("{", '{"a":' * 15_000 + "1" + "}" * 15_000):
+        file.write_text(text)
+        with pytest.raises(InvalidValueError, match="is not valid JSON"):
+            load_model(str(file))

@@ -1,0 +1,183 @@
+"""What a foreign client commanded, found in the record of a virtual controller: a scripted peer, over real sockets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcilab.conformance.check import check
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.motion.motion import Motion
+from rcilab.recording.run import Run
+from rcilab.recording.sent_motion import check_sent, sent_motion, with_stop
+from tests.peers import kinematics, programs, wire
+from tests.peers.robot import ControlException, Output, Robot
+from tests.recording.test_client_motions import MODEL, NEAR, SECONDS, as_run, collect, watched
+
+
+@pytest.fixture(scope="module")
+def sine() -> Run:
+    with watched() as (_place, motions), _place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.joint_sine(robot, SECONDS, period=SECONDS)
+        return as_run(collect(motions, 2)[1])
+
+
+def send_poses(robot: Robot, offsets: list[tuple[float, float, float]]) -> None:
+    """Commands the pose of the tool, moved by an offset a cycle, [m]."""
+    poses = iter(offsets)
+    robot.start_move(wire.CARTESIAN_POSITION, wire.CARTESIAN)
+    begin: list[np.ndarray] = []
+
+    def callback(state: wire.State) -> Output:
+        if not begin:
+            begin.append(kinematics.matrix(state.pos_m))
+        T = begin[0].copy()
+        T[:3, 3] += next(poses)
+        return Output(pose=tuple(T.ravel().tolist()), psi=state.psi_m[0])
+
+    robot.control(callback)
+
+
+def recorded_poses(offsets: list[tuple[float, float, float]]) -> Run:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        with pytest.raises(ControlException):
+            send_poses(robot, offsets)
+        parts = collect(motions, 2)[1]
+    assert parts[-1].end is not None
+    return replace(as_run(parts), stopped=parts[-1].end.stopped)
+
+
+def without(run: Run, rows: slice, *, arrived: bool) -> Run:
+    """The controller had no command to play in some cycles: they came too late, or never."""
+    cycles = run.cycles.copy()
+    pause = np.flatnonzero(cycles["played"])[rows]
+    sources = pause - cycles["age"][pause].astype(int)
+    cycles["played"][pause], cycles["missed"][pause] = 0, 1
+    cycles["q_c"][pause] = cycles["q_c"][pause[0] - 1]  # The arm is held there.
+    if not arrived:
+        cycles["command"][sources] = np.nan
+    return replace(run, cycles=cycles)
+
+
+def test_a_first_pose_far_from_the_arm_does_not_conform() -> None:
+    run = recorded_poses([(0.0, 0.1, 0.0)] * 100)
+    assert run.stopped
+    report = check_sent(run)
+    assert not report.ok
+    assert report.violations[0].time <= CYCLE_TIME
+    assert "cartesian.velocity.translation" in {violation.condition.id for violation in report.violations}
+
+
+@pytest.mark.parametrize("count", [0, 20])
+def test_a_pose_without_joint_angles_is_the_violation(count: int) -> None:
+    run = recorded_poses([(0.0, 0.0, 0.0)] * count + [(3.0, 0.0, 0.0)] * 100)
+    report = check_sent(run)
+    assert {violation.condition.id for violation in report.violations} == {"cartesian.frame"}
+    (violation,) = report.violations
+    assert violation.time == pytest.approx(max(count, 1) * CYCLE_TIME)
+    assert violation.count == 1
+
+
+def test_poses_are_checked_by_their_own_angles() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.nullspace(robot, SECONDS, period=SECONDS)
+        run = as_run(collect(motions, 2)[1])
+    motion = sent_motion(run)
+    rows = np.flatnonzero(run.cycles["played"])
+    np.testing.assert_allclose(motion.q, run.q_c[rows], rtol=0, atol=1e-9)
+    assert check_sent(run).ok
+
+
+def test_late_commands_count_at_their_place(sine: Run) -> None:
+    late = without(sine, slice(300, 320), arrived=True)
+    assert not check(late.commanded(), MODEL, distance=None).ok
+    motion = sent_motion(late)
+    assert motion.notes == ()
+    assert motion.q.tobytes() == sent_motion(sine).q.tobytes()
+
+
+def test_commands_that_never_arrived_are_interpolated(sine: Run) -> None:
+    motion = sent_motion(without(sine, slice(300, 320), arrived=False))
+    assert motion.notes == ("20 commands did not arrive and are interpolated",)
+    np.testing.assert_allclose(motion.q, sent_motion(sine).q, rtol=0, atol=1e-6)
+
+
+def test_a_client_that_goes_on_where_it_paused_has_no_gap(sine: Run) -> None:
+    cycles = without(sine, slice(300, 320), arrived=False).cycles.copy()
+    sent = np.flatnonzero(np.isfinite(sine.command).all(axis=1))
+    cycles["command"][sent[320:]] = sine.command[sent[300:-20]]
+    motion = sent_motion(replace(sine, cycles=cycles))
+    assert motion.notes == ()
+    assert motion.q.tobytes() == sent_motion(sine).q[:-20].tobytes()
+
+
+def test_a_cycle_that_catches_up_leaves_no_gap(sine: Run) -> None:
+    """It plays a command and has no state, so that the age of all later commands is one less."""
+    rows = sine.cycles
+    played = np.flatnonzero(rows["played"])
+    place = int(played[400])
+    sources = played - rows["age"][played].astype(int)
+    cycles = np.insert(rows, place, rows[place])
+    cycles["command"][place], cycles["sent_ns"][place] = np.nan, 0
+    moved = sources + (sources >= place)
+    cycles["played"][played[-1] + 1] = 0
+    for number, source in enumerate(moved):
+        cycles["age"][played[number]] = played[number] - source if source < played[number] else 0
+    found = sent_motion(replace(sine, cycles=cycles))
+    assert found.notes == ()
+    assert found.q.tobytes() == sent_motion(sine).q[: len(found.q)].tobytes()
+
+
+def test_a_motion_lasts_from_its_first_played_command_to_the_last(sine: Run) -> None:
+    report = check_sent(sine)
+    assert report.motion.duration == pytest.approx(sine.duration)
+    assert sine.duration == pytest.approx(SECONDS, abs=2.5 * CYCLE_TIME)
+    assert sine.t[-1] > sine.duration
+
+
+def test_the_hold_after_the_last_command_is_not_the_clients(sine: Run) -> None:
+    """A client that ends at speed is advised to end at rest; one that was stopped is not."""
+    end = int(np.flatnonzero(sine.cycles["played"])[300])
+    cut = replace(sine, cycles=sine.cycles[: end + 1])
+    assert not check(sent_motion(cut), MODEL, distance=None).ok
+    report = check_sent(cut, distance=None)
+    assert report.ok
+    assert "end.velocity" in {row.condition.id for row in report.warnings}
+    stopped = check_sent(replace(cut, stopped="an emergency stop was pressed"), distance=None)
+    assert not any(row.condition.stage == "end" for row in stopped.rows)
+    assert stopped.certificate is None
+    assert check(with_stop(report.motion, MODEL, "joint_position"), MODEL, distance=None).ok
+
+
+def test_a_jump_at_the_end_is_a_violation(sine: Run) -> None:
+    end = int(np.flatnonzero(sine.cycles["played"])[300])
+    cycles = sine.cycles[: end + 1].copy()
+    cycles["command"][end - int(cycles["age"][end]), 1] += 1e12
+    cycles["faults"][end] = 1
+    cut = replace(sine, cycles=cycles)
+    report = check_sent(cut)
+    assert {violation.joint for violation in report.violations if violation.joint} == {2}
+    assert with_stop(report.motion, MODEL, "joint_position") is report.motion
+
+
+def test_a_first_step_that_no_limit_forbids_needs_no_advice(sine: Run) -> None:
+    cycles = sine.cycles.copy()
+    cycles["q_c"][0] -= 5e-8
+    report = check_sent(replace(sine, cycles=cycles))
+    assert next(row for row in report.rows if row.id == "start.position").ok
+    cycles["q_c"][0] -= 5e-5
+    report = check_sent(replace(sine, cycles=cycles))
+    assert not next(row for row in report.rows if row.id == "start.position").ok
+
+
+def test_a_stop_of_poses_takes_as_long_as_its_speed_needs() -> None:
+    path = MODEL.home + 1e-6 * np.arange(200)[:, np.newaxis] * np.ones(7)
+    slow = with_stop(Motion.from_cycles(path), MODEL, "cartesian_position")
+    fast = with_stop(Motion.from_cycles(path[0] + 400.0 * (path - path[0])), MODEL, "cartesian_position")
+    assert 0.199 < slow.duration < 0.22
+    assert 0.3 < fast.duration < 0.7
