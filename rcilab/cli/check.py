@@ -194,7 +194,7 @@ def _read_run(args: Namespace) -> _Subject:
     if not run.is_complete:
         notes.append("the end of its file is missing")
     if run.truncated:
-        notes.append("the beginning of the run is missing, so that the motion begins with a jump")
+        notes.append("the beginning of the run is missing: the check begins in mid-motion")
     return _Subject(
         found=run,
         model=model,

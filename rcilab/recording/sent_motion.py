@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rcilab.conformance.check import check_commands, check_torques
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.conformance.signals import Record
+from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath, JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
@@ -112,10 +113,9 @@ def check_sent(
     if recorded == "torque":
         return check_torques(*sent_torques(run), model, start=start_of(run), box=box, distance=distance)
     sent = read_sent(run)
+    motion, start = _in_progress(sent.motion) if run.truncated else (sent.motion, start_of(run))
     record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
-    return check_commands(
-        sent.motion, model, record, start=start_of(run), box=box, distance=distance, mode=mode or recorded
-    )
+    return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
 
 
 def recorded_mode(run: Run) -> Mode:
@@ -150,6 +150,15 @@ def start_of(run: Run) -> JointVector | None:
     A compliant arm stands off its last command, and a controller absorbs the offset of the next first one.
     """
     return None if run.truncated or run.setup.mode in COMPLIANT_MODES else run.q_c[0]
+
+
+def _in_progress(motion: Motion) -> tuple[Motion, StartState | None]:
+    """Returns a motion whose beginning is missing from its third row on, and the state of the arm there."""
+    q = motion.q
+    if len(q) < 4:
+        return motion, None
+    start = StartState(q=q[2], dq=(q[2] - q[1]) / CYCLE_TIME, ddq=(q[2] - 2.0 * q[1] + q[0]) / CYCLE_TIME**2)
+    return replace(Motion.from_cycles(q[2:]), notes=motion.notes), start
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:

@@ -181,3 +181,26 @@ def test_a_stop_of_poses_takes_as_long_as_its_speed_needs() -> None:
     fast = with_stop(Motion.from_cycles(path[0] + 400.0 * (path - path[0])), MODEL, "cartesian_position")
     assert 0.199 < slow.duration < 0.22
     assert 0.3 < fast.duration < 0.7
+
+
+def test_a_run_without_its_beginning_is_checked_in_mid_motion(sine: Run) -> None:
+    whole = check_sent(sine, distance=None)
+    cycles = sine.cycles[350:].copy()
+    cycles["t"] -= cycles["t"][0]
+    cut = check_sent(replace(sine, cycles=cycles, truncated=True), distance=None)
+    assert cut.ok
+    for name in ("joint.acceleration", "joint.jerk"):
+        (before,) = (row for row in whole.rows if row.id == name)
+        (after,) = (row for row in cut.rows if row.id == name)
+        assert after.ratio <= before.ratio + 1e-6
+
+
+def test_poses_without_their_beginning_are_checked_in_mid_motion() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
+        line = as_run(collect(motions, 2)[1])
+    assert check_sent(line, distance=None).ok
+    cycles = line.cycles[350:].copy()
+    cycles["t"] -= cycles["t"][0]
+    assert check_sent(replace(line, cycles=cycles, truncated=True), distance=None).ok
