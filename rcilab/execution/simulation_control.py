@@ -270,7 +270,7 @@ class SimulationControl(Closeable):
                 self._disconnect()
                 raise ConnectionLostError(
                     f"{self._name} does not respond to {request.name} ({error}); check that the virtual controller "
-                    "is running"
+                    "is running and prints this address after 'world'"
                 ).coded("world_silent") from error
             if self._is_refused:
                 self._disconnect()
