@@ -8,7 +8,7 @@ from rcilab.core.arrays import JointVector
 from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import DecodeError, InvalidValueError
 from rcilab.core.state import RobotState
-from rcilab.makers.rokae.wire.layout import Field, Layout
+from rcilab.core.message_layout import Field, Layout
 
 COMMAND = Layout(
     "robot command",

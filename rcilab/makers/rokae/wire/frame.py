@@ -7,7 +7,7 @@ from struct import Struct
 from typing import Any, NamedTuple, TypeVar
 
 from rcilab.core.errors import DecodeError, InvalidValueError
-from rcilab.makers.rokae.wire.layout import Field, Layout
+from rcilab.core.message_layout import Field, Layout
 from rcilab.makers.rokae.wire.requests import REQUESTS, Request
 from rcilab.makers.rokae.wire.responses import (
     DIGITAL_INPUT,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, TypeAlias
 
 from rcilab.core.errors import InvalidValueError
-from rcilab.makers.rokae.wire.layout import Field, Layout
+from rcilab.core.message_layout import Field, Layout
 from rcilab.makers.rokae.wire.statuses import CommandCode
 
 Numbers: TypeAlias = tuple[float, ...]

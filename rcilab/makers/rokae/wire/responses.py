@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcilab.makers.rokae.wire.layout import Field, Layout
+from rcilab.core.message_layout import Field, Layout
 from rcilab.makers.rokae.wire.statuses import (
     CommandCode,
     GuideStatus,

@@ -15,7 +15,7 @@ from rcilab.core.errors import DecodeError, InvalidValueError
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 from rcilab.makers.rokae.faults import FAULT_COUNT, Fault
-from rcilab.makers.rokae.wire.layout import Field, Layout
+from rcilab.core.message_layout import Field, Layout
 
 STATE = Layout(
     "robot state",

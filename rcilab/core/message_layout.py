@@ -1,8 +1,7 @@
 """A packed message as a table of fields, and its encoder and decoder.
 
-The tables of this package follow the description of the wire: one row per field, its offset given by the rows above
-it. Byte order is given per field, because the RCI mixes them: ids and lengths are big-endian, doubles are
-little-endian, in one datagram.
+A table follows the description of a wire: one row per field, its offset given by the rows above it. Byte order is given
+per field, because some wires mix them in one datagram.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from typing import Literal, TypeAlias
 
 from rcilab.core.errors import DecodeError
 
-FieldType: TypeAlias = Literal["u8", "flag", "u16", "u32", "u64", "f64"]
+FieldType: TypeAlias = Literal["u8", "flag", "u16", "u32", "i32", "u64", "f64"]
 ByteOrder: TypeAlias = Literal["little", "big"]
 Scalar: TypeAlias = int | float
 
-_STRUCT_CODES = {"u8": "B", "flag": "?", "u16": "H", "u32": "I", "u64": "Q", "f64": "d"}
-_SIZES = {"u8": 1, "flag": 1, "u16": 2, "u32": 4, "u64": 8, "f64": 8}
+_STRUCT_CODES = {"u8": "B", "flag": "?", "u16": "H", "u32": "I", "i32": "i", "u64": "Q", "f64": "d"}
+_SIZES = {"u8": 1, "flag": 1, "u16": 2, "u32": 4, "i32": 4, "u64": 8, "f64": 8}
 _ORDER_CODES = {"little": "<", "big": ">"}
 
 
