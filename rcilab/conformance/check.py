@@ -21,7 +21,7 @@ from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.condition import Condition
+from rcilab.core.condition import Bounds, Condition
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box
@@ -229,15 +229,20 @@ class _MotionChecker:
 
     def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
         values, first_time = self._signals.table(condition)
-        lower, upper = condition.bounds(self._limits)
-        smallest, largest = values.min(axis=0), values.max(axis=0)
-        reach = np.maximum(self._ratio(smallest, lower, upper), self._ratio(largest, lower, upper))
+        lower, upper = self._bounds(condition)
+        if lower.ndim == 2:
+            reach = self._ratio(values, lower, upper).max(axis=0)
+            ok = bool(((lower < values) & (values < upper)).all())
+        else:
+            smallest, largest = values.min(axis=0), values.max(axis=0)
+            reach = np.maximum(self._ratio(smallest, lower, upper), self._ratio(largest, lower, upper))
+            ok = bool(((lower < smallest) & (largest < upper)).all())
         column = int(reach.argmax())
-        row = int(self._ratio(values[:, column], lower[column], upper[column]).argmax())
+        one = slice(column, column + 1)
+        row = int(self._ratio(values[:, one], lower[..., one], upper[..., one]).argmax())
         value = float(values[row, column])
-        ok = bool(((lower < smallest) & (largest < upper)).all())
         is_violated = None if ok else ~((lower < values) & (values < upper))
-        bound = _nearest_bound(value, lower, upper, column)
+        bound = _nearest_bound(value, lower, upper, row, column)
         result = ConditionResult(
             condition=self._with_source(condition, column, bound),
             value=value,
@@ -255,7 +260,13 @@ class _MotionChecker:
         if condition.necessity == "recommended" and condition.stage == "throughout":
             runs = [run for run in runs if run[0] == column and run[1] <= row < run[2]]  # Only the worst.
         ratio = self._ratio(values, lower, upper)
-        return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
+        return result, [self._violation(condition, values, (lower, upper), ratio, first_time, run) for run in runs]
+
+    def _bounds(self, condition: Condition) -> Bounds:
+        """Returns the bounds of a condition, shape (n,) or (1,); (rows, n) if they depend on the joint angles."""
+        if condition.bounds_at is None or not condition.depends_on_angles(self._limits.joint):
+            return condition.bounds(self._limits)
+        return condition.bounds_at(self._limits.joint, self._signals.angles_before())
 
     def _with_source(self, condition: Condition, column: int, bound: float) -> Condition:
         """Returns the condition, with the source of its bound if that is not the arm's own."""
@@ -270,11 +281,16 @@ class _MotionChecker:
 
     def _used(self, condition: Condition) -> Array:
         values, _ = self._signals.table(condition)
-        ratio = self._ratio(values, *condition.bounds(self._limits)).max(axis=1)[: len(self._motion.times)]
+        ratio = self._ratio(values, *self._bounds(condition)).max(axis=1)[: len(self._motion.times)]
         return near_bound(ratio) if condition.order == 0 and condition.signal in ("joint", "position") else ratio
 
     def _ratio(self, values: Array, lower: Array, upper: Array) -> Array:
-        """Returns the distance from the middle of the allowed range, as a share of that of the bound."""
+        """Returns the distance from the middle of the allowed range, as a share of that of the bound.
+
+        Bounds that depend on the joint angles are not symmetric; there the value is a share of the bound on its side.
+        """
+        if lower.ndim == 2:
+            return values / np.where(values < 0.0, lower, upper)
         if not np.isfinite(lower).all():  # The box: 0 at its centre, 1 on its faces.
             return np.maximum(1.0 + (values - upper) / self._depth, 0.0)
         if not np.isfinite(upper).all():  # A clearance: 0 at `FAR` or more beyond the bound, 1 at the bound.
@@ -285,7 +301,13 @@ class _MotionChecker:
         return ratio
 
     def _violation(
-        self, condition: Condition, values: Array, ratio: Array, first_time: float, run: tuple[int, int, int]
+        self,
+        condition: Condition,
+        values: Array,
+        bounds: Bounds,
+        ratio: Array,
+        first_time: float,
+        run: tuple[int, int, int],
     ) -> Violation:
         column, begin, end = run
         row = begin + int(ratio[begin:end, column].argmax())
@@ -310,7 +332,7 @@ class _MotionChecker:
             count=end - begin,
             value=value,
             worst_time=first_time + row * CYCLE_TIME,
-            bound=_nearest_bound(value, *condition.bounds(self._limits), column),
+            bound=_nearest_bound(value, *bounds, row, column),
             ratio=worst,
             advice=advice,
             links=self._signals.links(condition, row),
@@ -326,8 +348,10 @@ def _limits_of(motion: Motion, limits: Limits, start: StartState) -> Limits:
     return replace(limits, joint=range_from(joint, start.q, RECOVERY_RANGE))
 
 
-def _nearest_bound(value: float, lower: Array, upper: Array, column: int) -> float:
-    """Returns the bound on the value's side of the middle of the range."""
+def _nearest_bound(value: float, lower: Array, upper: Array, row: int, column: int) -> float:
+    """Returns the bound on the value's side of the middle of the range; of zero, if it depends on the joint angles."""
+    if lower.ndim == 2:
+        return float((upper if value >= 0.0 else lower)[row, column])
     low, high = float(lower[column]), float(upper[column])
     return high if value >= (low + high) / 2.0 else low
 

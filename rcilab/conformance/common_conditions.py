@@ -32,7 +32,7 @@ from rcilab.core.condition import (
     joint_tolerance,
     symmetric_bounds,
 )
-from rcilab.core.limits import Limits
+from rcilab.core.limits import JointLimits, Limits
 from rcilab.robots.description import RobotDescription
 
 START_POSITION_TOLERANCE = 1e-9  # [rad]
@@ -130,6 +130,7 @@ def _joint(order: int) -> Condition:
         stage="throughout",
         order=order,
         bounds=_symmetric(name) if order else _joint_range,
+        bounds_at=JointLimits.velocity_bounds if order == 1 else None,
     )
 
 

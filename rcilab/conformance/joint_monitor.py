@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 from operator import sub
 
 from rcilab.conformance.bounds_table import BoundsTable
@@ -11,7 +12,7 @@ from rcilab.conformance.divided_differences import EVEN_TIMES, difference_times
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.core.condition import Condition
 from rcilab.core.errors import InvalidValueError
-from rcilab.core.limits import JointLimits
+from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
 
 
 class JointMonitor:
@@ -39,6 +40,7 @@ class JointMonitor:
     def __init__(self, limits: JointLimits, rows: Sequence[Condition] = JOINT_CONDITIONS) -> None:
         self._n = len(limits.velocity)
         self._rows = BoundsTable(rows, limits)
+        self._ends = _EndBounds(limits, rows)
         self.reset([0.0] * self._n)
 
     def reset(self, q: Sequence[float], dq: Sequence[float] | None = None, ddq: Sequence[float] | None = None) -> None:
@@ -75,6 +77,8 @@ class JointMonitor:
         dq = [(new - old) / first for new, old in zip(q, self.q, strict=True)]
         ddq = [change / second for change in map(sub, dq, self.dq)]
         jerk = [change / third for change in map(sub, ddq, self.ddq)]
+        if self._ends.rows:
+            self._ends.apply(self._rows, self.q)
         self.q, self.dq, self.ddq, self.jerk = q, dq, ddq, jerk
         return self._rows.evaluate([*q, *dq, *ddq, *jerk])
 
@@ -86,3 +90,27 @@ class JointMonitor:
         if len(values) != self._n:
             raise InvalidValueError(name, values, f"must be {self._n} numbers")
         return [float(value) for value in values]
+
+
+class _EndBounds:
+    """The velocity bounds near the ends of the joints' ranges, in plain floats; as `JointLimits.velocity_bounds`."""
+
+    def __init__(self, limits: JointLimits, rows: Sequence[Condition]) -> None:
+        n, own, ends = len(limits.velocity), limits if limits.own is None else limits.own, limits.near_ends
+        self.rows = [i * n for i, row in enumerate(rows) if row.depends_on_angles(limits)]
+        """First index of each affected condition in the table of bounds."""
+        self._joints: list[tuple[float, ...]] = []
+        if ends is not None:
+            columns = (own.lower, own.upper, limits.velocity, ends.offset, 2.0 * ends.deceleration)
+            self._joints = list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def apply(self, table: BoundsTable, q: Sequence[float]) -> None:
+        """Sets the bounds for a command after joint angles, n numbers, [rad]."""
+        for first in self.rows:
+            for i, (angle, (low, high, velocity, offset, twice)) in enumerate(zip(q, self._joints, strict=True), first):
+                down, up = twice * (angle - low), twice * (high - angle)
+                down = sqrt(down) - offset if down > 0.0 else 0.0
+                up = sqrt(up) - offset if up > 0.0 else 0.0
+                table.set_bounds(
+                    i, -min(max(down, SMALLEST_END_VELOCITY), velocity), min(max(up, SMALLEST_END_VELOCITY), velocity)
+                )

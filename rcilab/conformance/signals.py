@@ -98,6 +98,11 @@ class MotionSignals:
             return values, 0.0
         return above_resolution(values, condition, self._model.limits), 0.0  # It may be the first step of the motion.
 
+    def angles_before(self) -> Array:
+        """Returns the joint angles one cycle before each row that is checked throughout, shape (rows, n), [rad]."""
+        first = self._start.q - CYCLE_TIME * self._start.dq if self._start.moving else self._start.q
+        return np.concatenate((first[np.newaxis], self._differences[0][:-1]))
+
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns the two links of the distance in a row of a table; None for other conditions."""
         if not condition.is_clearance:

@@ -77,6 +77,13 @@ class Condition:
     """Derivative of the signal that it bounds: 0 the signal itself, 3 its jerk."""
     bounds: Callable[[AnyLimits], Bounds]
     """Computes its bounds from the limits of an arm."""
+    bounds_at: Callable[[JointLimits, Array], Bounds] | None = None
+    """Computes its bounds at the joint angles of the cycle before, shape (N, n), [rad]; None if they do not depend on
+    them. `bounds` are then the widest ones."""
+
+    def depends_on_angles(self, limits: JointLimits) -> bool:
+        """Returns whether its bounds depend on the joint angles, with these limits."""
+        return self.bounds_at is not None and limits.near_ends is not None
 
     @property
     def is_measured(self) -> bool:

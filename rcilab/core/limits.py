@@ -7,12 +7,32 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
-from rcilab.core.arrays import JointVector
+import numpy as np
+
+from rcilab.core.arrays import Array, JointVector
 from rcilab.core.errors import InvalidValueError
 
 _ROUNDING = (
     1e-6  # [rad] Soft limits that are this close to the arm's own limits equal them: they are converted from degrees.
 )
+
+SMALLEST_END_VELOCITY = 1e-3  # [rad/s]
+"""Velocity that a joint may have anywhere in its range. Reason: where the bound decreases to zero, a joint that stands
+must not violate it by rounding, which is up to 2e-4 rad/s for clients that compute with single precision."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class EndVelocity:
+    """Velocity bounds that decrease towards the ends of the joints' ranges.
+
+    At a distance d from the end, a joint may approach it with sqrt(2 deceleration d) - offset: slowly enough to brake
+    with this deceleration. Its velocity away from the end is not affected.
+    """
+
+    offset: JointVector
+    """Shape (n,), [rad/s]."""
+    deceleration: JointVector
+    """Shape (n,), [rad/s^2]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -39,9 +59,32 @@ class JointLimits:
     """Largest stiffness that `setJointImpedance` accepts, [N m/rad]."""
     own: JointLimits | None = None
     """The arm's own limits if soft limits of the joint angles are set; else None."""
+    near_ends: EndVelocity | None = None
+    """How `velocity` decreases towards the ends of the arm's own range; None: it does not."""
+
+    def velocity_bounds(self, q: Array) -> tuple[Array, Array]:
+        """Returns the smallest and the largest velocity at joint angles.
+
+        Args:
+            q: Joint angles one cycle before, shape (n,) or (N, n), [rad]: the last command, which a controller reports.
+
+        Returns:
+            Both of the shape of q, [rad/s].
+        """
+        if self.near_ends is None:
+            bound = np.broadcast_to(self.velocity, q.shape)
+            return -bound, bound
+        own = self if self.own is None else self.own
+        offset, twice = self.near_ends.offset, 2.0 * self.near_ends.deceleration
+        down, up = (
+            np.clip(np.sqrt(np.maximum(twice * room, 0.0)) - offset, SMALLEST_END_VELOCITY, self.velocity)
+            for room in (q - own.lower, own.upper - q)
+        )
+        return -down, up
 
     def __repr__(self) -> str:
-        names = ", ".join(name for name in self.__slots__ if name != "own")
+        hidden = ("own",) if self.near_ends is not None else ("own", "near_ends")
+        names = ", ".join(name for name in self.__slots__ if name not in hidden)
         return f"<JointLimits of {len(self.velocity)} joints: {names}>"
 
     def is_soft(self, joint: int, side: Literal["lower", "upper"]) -> bool:

@@ -301,7 +301,10 @@ class RobotModel(ReachingArm):
         joint, cartesian = d.limits.joint, d.limits.cartesian
         geometry = [(row.a, row.alpha, row.d, row.theta_offset) for row in d.dh]
         masses = [(link.mass, *link.center_of_mass, *link.inertia.flat, link.origin_height) for link in d.links]
-        bounds = [getattr(joint, name).tolist() for name in joint.__slots__ if name != "own"]
+        names = [name for name in joint.__slots__ if name not in ("own", "near_ends")]
+        bounds = [getattr(joint, name).tolist() for name in names]
+        if joint.near_ends is not None:
+            bounds += [joint.near_ends.offset.tolist(), joint.near_ends.deceleration.tolist()]
         paths = [getattr(cartesian, name) for name in cartesian.__slots__]
         load = (self.load.mass, *self.load.center_of_mass, *self.load.inertia.flat)
         return MappingProxyType(

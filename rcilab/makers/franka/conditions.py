@@ -1,9 +1,13 @@
-"""The conditions of Franka's control interface (FCI) for the Panda: the common rows with its sources and errors.
+"""The conditions of Franka's control interface (FCI) for Panda and FR3: the common rows with its sources and errors.
 
 The page "Robot and interface specifications" has three lists: for joint trajectories, for Cartesian ones with their
 consequences for the joints, and for torques. Its recommendations for the start and the end of a motion are in the list
 for Cartesian ones; they are applied to joints, too. The page "Errors" names the error of each violated condition.
 Differences are backward differences over 1 ms there as well.
+
+The FR3 has the Panda's rows with two differences. Its velocity bounds decrease towards the ends of the joints' ranges;
+they are those at the last commanded angles, which its clients compute from its state. And a commanded angle out of
+range raises the error of a measured one.
 """
 
 from __future__ import annotations
@@ -258,6 +262,42 @@ FCI_CONDITIONS = ConditionTable(
 self-collision) have no row."""
 
 
+_FR3_VELOCITY = "Franka's page Control parameters, limits for Franka Research 3; numbers: the URDF of the arm"
+
+
+def _fr3_row(row: Condition) -> Condition:
+    """Returns a row of the Panda in the FR3's form."""
+    if row.id in ("joint.position", "inverse.joint.position"):
+        return replace(row, fault=FrankaError.JOINT_POSITION_LIMITS_VIOLATION)
+    if row.id in ("joint.velocity", "inverse.joint.velocity"):
+        return replace(row, formula="dq_min(q) < dq_c < dq_max(q)", source=f"{_FR3_VELOCITY}; {_ERRORS}")
+    return row
+
+
+_FR3 = {row.id: _fr3_row(row) for row in FCI_CONDITIONS.conditions}
+
+
+def _fr3_rows(rows: tuple[Condition, ...]) -> tuple[Condition, ...]:
+    return tuple(_FR3[row.id] for row in rows)
+
+
+FR3_CONDITIONS = ConditionTable(
+    name="FCI",
+    motion=_fr3_rows(FCI_CONDITIONS.motion),
+    cartesian=_fr3_rows(FCI_CONDITIONS.cartesian),
+    torque=_fr3_rows(FCI_CONDITIONS.torque),
+    measured=_fr3_rows(FCI_CONDITIONS.measured),
+    box=_BOX,
+    conditions=tuple(_FR3.values()),
+)
+"""The rows of the FR3."""
+
+
 def fci_conditions() -> ConditionTable:
-    """Returns the conditions of Franka's control interface."""
+    """Returns the conditions of the Panda."""
     return FCI_CONDITIONS
+
+
+def fr3_conditions() -> ConditionTable:
+    """Returns the conditions of the FR3."""
+    return FR3_CONDITIONS

@@ -1,4 +1,4 @@
-"""Franka: the Panda arm, its errors and conditions. Motions are planned and checked, but not simulated or driven."""
+"""Franka: the arms Panda and FR3, their errors and conditions. Motions are planned and checked, but not simulated or driven."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rcilab.makers.maker import Capabilities, PlanningOnly, Timing
 
 
 class Franka(PlanningOnly):
-    """The maker of the Panda."""
+    """The maker of Panda and FR3."""
 
     name = "franka"
     title = "Franka"

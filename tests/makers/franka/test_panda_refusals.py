@@ -18,8 +18,8 @@ PANDA = load_model("panda")
 REFUSED = pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*xMatePro3, xMatePro7, xMate3")
 
 
-def test_all_arms_but_the_panda_speak_the_rci():
-    assert set(ROBOT_NAMES) - set(ROBOTS) == {"Panda"}
+def test_all_arms_but_frankas_speak_the_rci():
+    assert set(ROBOT_NAMES) - set(ROBOTS) == {"Panda", "FR3"}
     assert all(require_driver(load_model(name)).name == name for name in ROBOTS)
 
 

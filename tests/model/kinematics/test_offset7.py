@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rcilab.core.errors import KinematicsError, ModelError, UnreachableError
 from rcilab.core.spatial import Pose
-from rcilab.makers.franka.robots.panda import CRAIG, ELBOW_FLIP
+from rcilab.makers.franka.robots.arm import CRAIG, ELBOW_FLIP
 from rcilab.model.kinematics.solvers.offset7.arm import build_offset_geometry, trace
 from rcilab.model.kinematics.solvers.offset7.singularity import held_singularity_path
 from rcilab.model.robot_model import load_model

@@ -50,9 +50,7 @@ class Move(Request, fields=_MOVE):
 
 
 @dataclass(frozen=True)
-class AsyncMove(
-    Move, fields=(*_MOVE, Field("is_asynchronous", "flag"), Field("largest_velocity", "f64", 7, "rad/s"))
-):
+class AsyncMove(Move, fields=(*_MOVE, Field("is_asynchronous", "flag"), Field("largest_velocity", "f64", 7, "rad/s"))):
     """The Move of version 10: an asynchronous one takes joint angles as goals, at largest velocities."""
 
     is_asynchronous: bool = False
