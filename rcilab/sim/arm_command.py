@@ -22,3 +22,7 @@ class ArmCommand(NamedTuple):
     """True on the last command of a motion."""
     tau: tuple[float, ...] = ()
     """Joint torques, n numbers, [N m]."""
+    dq: tuple[float, ...] = ()
+    """Joint velocities, n numbers, [rad/s]."""
+    twist: tuple[float, ...] = ()
+    """Velocity of the tool, base axes, linear first, 6 numbers, [m/s, rad/s]."""

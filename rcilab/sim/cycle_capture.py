@@ -26,7 +26,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
-from rcilab.sim.generators.motion_limits import MotionMode
+from rcilab.sim.generators.motion_limits import CommandKind, MotionMode
 from rcilab.sim.maker_server import SimulatedController
 
 _HEAD = struct.Struct("<Qdqqdd")
@@ -181,9 +181,12 @@ class CycleCapture:
         joints = struct.Struct(f"<{self._ring.n}d").pack_into
         if mode.law is ControlLaw.TORQUE:
             return joints, self._offsets["command_tau"], attrgetter("tau")
-        if mode.is_cartesian:
+        if mode.kind is CommandKind.POSES:
             return struct.Struct("<17d").pack_into, self._offsets["command_pose"], _pose_of
-        return joints, self._offsets["command"], attrgetter("q")
+        if mode.kind is CommandKind.JOINT_ANGLES:
+            return joints, self._offsets["command"], attrgetter("q")
+        nothing = (math.nan,) * self._ring.n  # A record has no column for velocities and goals.
+        return joints, self._offsets["command"], lambda command: nothing
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
         """Writes the events of a motion that begins or has ended."""

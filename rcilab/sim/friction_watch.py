@@ -105,7 +105,7 @@ def blame_friction(violations: Violations) -> Violations:
     """Returns the violations of a first command after a compliant motion, with friction as the cause of the offset."""
     return tuple(
         ArmViolation(violation.condition, _held_off(violation.remark))
-        if violation.condition is ArmCondition.START_TOLERANCE
+        if violation.condition in (ArmCondition.START_TOLERANCE, ArmCondition.START_ARM_ANGLE)
         else violation
         for violation in violations
     )

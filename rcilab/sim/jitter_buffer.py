@@ -19,6 +19,7 @@
 * If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
   cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
+* Commands that come now and then (goals of a planned motion) are played when they arrive; no cycle is lost.
 * A long gap, or ids that start again far behind, mean that the client has restarted its numbering: the command is
   treated as the next one.
 """
@@ -67,30 +68,36 @@ class JitterBuffer:
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
         duplicates: Datagrams dropped as duplicates.
+        prefill: Cycles between the first command's arrival and its play-out, from the next motion on.
+        window: Cycles that the success rate covers, from the next motion on.
 
     Args:
-        prefill: Cycles between the first command's arrival and its play-out.
+        prefill: As the attribute.
+        window: As the attribute.
     """
 
-    def __init__(self, prefill: int) -> None:
-        self._prefill = prefill
+    def __init__(self, prefill: int, window: int = WINDOW) -> None:
+        self.prefill = prefill
+        self.window = window
         self._queue: deque[ArmCommand] = deque()
         self.begin()
 
-    def begin(self, *, max_queued: int | None = None) -> None:
+    def begin(self, *, max_queued: int | None = None, is_streamed: bool = True) -> None:
         """Resets everything for the first command of a motion.
 
         Args:
             max_queued: Largest number of queued commands next to the one that is played: it replaces the prefill, and
                 older commands are skipped. None: as many as fit.
+            is_streamed: Whether every cycle needs a command.
         """
         self._queue.clear()
         self._max_queued = max_queued
-        self._countdown = self._prefill if self._max_queued is None else self._max_queued
+        self._is_streamed = is_streamed
+        self._countdown = self.prefill if self._max_queued is None else self._max_queued
         self._newest: ArmCommand | None = None
         self._is_repeating = False
         self._lowest, self._observed, self._excess = CAPACITY, 0, 0
-        self._outcomes: deque[bool] = deque(maxlen=WINDOW)
+        self._outcomes: deque[bool] = deque(maxlen=self.window)
         self._played_in_window = 0
         self._last_id = 0
         self._is_last_lost = False  # The cycle `_last_id` had no command.
@@ -113,7 +120,7 @@ class JitterBuffer:
     @property
     def is_starved(self) -> bool:
         """Whether the next cycle is lost unless a command arrives."""
-        return self.is_playing and not (self.is_finished or self._queue or self._is_repeating)
+        return self._is_streamed and self.is_playing and not (self.is_finished or self._queue or self._is_repeating)
 
     @property
     def success_rate(self) -> float:
@@ -160,7 +167,7 @@ class JitterBuffer:
                 continues the motion by one step (true) or by that many (false). `in_doubt` is the result if
                 neither is clear.
         """
-        if self.is_finished:
+        if self.is_finished or not (self._is_streamed or self._queue):
             return _WAITING
         if not self.is_playing:
             if not self._queue:
@@ -218,7 +225,7 @@ class JitterBuffer:
             self._lowest = queued
         self._observed += 1
         if self._observed >= QUEUE_WINDOW:
-            excess = self._lowest - self._prefill
+            excess = self._lowest - self.prefill
             self._excess = excess if excess > SLACK else 0
             self._observed, self._lowest = 0, CAPACITY
 
@@ -272,7 +279,7 @@ class JitterBuffer:
     def _count(self, played: bool) -> None:
         self.cycles += 1
         outcomes = self._outcomes
-        if len(outcomes) == WINDOW:
+        if len(outcomes) == outcomes.maxlen:
             self._played_in_window -= outcomes[0]
         outcomes.append(played)
         self._played_in_window += played

@@ -9,7 +9,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.generators.generator import GeneratorOutput, MotionGenerator
-from rcilab.sim.generators.motion_limits import MotionMode
+from rcilab.sim.generators.motion_limits import CommandKind, MotionMode
 from rcilab.sim.jitter_buffer import FIRST_COMMAND_TIMEOUT, JitterBuffer, Playback
 from rcilab.sim.violations import ArmCondition, ArmViolation
 
@@ -58,8 +58,8 @@ class StreamedMotion:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.playback: Playback | None = None
-        self.mode = MotionMode(ControlLaw.POSITION, False)
-        self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
+        self.mode = MotionMode(ControlLaw.POSITION, CommandKind.JOINT_ANGLES)
+        self._torque_prefill = torque_prefill
         self._lost_limit = lost_limit
         self.on_loss: LossBehaviour = "hold"
         self._generator: MotionGenerator | None = None
@@ -81,10 +81,11 @@ class StreamedMotion:
 
         Args:
             mode: Type of command and control law.
-            on_loss: What the arm does without commands; torques are held in any case.
+            on_loss: What the arm does without commands, if they are places; torques are held in any case, and
+                velocities bridged.
         """
-        self.mode, self.on_loss = mode, on_loss
-        self.playout.begin(max_queued=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
+        self.mode, self.on_loss = mode, on_loss if mode.can_hold else "bridge"
+        self.playout.begin(max_queued=self._find_max_queued(mode), is_streamed=mode.is_streamed)
 
     def begin(self, generator: MotionGenerator) -> None:
         """Plays commands from now on."""
@@ -130,7 +131,14 @@ class StreamedMotion:
     @property
     def _tolerance(self) -> int:
         """Cycles by which a command may be late before it is lost."""
-        return LATE_TOLERANCE if self.on_loss == "hold" and self.mode.law is not ControlLaw.TORQUE else 0
+        return LATE_TOLERANCE if self.on_loss == "hold" else 0
+
+    def _find_max_queued(self, mode: MotionMode) -> int | None:
+        if not mode.is_streamed:
+            return 0  # Of goals the newest one counts.
+        if mode.law is not ControlLaw.TORQUE:
+            return None
+        return min(self.playout.prefill, TORQUE_PREFILL) if self._torque_prefill is None else self._torque_prefill
 
     def _describe_loss(self) -> Remark:
         if not self.playout.is_playing:

@@ -18,7 +18,9 @@ class ArmCondition(Enum):
     VALID_POSE = "a commanded pose is a pose that the arm can reach without a singularity"
     ARM_ANGLE_RANGE = "a commanded arm angle is within one turn"
     START_TOLERANCE = "a motion begins near the reference"
-    """Not a fault by itself: it explains the limits that the jump violates."""
+    """Not a fault by itself, unless the maker has its own tolerance: it explains the limits that the jump violates."""
+    START_ARM_ANGLE = "a motion begins near the reference's arm angle"
+    """As START_TOLERANCE."""
     COMMANDS_ARRIVE = "few commands in a row are lost, and the motion can continue without them"
     NO_COLLISION = "external joint torques stay below the collision thresholds"
 

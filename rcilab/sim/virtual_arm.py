@@ -28,7 +28,7 @@ from rcilab.sim.friction_watch import FrictionWatch, blame_friction
 from rcilab.sim.generators import build_generator
 from rcilab.sim.generators.generator import blame_lost_commands
 from rcilab.sim.generators.motion_limits import MotionMode, build_motion_limits
-from rcilab.sim.generators.start import start_tolerance
+from rcilab.sim.generators.start import StartTolerance, start_tolerance
 from rcilab.sim.hand_guiding import GuidedFreedom
 from rcilab.sim.hold_response import servo_figures
 from rcilab.sim.jitter_buffer import JitterBuffer, Playback
@@ -215,20 +215,28 @@ class VirtualArm:
         """Resets everything for a motion in this mode."""
         self._motion.prepare(mode, self.on_loss)
 
-    def begin_motion(self, limits: Limits) -> None:
+    def begin_motion(self, limits: Limits, *, start: StartTolerance | None = None) -> None:
         """Follows commands from now on, from the present reference.
 
         Args:
             limits: Limits of the arm for this motion; infinite where the maker has no check.
+            start: Largest difference of the first command from the reference, by the maker's own rule: a start outside
+                it ends the motion by this violation alone. None: `start_tolerance`, beyond which the jump violates
+                limits. It is not checked for velocities and goals.
         """
         mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
         tolerance = start_tolerance(mode.law, parameters)
-        if self._last_compliance is not None:
+        if start is not None:
+            tolerance = start
+        elif self._last_compliance is not None:
             tolerance = tolerance.widened(start_tolerance(self._last_compliance, parameters))
         starts = (sensors.measured.q, np.array(self.commanded.q))
         tools = (sensors.tool.pose, self.tool_c.pose)
         servos = servo_figures(self.model.description) if self._motion.on_loss == "hold" else None
-        bounds = build_motion_limits(mode, self.model, parameters, limits, starts, tools, tolerance, servos)
+        is_strict = start is not None
+        bounds = build_motion_limits(
+            mode, self.model, parameters, limits, starts, tools, tolerance, servos, is_strict_start=is_strict
+        )
         self._motion.begin(build_generator(mode, bounds, list(self.commanded.q)))
         sensors.begin(
             bounds.limits,
@@ -362,9 +370,10 @@ class VirtualArm:
             commanded.join(last.q.tolist(), last.dq.tolist(), ddq)
         if has_moved and not law.is_compliant:
             self._last_compliance = None
-        if not (law.is_force_driven or commanded.is_stationary or has_moved):
+        is_reference_measured = self._is_reference_measured(law)
+        if not (is_reference_measured or commanded.is_stationary or has_moved):
             commanded.stop()
-        if not law.is_force_driven:
+        if not is_reference_measured:
             self._move_tool()
         self._setpoint = self._actuator.setpoint(law, commanded, self.tool_c, last, self._tau_c)
         self._take(law, self.plant.step(self._setpoint))
@@ -382,7 +391,7 @@ class VirtualArm:
     def _take(self, law: ControlLaw, measured: Measurement) -> None:
         """Processes the measurement of this cycle."""
         commanded, last = self.commanded, self.measured_state.measured
-        if law.is_force_driven:
+        if self._is_reference_measured(law):
             commanded.move(measured.q.tolist())
             self._move_tool()
         elif law is ControlLaw.BRAKED and measured.q.tolist() != commanded.q:
@@ -393,6 +402,10 @@ class VirtualArm:
             self._last_compliance = law
         self._cycles_at_rest = self._cycles_at_rest + 1 if commanded.is_stationary else 0
         self.measured_state.observe(measured, commanded, self.tool_c)
+
+    def _is_reference_measured(self, law: ControlLaw) -> bool:
+        """Returns whether forces move the arm and no motion is commanded beside them."""
+        return law.is_force_driven and not (self._motion.is_followed and self._motion.mode.has_reference)
 
     def _is_slow(self) -> bool:
         speeds: list[float] = self.measured_state.measured.dq.tolist()

@@ -289,3 +289,26 @@ def test_the_success_rate_forgets_what_is_older_than_its_window(lost: int) -> No
         playout.push(command(10_000 + k))
         take_ids(playout, 1)
     assert playout.success_rate == 1.0
+
+
+def test_the_window_of_the_success_rate_is_the_makers() -> None:
+    playout = JitterBuffer(prefill=0, window=100)
+    for k in range(150):
+        playout.push(command(k))
+    take_ids(playout, 150)
+    take_ids(playout, 25)
+    assert playout.success_rate == 0.75
+
+
+def test_commands_that_come_now_and_then_are_played_at_once_and_nothing_is_lost() -> None:
+    playout = JitterBuffer(prefill=10)
+    playout.begin(max_queued=0, is_streamed=False)
+    assert take_ids(playout, 6000) == ["wait"] * 6000  # Longer than a stream may keep the controller waiting.
+    for number in (7, 8, 20, 100):
+        playout.push(command(number))
+        assert [playout.take(by_one_step).command.number, *take_ids(playout, 3)] == [number, *["wait"] * 3]  # type: ignore[union-attr]
+        assert not playout.is_starved
+    playout.push(command(110))
+    playout.push(command(111))
+    assert take_ids(playout, 2) == [111, "wait"]
+    assert (playout.lost, playout.success_rate) == (0, 1.0)

@@ -12,7 +12,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_parameters import ArmParameters
-from rcilab.sim.generators.motion_limits import MotionMode
+from rcilab.sim.generators.motion_limits import CommandKind, MotionMode
 from rcilab.sim.plants import build_plant
 from rcilab.sim.streamed_motion import LATE_TOLERANCE
 from rcilab.sim.violations import ArmCondition, ArmViolation, describe_violations
@@ -39,7 +39,7 @@ def arm(request) -> VirtualArm:
     arm = VirtualArm(MODEL, build_plant(request.param, MODEL), parameters(), prefill=0, lost_limit=10)
     arm.resting_law = ControlLaw.POSITION
     arm.step()
-    arm.prepare_motion(MotionMode(ControlLaw.POSITION, False))
+    arm.prepare_motion(MotionMode(ControlLaw.POSITION, CommandKind.JOINT_ANGLES))
     arm.begin_motion(MODEL.limits)
     arm.is_monitored = True
     return arm

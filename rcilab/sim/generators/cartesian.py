@@ -14,25 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from math import dist, hypot, pi, remainder, tau
+from math import remainder, tau
 
-from rcilab.conformance.cartesian_monitor import CartesianMonitor
-from rcilab.conformance.common_conditions import ARM_ANGLE_TOLERANCE
-from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.errors import InvalidValueError, KinematicsError, SingularError, UnreachableError
-from rcilab.core.spatial import IDENTITY, Pose, rotation_between, rotation_from_wxyz, wxyz_from_rotation
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import Pose, rotation_from_wxyz, wxyz_from_rotation
 from rcilab.i18n.translator import Remark
-from rcilab.model.robot_model import RobotModel
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import PoseLowPass
-from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles, lost_motion, with_jump
+from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
 from rcilab.sim.generators.motion_limits import MotionLimits
-from rcilab.sim.generators.start import StartMonitor, find_tool_jump
+from rcilab.sim.generators.pose_reference import PoseReference, find_arm_angle_error, invalid_pose
 from rcilab.sim.jitter_buffer import Playback
-from rcilab.sim.violations import ArmCondition, ArmViolation
 
 
 class CartesianGenerator:
@@ -44,27 +39,18 @@ class CartesianGenerator:
     """
 
     def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
-        model = bounds.model
         self._bounds = bounds
         self._has_begun = False
-        self._jump: Remark | None = None
-        self._has_psi = bool(model.redundancy)
-        self._q = q
-        self._psi = model.arm_angle(q) if self._has_psi else 0.0
+        self._reference = reference = PoseReference(bounds, q)
+        self._psi = reference.psi
         limits = bounds.limits.arm_angle
         self._had_psi = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
-        pose = model.forward(q)
-        self._tracker = IkTracker(model)
-        self._stream = CommandExtrapolator([*pose.parts[1], *wxyz_from_rotation(pose.parts[0]), self._psi])
-        self._filter = PoseLowPass(bounds.parameters.cartesian_filter, pose, self._psi)
-        self._pose = pose
-        self._monitor = self._monitor_from(pose, self._psi)
-        self._start: StartMonitor[CartesianMonitor] | None = None
+        rotation, position = reference.pose.parts
+        self._stream = CommandExtrapolator([*position, *wxyz_from_rotation(rotation), self._psi])
+        self._filter = PoseLowPass(bounds.parameters.cartesian_filter, reference.pose, self._psi)
         self._before_pause: CommandExtrapolator | None = None  # While the last command is held.
         self._gap = MissedCycles()
-        self._reference = JointReference(bounds, q, checks_box=False)
-        self._reference_has_begun = False
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
@@ -84,11 +70,10 @@ class CartesianGenerator:
         else:
             error = find_frame_error(command.T_base_tool)
             if error is not None:
-                return _invalid_pose(Remark(error, "no_pose"))
-            if self._has_psi and command.has_psi and not abs(command.psi) <= pi + ARM_ANGLE_TOLERANCE:
-                sentence = f"arm angle: commanded position {command.psi} rad passes +-pi rad"
-                remark = Remark(sentence, "arm_angle", value=command.psi, bound=pi, unit="rad")
-                return GeneratorOutput(violations=(ArmViolation(ArmCondition.ARM_ANGLE_RANGE, remark),))
+                return invalid_pose(Remark(error, "no_pose"))
+            violation = find_arm_angle_error(command) if self._reference.has_psi else None
+            if violation is not None:
+                return GeneratorOutput(violations=(violation,))
             values = self._read(command)
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
@@ -106,8 +91,8 @@ class CartesianGenerator:
                 self._filter.step(_pose(earlier), remainder(earlier[7], tau))
             pose, psi = self._filter.step(_pose(values), self._psi)
         except InvalidValueError as error:  # Extreme numbers, from which bridge or filter gave no pose.
-            return _invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
-        return self._check(pose, psi, cycles)
+            return invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
+        return self._reference.step(pose, psi, cycles)
 
     def _end_pause(self, values: list[float], cycles: int) -> list[list[float]]:
         """Returns the poses on the way over a pause, for the filter if it is on; none without a pause."""
@@ -116,26 +101,6 @@ class CartesianGenerator:
         self._stream, self._before_pause = self._before_pause, None
         between = self._stream.bridge(values, cycles)
         return between if self._filter.is_on else []
-
-    def _check(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
-        if cycles > 0:
-            violations = self._step_monitor(pose, psi if self._has_psi else None, cycles)
-            if violations:
-                return GeneratorOutput(violations=with_jump(self._jump, violations))
-            self._jump = None
-        try:
-            q = self._tracker.solve(pose, psi, self._q)
-        except KinematicsError as error:
-            if cycles == 0:
-                return lost_motion(Remark(f"no joint angles for a bridged pose: {error}", "no_angles"))
-            return _invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
-        if not self._reference_has_begun:
-            self._reference_has_begun = True
-            self._reference.begin(q, None)  # The tolerance of the tool was already checked.
-        step = self._reference.step(q, cycles)
-        if step.q is not None:
-            self._q = q
-        return step
 
     @property
     def is_off_commands(self) -> bool:
@@ -147,46 +112,15 @@ class CartesianGenerator:
         return self._reference.settle()
 
     def _begin(self, values: list[float]) -> None:
-        """Processes the first command: the start of the motion at standstill, or its first step from the reference."""
+        """Processes the first command; filter and prediction start there if the motion does."""
         self._has_begun = True
-        x, y, z, *wxyz, psi = values
         try:
-            pose = Pose.from_parts(rotation_from_wxyz(wxyz), (x, y, z))
+            pose = _pose(values)
         except InvalidValueError:
             return  # `step` refuses it.
-        rotation, position = self._pose.parts
-        translation = dist(position, (x, y, z))
-        turn = hypot(*rotation_between(rotation, pose.parts[0]))
-        lag = remainder(psi - self._psi, tau)
-        if not (translation or turn or lag):
-            return
-        cartesian, arm_angle = self._bounds.limits.cartesian, self._bounds.limits.arm_angle
-        h3 = CYCLE_TIME**3
-        is_a_step = translation <= cartesian.translation_jerk * h3 and turn <= cartesian.rotation_jerk * h3
-        if is_a_step and (arm_angle is None or abs(lag) <= arm_angle.jerk * h3):
-            self._start = StartMonitor(self._monitor, self._monitor_from(pose, psi))
-            return
-        self._jump = find_tool_jump(translation, turn, lag, self._bounds.tolerance)
-        if self._jump is None:
+        if self._reference.begin(pose, values[7]):
             self._stream = CommandExtrapolator(values)
-            self._filter = PoseLowPass(self._bounds.parameters.cartesian_filter, pose, psi)
-            self._monitor = self._monitor_from(pose, psi)
-
-    def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
-        bounds = self._bounds
-        monitor = CartesianMonitor(bounds.limits, bounds.entry_box())
-        monitor.reset(pose, psi if self._has_psi else None)
-        return monitor
-
-    def _step_monitor(self, pose: Pose, psi: float | None, cycles: int) -> Sequence[LimitViolation]:
-        start = self._start
-        if start is None:
-            return self._monitor.step(pose, psi, cycles)
-        violations = start.step(pose, psi, cycles)
-        self._monitor = start.monitor
-        if start.is_decided:
-            self._start = None
-        return violations
+            self._filter = PoseLowPass(self._bounds.parameters.cartesian_filter, pose, values[7])
 
     def _read(self, command: ArmCommand) -> list[float]:
         """Returns position, quaternion and arm angle of a command, continuous with the last ones."""
@@ -199,7 +133,7 @@ class CartesianGenerator:
         return [m[3], m[7], m[11], w, x, y, z, psi]
 
     def _arm_angle(self, command: ArmCommand) -> float:
-        if not self._has_psi:
+        if not self._reference.has_psi:
             return 0.0
         if command.has_psi:
             return command.psi
@@ -210,44 +144,3 @@ class CartesianGenerator:
 
 def _pose(values: Sequence[float]) -> Pose:
     return Pose.from_parts(rotation_from_wxyz(values[3:7]), (values[0], values[1], values[2]))
-
-
-def _invalid_pose(remark: Remark) -> GeneratorOutput:
-    return GeneratorOutput(violations=(ArmViolation(ArmCondition.VALID_POSE, remark),))
-
-
-class IkTracker:
-    """The inverse of one arm with its tool, for poses that follow each other. Owned by a motion generator.
-
-    It stays on the branch nearest to the last angles. Joint limits are checked later.
-
-    Args:
-        model: The arm with its tool.
-    """
-
-    def __init__(self, model: RobotModel) -> None:
-        self._solver = model.solver
-        self._T_tool_flange = model.T_flange_tool.inverse()
-        self._has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
-
-    def solve(self, T_base_tool: Pose, psi: float, near: Sequence[float]) -> list[float]:
-        """Returns the joint angles of a pose, [rad]: those closest to `near`, full turns counted.
-
-        Args:
-            T_base_tool: Pose of the tool in base.
-            psi: Redundancy angle, [rad]; without effect for an arm without redundancy.
-            near: Last joint angles, n plain floats, [rad].
-
-        Raises:
-            UnreachableError: The pose is out of reach, even without joint limits.
-            SingularError: The arm would be at a singularity; the message names it.
-        """
-        flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
-        q = self._solver.solve_near(flange, psi, near)
-        if q is None:
-            self._solver.at(flange, near).branches(psi)  # Raises an error with the distance.
-            raise UnreachableError("no joint angles near the last ones put the tool there")
-        singularity = self._solver.singularity(q)
-        if singularity is not None:
-            raise SingularError(singularity)
-        return q

@@ -12,7 +12,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.generators.motion_limits import MotionLimits
-from rcilab.sim.generators.start import StartMonitor, StartOffset, StartTolerance, find_joint_jump
+from rcilab.sim.generators.start import StartMonitor, StartOffset, find_joint_jump
 from rcilab.sim.hold_response import HoldResponse
 from rcilab.sim.jitter_buffer import Playback
 from rcilab.sim.reference_trajectory import JOIN_SHARE
@@ -83,9 +83,9 @@ def blame_lost_commands(reason: Remark) -> ArmViolation:
     return ArmViolation(ArmCondition.COMMANDS_ARRIVE, remark)
 
 
-def with_jump(jump: Remark | None, violations: Sequence[LimitViolation]) -> Violations:
+def with_jump(jump: ArmViolation | None, violations: Sequence[LimitViolation]) -> Violations:
     """Returns violations, preceded by a jump at the start that explains them, if there was one."""
-    return (ArmViolation(ArmCondition.START_TOLERANCE, jump), *violations) if jump else tuple(violations)
+    return (jump, *violations) if jump else tuple(violations)
 
 
 class JointReference:
@@ -111,31 +111,37 @@ class JointReference:
         self._monitor = self._monitor_from(q)
         self._start: StartMonitor[JointMonitor] | None = None
         self._offset: StartOffset | None = None
-        self._jump: Remark | None = None
+        self._tolerance = bounds.tolerance
+        self._is_strict = bounds.is_strict_start
+        self._jump: ArmViolation | None = None
         self._range = list(zip(joint.lower.tolist(), joint.upper.tolist(), strict=True))
         self._max_acceleration: list[float] = (JOIN_SHARE * joint.acceleration).tolist()
         self._last = self._before = q
         self._cycles_to_check = 0
         self._servo = None if bounds.servos is None else HoldResponse(bounds.servos, q)
 
-    def begin(self, q: list[float], tolerance: StartTolerance | None) -> bool:
+    def begin(self, q: list[float], *, is_checked: bool = False) -> bool:
         """Processes the first commanded angles, before `step`; returns whether the motion starts there, at standstill.
 
         Otherwise they are the first step of a motion from the reference, near it or too far from it.
 
         Args:
             q: n plain floats, [rad].
-            tolerance: Largest difference from the reference; None if it was already checked.
+            is_checked: Whether their difference from the reference is known to be inside the tolerance.
         """
         h3 = CYCLE_TIME**3
         offset = [here - angle for here, angle in zip(self._last, q, strict=True)]
         if not any(offset):
             return False
+        jump = None if is_checked else find_joint_jump(q, self._last, self._tolerance)
+        if jump is not None and self._is_strict:
+            self._jump = jump
+            return False
         if all(abs(d) <= jerk * h3 for d, jerk in zip(offset, self._limits.jerk.tolist(), strict=True)):
             self._start = StartMonitor(self._monitor, self._monitor_from(q))
             return False
-        self._jump = None if tolerance is None else find_joint_jump(q, self._last, tolerance)
-        if self._jump is not None:
+        self._jump = jump
+        if jump is not None:
             return False
         self._monitor = self._monitor_from(q)
         self._offset = StartOffset(self._limits, offset)
@@ -150,6 +156,8 @@ class JointReference:
             q: Finite numbers, [rad].
             cycles: Cycles since the last command; 0 if these angles replace a lost command.
         """
+        if self._is_strict and self._jump is not None:
+            return GeneratorOutput(violations=(self._jump,))
         if self._governor is not None:
             q = self._governor.step(q)
         reference = q

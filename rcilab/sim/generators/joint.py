@@ -83,6 +83,6 @@ class JointGenerator:
     def _begin(self, q: list[float]) -> None:
         """Processes the first command; filter and prediction start there if the motion does."""
         self._has_begun = True
-        if self._reference.begin(q, self._bounds.tolerance):
+        if self._reference.begin(q):
             self._stream = CommandExtrapolator(q)
             self._filter = LowPass(self._bounds.parameters.joint_filter, q)

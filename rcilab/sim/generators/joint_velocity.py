@@ -22,7 +22,7 @@ class JointVelocityGenerator:
     """Follows commanded joint velocities.
 
     Args:
-        bounds: Bounds of the motion.
+        bounds: Limits of the motion.
         q: Joint angles of the stationary arm, n plain floats, [rad].
     """
 
@@ -39,7 +39,7 @@ class JointVelocityGenerator:
 
     def step(self, playback: Playback) -> GeneratorOutput:
         """Processes the velocities of this cycle, or bridges a cycle without any."""
-        cycles = self._gap.step(playback)
+        cycles = self._gap.step(playback._replace(skipped=0))  # A skipped velocity has moved nothing.
         sent = None if playback.command is None else playback.command.dq[: self._n]
         dq = self._stream.step(sent, playback.steps)
         if not isfinite(sum(dq)):
@@ -50,9 +50,9 @@ class JointVelocityGenerator:
 
     @property
     def is_off_commands(self) -> bool:
-        """Whether the joints still respond to commands that were missing."""
-        return self._reference.is_off_commands
+        """Returns False: velocities are bridged, not held."""
+        return False
 
     def settle(self) -> GeneratorOutput | None:
-        """Continues the response to a pause after the last command; None without one."""
-        return self._reference.settle()
+        """Returns None: the arm stops after the last velocity."""
+        return None

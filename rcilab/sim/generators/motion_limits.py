@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import NamedTuple
 
 from rcilab.core.arrays import JointVector
@@ -19,12 +20,49 @@ from rcilab.sim.generators.start import StartTolerance
 _SPRINGS = (ControlLaw.JOINT_IMPEDANCE, ControlLaw.CARTESIAN_IMPEDANCE)
 
 
+class CommandKind(Enum):
+    """What a client commands; a command has the field of its kind."""
+
+    JOINT_ANGLES = "joint angles"
+    JOINT_VELOCITIES = "joint velocities"
+    POSES = "poses of the tool"
+    TWISTS = "velocities of the tool"
+    JOINT_GOALS = "joint angles to move to"
+    """The controller plans the motion to the newest one; a command may come at any time."""
+    TORQUES = "joint torques"
+
+
 class MotionMode(NamedTuple):
-    """Type of command and control law of a motion."""
+    """Type of command and control law of a motion.
+
+    Under the law TORQUE, torques move the arm. With a kind other than TORQUES the client commands a motion beside them,
+    which is checked and is the arm's reference; its torques may use it.
+    """
 
     law: ControlLaw
-    is_cartesian: bool
-    """Whether tool poses are commanded: the motion of the tool is checked, and a singular start is refused."""
+    kind: CommandKind
+    goal_velocity: tuple[float, ...] = ()
+    """For JOINT_GOALS: the largest joint velocities, n numbers, [rad/s]; the limits apply where they are smaller."""
+
+    @property
+    def is_cartesian(self) -> bool:
+        """Whether the tool is commanded: its motion is checked, and a singular start is refused."""
+        return self.kind in (CommandKind.POSES, CommandKind.TWISTS)
+
+    @property
+    def is_streamed(self) -> bool:
+        """Whether a command is needed in every cycle."""
+        return self.kind is not CommandKind.JOINT_GOALS
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether the last command can be held while commands are missing: it is a place."""
+        return self.law is not ControlLaw.TORQUE and self.kind in (CommandKind.JOINT_ANGLES, CommandKind.POSES)
+
+    @property
+    def has_reference(self) -> bool:
+        """Whether the client commands a motion, alone or beside torques."""
+        return self.kind is not CommandKind.TORQUES
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -40,6 +78,8 @@ class MotionLimits:
     """Safety box of the tool; None without one."""
     tolerance: StartTolerance
     """Largest difference of the first command from the reference."""
+    is_strict_start: bool
+    """Whether a start outside the tolerance is a violation by itself, and the only one of its cycle."""
     starts: tuple[Pose, ...]
     """Poses of the tool in base where the motion begins: measured and commanded."""
     servos: tuple[ServoFigures, ...] | None
@@ -59,6 +99,8 @@ def build_motion_limits(
     tools: tuple[Pose, ...],
     tolerance: StartTolerance,
     servos: tuple[ServoFigures, ...] | None,
+    *,
+    is_strict_start: bool = False,
 ) -> MotionLimits:
     """Returns filters and bounds of a motion.
 
@@ -75,6 +117,7 @@ def build_motion_limits(
         tools: Measured and commanded pose of the tool in base.
         tolerance: Largest difference of the first command from the reference.
         servos: The servos that respond to a held command; None: lost commands are bridged.
+        is_strict_start: Whether a start outside the tolerance is a violation by itself.
     """
     joint = parameters.soft_limits(limits.joint)
     for q in starts:
@@ -86,6 +129,7 @@ def build_motion_limits(
         limits=replace(limits, joint=joint),
         box=active_box(None if has_walls else parameters.safety_box),
         tolerance=tolerance,
+        is_strict_start=is_strict_start,
         starts=tools,
         servos=servos,
     )

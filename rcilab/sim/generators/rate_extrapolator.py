@@ -32,7 +32,10 @@ class RateExtrapolator:
         return now
 
     def is_next(self, sent: Sequence[float], steps: int, in_doubt: bool) -> bool:
-        """Returns whether a command continues the stream by one step rather than by `steps`; see `CommandExtrapolator`."""
+        """Returns whether a command continues the stream by one step rather than by `steps`.
+
+        As `CommandExtrapolator.is_next`.
+        """
         near, far = self._predict(1), self._predict(steps)
         off_near = sum(abs(a - b) for a, b in zip(sent, near, strict=True))
         off_far = sum(abs(a - b) for a, b in zip(sent, far, strict=True))

@@ -22,6 +22,7 @@ from rcilab.core.limits import JointLimits
 from rcilab.i18n.translator import Remark
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_parameters import ArmParameters
+from rcilab.sim.violations import ArmCondition, ArmViolation
 
 SERVO_ERROR = 1e-3  # [rad] Static error of a joint on its servo, and rounding; the MuJoCo plant's stays below 0.2 mrad.
 SERVO_LENGTH = 1e-3  # [m] The same at the tool, at a lever of 1 m.
@@ -82,8 +83,8 @@ def _deflection(load: float, stiffness: float, least: float, most: float) -> flo
     return most if stiffness * most <= load else max(least, load / stiffness)
 
 
-def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: StartTolerance) -> Remark | None:
-    """Returns the first joint whose start is outside the tolerance, as a remark, or None.
+def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: StartTolerance) -> ArmViolation | None:
+    """Returns the violation of the first joint whose start is outside the tolerance, or None.
 
     Args:
         q: First commanded angles, n numbers, [rad].
@@ -92,12 +93,14 @@ def find_joint_jump(q: Sequence[float], reference: Sequence[float], tolerance: S
     """
     for number, (angle, here, bound) in enumerate(zip(q, reference, tolerance.joint, strict=True), 1):
         if not abs(angle - here) <= bound:
-            return _jump(angle, here, bound, number)
+            return ArmViolation(ArmCondition.START_TOLERANCE, _jump(angle, here, bound, number))
     return None
 
 
-def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolerance: StartTolerance) -> Remark | None:
-    """Returns the first quantity of the tool whose start is outside the tolerance, as a remark, or None.
+def find_tool_jump(
+    translation: float, rotation: float, arm_angle: float, tolerance: StartTolerance
+) -> ArmViolation | None:
+    """Returns the violation of the first quantity of the tool whose start is outside the tolerance, or None.
 
     Args:
         translation: From the controller's reference to the first commanded position, [m].
@@ -106,11 +109,14 @@ def find_tool_jump(translation: float, rotation: float, arm_angle: float, tolera
         tolerance: Largest difference.
     """
     if not translation <= tolerance.translation:
-        return _tool_jump("start_position", "position", translation, tolerance.translation)
+        jump = _tool_jump("start_position", "position", translation, tolerance.translation)
+        return ArmViolation(ArmCondition.START_TOLERANCE, jump)
     if not rotation <= tolerance.rotation:
-        return _tool_jump("start_orientation", "orientation", rotation, tolerance.rotation)
+        jump = _tool_jump("start_orientation", "orientation", rotation, tolerance.rotation)
+        return ArmViolation(ArmCondition.START_TOLERANCE, jump)
     if not abs(arm_angle) <= tolerance.arm_angle:
-        return _tool_jump("start_arm_angle", "arm angle", arm_angle, tolerance.arm_angle)
+        jump = _tool_jump("start_arm_angle", "arm angle", arm_angle, tolerance.arm_angle)
+        return ArmViolation(ArmCondition.START_ARM_ANGLE, jump)
     return None
 
 

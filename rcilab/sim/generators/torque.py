@@ -15,7 +15,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
-from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
+from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles, MotionGenerator
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.jitter_buffer import Playback
 from rcilab.sim.violations import ArmCondition, ArmViolation
@@ -64,6 +64,38 @@ class TorqueGenerator:
     @property
     def is_off_commands(self) -> bool:
         """Returns False: torques have no reference."""
+        return False
+
+    def settle(self) -> GeneratorOutput | None:
+        """Returns None: torques end with the last command."""
+        return None
+
+
+class TorqueAndMotionGenerator:
+    """Follows commanded joint torques; a motion that is commanded beside them is checked and becomes the reference.
+
+    Args:
+        torques: Of the torques, which move the arm.
+        motion: Of the motion.
+    """
+
+    def __init__(self, torques: TorqueGenerator, motion: MotionGenerator) -> None:
+        self._torques = torques
+        self._motion = motion
+
+    def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
+        """Returns whether the motion continues by one cycle rather than by `steps`: torques may be constant."""
+        return self._motion.is_next(command, steps, in_doubt)
+
+    def step(self, playback: Playback) -> GeneratorOutput:
+        """Processes the command of this cycle, or bridges a cycle without one: torques are held."""
+        torques, motion = self._torques.step(playback), self._motion.step(playback)
+        violations = (*torques.violations, *motion.violations)
+        return GeneratorOutput(motion.q, torques.tau, violations, motion.differences)
+
+    @property
+    def is_off_commands(self) -> bool:
+        """Returns False: a motion beside torques is bridged, not held."""
         return False
 
     def settle(self) -> GeneratorOutput | None:
