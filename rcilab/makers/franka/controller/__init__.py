@@ -1,0 +1,1 @@
+"""The virtual controller of the Franka arms: their side of the FCI on the neutral virtual arm."""

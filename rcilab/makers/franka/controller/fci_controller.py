@@ -1,0 +1,378 @@
+"""The FCI controller of a virtual arm: requests and commands in, one state per cycle out. No sockets, no clock.
+
+Each `step` advances the arm by one cycle, turns its violations into errors, and reports the state. An error ends the
+motion: the violating command is not followed, the flag is set in the state of the same cycle and stays set until the
+error recovery, and the arm stops on one path, inside its acceleration and jerk limits. The errors that ended the last
+motion remain in `reflex_reason` until the next one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
+from rcilab.i18n.translator import Remark
+from rcilab.makers.franka.controller.error_of import errors_of
+from rcilab.makers.franka.controller.modes import MotionKind, motion_of
+from rcilab.makers.franka.controller.phases import (
+    IN_MOTION,
+    MOVE_REFUSALS,
+    RECOVERY_REFUSALS,
+    SETTABLE,
+    STOP_STATUSES,
+    Phase,
+)
+from rcilab.makers.franka.controller.reporter import StateReporter
+from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.wire.command_packet import CommandPacket
+from rcilab.makers.franka.wire.requests import Move, Request
+from rcilab.makers.franka.wire.state_packet import NO_ERRORS, StatePacket, flags_of
+from rcilab.makers.franka.wire.versions import FciVersion, Status
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.api import SafetyButton
+from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.arm_setup import ArmSetup, require_stand
+from rcilab.sim.jitter_buffer import JitterBuffer
+from rcilab.sim.violations import Violations, describe_violations
+from rcilab.sim.virtual_arm import VirtualArm
+
+RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
+_NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
+_BRAKED = (Phase.USER_STOPPED,)
+_STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
+_USER_STOP = Remark("the user stop was pressed", "estop")
+
+
+class FciController:
+    """The controller without its sockets. Owned by the loop that calls `step`, once a millisecond.
+
+    Attributes:
+        arm: The arm.
+        version: The version of the interface.
+        settings: All settings.
+        phase: The phase of the robot.
+        faults: The errors that are set.
+        reflex_reason: The errors that ended the last motion.
+        reason: Reason for the last error, as a sentence with numbers.
+        outcome: How the last motion ended, for the second answer to its Move; None while there is nothing to say.
+        state: The last reported state.
+        ignored: Number of commands that arrived outside of a motion.
+        on_phase: Called with the phases before and after every transition.
+
+    Args:
+        arm: The arm after power-up.
+        version: The version of the interface.
+    """
+
+    loop_back = False
+    auto_limit = False
+
+    def __init__(self, arm: VirtualArm, version: FciVersion) -> None:
+        self.arm, self.version = arm, version
+        self.settings = Settings.of_arm(arm.model.description)
+        self.phase = Phase.IDLE
+        self.faults: tuple[FrankaError, ...] = ()
+        self.reflex_reason: tuple[FrankaError, ...] = ()
+        self.reason = Remark("")
+        self.outcome: Status | None = None
+        self.ignored = 0
+        self.button: SafetyButton = "none"
+        self.on_phase: Callable[[Phase, Phase], None] = lambda before, after: None
+        conditions = arm.model.description.conditions
+        assert conditions is not None  # Every Franka arm has them.
+        self._table = conditions()
+        self._motion: MotionKind | None = None
+        self._countdown = 0
+        self._message_id = 0
+        arm.configure(self.settings)
+        arm.resting_law = ControlLaw.POSITION
+        self._reporter = StateReporter(arm.model, self.settings)
+        self.state = self._report()
+
+    @property
+    def model(self) -> RobotModel:
+        """The arm with its tool and load."""
+        return self.arm.model
+
+    @property
+    def playout(self) -> JitterBuffer:
+        """The queue of commands, with its counts."""
+        return self.arm.playout
+
+    @property
+    def limit_table(self) -> str:
+        """Whose limits of the tool's motion apply."""
+        return "manual"
+
+    @limit_table.setter
+    def limit_table(self, table: str) -> None:
+        if table != "manual":
+            raise InvalidValueError("limit table", table, "is unknown; known: manual")
+
+    @property
+    def cycle_number(self) -> int:
+        """The number of the last state."""
+        return self._message_id
+
+    @property
+    def phase_name(self) -> str:
+        """Name of the phase, such as "idle"."""
+        return self.phase.name.lower()
+
+    @property
+    def safety_box(self) -> SafetyBox | None:
+        """None: this controller has none."""
+        return None
+
+    @property
+    def inputs(self) -> tuple[int, ...]:
+        """Empty: this controller has no digital inputs."""
+        return ()
+
+    def set_input(self, signal: int, level: bool) -> None:
+        """Raises an error: there are no digital inputs.
+
+        Raises:
+            InvalidValueError: Always.
+        """
+        raise InvalidValueError("digital input", signal, "does not exist: this controller has none")
+
+    @property
+    def packet(self) -> StatePacket:
+        """The last state, as the content of a datagram."""
+        controller, generator = self._shown
+        rate = self.playout.success_rate if self.phase in IN_MOTION else 0.0
+        reporter = self._reporter
+        errors = flags_of(self.faults) if self.faults else NO_ERRORS
+        reflex = flags_of(self.reflex_reason) if self.reflex_reason else NO_ERRORS
+        return StatePacket(
+            self._message_id,
+            reporter.numbers,
+            reporter.accelerometers,
+            generator,
+            controller,
+            errors,
+            reflex,
+            self.phase.robot_mode,
+            rate,
+        )
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the arm moves, or waits for commands that would make it move."""
+        return self.phase in IN_MOTION or not self.arm.commanded.is_stationary
+
+    @property
+    def wants_commands(self) -> bool:
+        """Whether a client's motion is in progress."""
+        return self.phase is Phase.MOVING and not self.playout.is_finished
+
+    @property
+    def is_starved(self) -> bool:
+        """Whether a motion is in progress and its next command is missing."""
+        return self.phase is Phase.MOVING and self.playout.is_starved
+
+    @property
+    def lacks_commands(self) -> bool:
+        """Whether an error is set that is caused by missing commands."""
+        return FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION in self.faults
+
+    def reset(self, q: JointVector) -> None:
+        """Moves the arm at standstill to another position (simulation only)."""
+        self.arm.reset(q)
+
+    def set_up(self, setup: ArmSetup) -> None:
+        """Sets the arm up as on Franka's Desk.
+
+        Raises:
+            InvalidValueError: A value is out of its bounds, or the arm cannot stand at the joint angles.
+            UsageError: The arm moves, follows commands or is guided.
+        """
+        if self.phase not in _STILL or not self.arm.is_standstill:
+            raise UsageError(f"the arm cannot be set up or placed in phase {self.phase_name}; end its motion first")
+        settings = apply_setup(self.settings, setup)
+        if setup.q is not None:
+            require_stand(self.model.with_tool(settings.T_flange_tool), setup.q, settings, self.arm.plant)
+        self._configure(settings)
+        if setup.q is not None:
+            self.arm.reset(readonly_copy(setup.q))
+
+    def press_button(self, button: SafetyButton) -> None:
+        """Presses or releases the user stop."""
+        if button == self.button:
+            return
+        self.button = button
+        if button == "none":
+            self._enter(Phase.IDLE if not self.faults else Phase.REFLEX)
+            return
+        self.reason = _USER_STOP
+        self._end(Status.EMERGENCY_ABORTED)
+        self._enter(Phase.USER_STOPPED)
+
+    def receive(self, packet: CommandPacket) -> None:
+        """Queues a command from the network while a motion is in progress; others are counted."""
+        if self._motion is None or self.phase is not Phase.MOVING:
+            self.ignored += 1
+            return
+        self.ignored += not self.arm.receive(_as_command(packet, self._motion, self.version))
+
+    def begin_move(self, request: Move) -> Status:
+        """Begins a motion; returns MOTION_STARTED, or why it is refused."""
+        refusal = MOVE_REFUSALS.get(self.phase)
+        if refusal is not None:
+            return refusal
+        motion = motion_of(request, self.version, self.settings)
+        if motion is None:
+            return Status.INVALID_ARGUMENT
+        if motion.mode.is_cartesian and self.model.solver.singularity(self.arm.commanded.q) is not None:
+            return Status.START_SINGULAR
+        self.reflex_reason, self.outcome, self._motion = (), None, motion
+        self.arm.prepare_motion(motion.mode)
+        self.arm.begin_motion(self.model.limits)
+        self._enter(Phase.MOVING)
+        return Status.MOTION_STARTED
+
+    def stop_move(self) -> Status:
+        """Ends a motion; returns the status of the answer."""
+        status = STOP_STATUSES[self.phase]
+        if self.phase is Phase.MOVING:
+            self._end(Status.PREEMPTED)
+            self._enter(Phase.STOPPING)
+        return status
+
+    def begin_recovery(self) -> Status | None:
+        """Begins an error recovery; returns the status of the answer, or None: it follows when `phase` is IDLE."""
+        refusal = RECOVERY_REFUSALS.get(self.phase)
+        if refusal is not None:
+            return refusal
+        if self.phase is Phase.IDLE:
+            return Status.SUCCESS
+        self._countdown = RECOVERY_TIME
+        self._enter(Phase.RECOVERING)
+        return None
+
+    def set(self, request: Request) -> tuple[Status, str]:
+        """Applies a setter; returns the status of the answer, and why it is refused."""
+        if self.phase not in SETTABLE:
+            return Status.NOT_POSSIBLE, f"not possible in phase {self.phase_name}"
+        try:
+            settings = apply_request(self.settings, request)
+        except InvalidValueError as error:
+            return Status.INVALID_ARGUMENT, str(error)
+        self._configure(settings)
+        return Status.SUCCESS, ""
+
+    def lose_client(self) -> bool:
+        """Stops the arm; returns whether this ends a motion."""
+        was_moving = self.phase is Phase.MOVING
+        if was_moving:
+            self._end(Status.ABORTED)
+            self._enter(Phase.STOPPING)
+        self.outcome = None
+        return was_moving
+
+    def step(self, *, is_sent: bool = True) -> RobotState:
+        """Advances by one cycle and returns the state at its end."""
+        self._message_id += is_sent
+        command_violations, measured_violations = self.arm.step()
+        violations = command_violations or measured_violations
+        if violations:
+            self._raise(violations)
+        elif self.phase is Phase.MOVING and self.playout.is_finished and self.arm.is_standstill:
+            self.outcome = Status.SUCCESS
+            self.arm.discard_motion()
+            self._enter(Phase.IDLE)
+        elif self.phase is Phase.STOPPING and self.arm.is_standstill:
+            self._enter(Phase.IDLE)
+        elif self.phase is Phase.RECOVERING:
+            self._recover()
+        self.state = self._report()
+        self._check_reflex()
+        return self.state
+
+    def _recover(self) -> None:
+        self._countdown -= 1
+        if self._countdown <= 0 and self.arm.commanded.is_stationary:
+            self.faults = ()
+            self._enter(Phase.IDLE)
+
+    def _check_reflex(self) -> None:
+        torque, force = self._reporter.has_collision
+        if self.phase is not Phase.MOVING or not (torque or force):
+            return
+        found = ((FrankaError.JOINT_REFLEX,) if torque else ()) + ((FrankaError.CARTESIAN_REFLEX,) if force else ())
+        kind = "torque" if torque else "force"
+        self.reason = Remark(f"an external {kind} is above its threshold of setCollisionBehavior", "collision")
+        self._set_errors(found)
+        self.state = self._report()
+
+    def _raise(self, violations: Violations) -> None:
+        self.reason = describe_violations(violations)
+        is_cartesian = self._motion is not None and self._motion.mode.is_cartesian
+        self._set_errors(errors_of(violations, self._table, is_cartesian=is_cartesian))
+
+    def _set_errors(self, errors: tuple[FrankaError, ...]) -> None:
+        self.faults = tuple(sorted({*self.faults, *errors}))
+        self.reflex_reason = self.faults
+        self._end(Status.REFLEX_ABORTED)
+        self._enter(Phase.REFLEX)
+
+    def _end(self, outcome: Status) -> None:
+        """Ends a motion in progress, if there is one."""
+        if self.phase in IN_MOTION:
+            self.outcome = outcome
+            self.arm.discard_motion()
+
+    def _enter(self, phase: Phase) -> None:
+        before, self.phase = self.phase, phase
+        if phase not in IN_MOTION:
+            self._motion = None
+        self.arm.is_monitored = phase in IN_MOTION
+        self.arm.resting_law = ControlLaw.BRAKED if phase in _BRAKED else ControlLaw.POSITION
+        self.on_phase(before, phase)
+
+    @property
+    def _shown(self) -> tuple[int, int]:
+        """Controller and motion generator as in the state."""
+        if self.phase is not Phase.MOVING or self._motion is None:
+            return _NO_CONTROLLER, _NO_GENERATOR
+        return self._motion.controller, self._motion.generator + 1
+
+    def _report(self) -> RobotState:
+        motion = self._motion
+        return self._reporter.report(
+            self._message_id,
+            self.arm.signals,
+            faults=self.faults,
+            success_rate=self.playout.success_rate,
+            motion_generator_mode=MotionGeneratorMode.IDLE if motion is None else motion.reported_generator,
+            controller_mode=ControllerMode.OTHER if motion is None else motion.reported_controller,
+            robot_mode=self.phase.robot_mode,
+        )
+
+    def _configure(self, settings: Settings) -> None:
+        self.settings = settings
+        self.arm.configure(settings)
+        self._reporter.configure(self.model, settings)
+
+
+def _as_command(packet: CommandPacket, motion: MotionKind, version: FciVersion) -> ArmCommand:
+    m = packet.O_T_EE_c
+    rows = tuple(m[column * 4 + row] for row in range(4) for column in range(4))
+    is_torque = motion.mode.law is ControlLaw.TORQUE
+    return ArmCommand(
+        packet.message_id,
+        packet.q_c,
+        rows,
+        packet.has_elbow,
+        packet.elbow_c[0],
+        packet.has_ended_torques if is_torque else packet.is_finished,
+        packet.tau_c,
+        packet.dq_c,
+        packet.O_dP_EE_c,
+    )

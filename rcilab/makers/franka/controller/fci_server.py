@@ -1,0 +1,199 @@
+"""The server of the FCI: one TCP client whose requests are handled in order, commands and states over UDP.
+
+A client begins with Connect, which names its version and its UDP port; states flow from then on. Move has two answers,
+at the beginning and at the end of the motion, with one id.
+"""
+
+from __future__ import annotations
+
+from rcilab.core.errors import DecodeError
+from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.controller.phases import IN_MOTION, Phase
+from rcilab.makers.franka.wire.command_packet import decode_command
+from rcilab.makers.franka.wire.frame import (
+    FrameReader,
+    decode_header,
+    decode_request,
+    encode_connect_response,
+    encode_response,
+)
+from rcilab.makers.franka.wire.requests import (
+    SETTERS,
+    AutomaticErrorRecovery,
+    Connect,
+    GetCartesianLimit,
+    GetRobotModel,
+    LoadModelLibrary,
+    Move,
+    Request,
+    StopMove,
+)
+from rcilab.makers.franka.wire.state_packet import encode_state
+from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, FciVersion, Status
+from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
+from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.virtual_arm import VirtualArm
+
+DEFAULT_PORT = 1337
+_PROTOCOL = "FCI"
+_VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
+"""The version of each arm's controller."""
+
+
+def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
+    """Returns the FCI server of an arm with a configuration."""
+    version = _VERSIONS[arm.model.name]
+    controller = FciController(arm, version)
+    controller.limit_table = config.limit_table
+    return FciServer(controller, DEFAULT_PORT if config.port is None else config.port, config.udp_port)
+
+
+class FciServer:
+    """A `MakerServer` for the FCI.
+
+    Args:
+        controller: The controller.
+        port: TCP port; 0 takes any free one.
+        udp_port: For commands; None: any free one.
+    """
+
+    scheme = "fci"
+    patience = 0.02  # [s] A soft lock-step: clients on ordinary kernels jitter by milliseconds.
+
+    def __init__(self, controller: FciController, port: int, udp_port: int | None = None) -> None:
+        self.controller = controller
+        self.channels = (
+            TcpChannel(protocol=_PROTOCOL, port=port, open_framer=FrameReader),
+            UdpChannel(port=0 if udp_port is None else udp_port, target_port=0),
+        )
+        self._link: ClientLink
+        self._peer: Peer | None = None
+        self._version: FciVersion | None = None
+        self._move: tuple[type[Request], int] | None = None  # Waits for the end of its motion.
+        self._recovery: int | None = None  # Id of the request.
+        controller.on_phase = self._log_phase
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing moves and no answer is deferred."""
+        return self.controller.phase is Phase.IDLE and self._move is None and self._recovery is None
+
+    def attach(self, link: ClientLink) -> None:
+        """Sets the link to clients."""
+        self._link = link
+
+    def connect(self, peer: Peer) -> None:
+        """Accepts a client; states flow after its Connect."""
+        self._peer, self._version = peer, None
+
+    def disconnect(self, peer: Peer) -> bool:
+        """Stops the arm; returns whether this ends a motion."""
+        self._peer = self._version = self._move = self._recovery = None
+        return self.controller.lose_client()
+
+    def receive(self, peer: Peer, frame: bytes) -> None:
+        """Handles a request."""
+        header = decode_header(frame)
+        try:
+            request = decode_request(frame, self._version)
+        except DecodeError as error:
+            self._link.drop(peer, f"sent what is no request of the FCI: {error}")
+            return
+        if isinstance(request, Connect):
+            self._accept(peer, header.command_id, request)
+        else:
+            self._handle(peer, header.command_id, request)
+
+    def receive_datagram(self, datagram: bytes) -> bool:
+        """Passes a command on; returns whether it is well formed."""
+        if self._version is None:
+            return False
+        try:
+            packet = decode_command(datagram, self._version)
+        except DecodeError as error:
+            self._link.log("bad_datagram", f"ignored a datagram: {error}", size=len(datagram))
+            return False
+        self.controller.receive(packet)
+        return True
+
+    def step(self, *, is_sent: bool = True) -> None:
+        """Advances by one cycle."""
+        self.controller.step(is_sent=is_sent)
+
+    def send_states(self) -> None:
+        """Sends the last state."""
+        if self._version is not None:
+            self._link.send_datagram(encode_state(self.controller.packet, self._version))
+
+    def settle(self) -> None:
+        """Sends the answers that the state just sent has made due."""
+        if self._peer is None or self._version is None:
+            return
+        outcome = self.controller.outcome
+        if self._move is not None and outcome is not None:
+            kind, command_id = self._move
+            self._move = self.controller.outcome = None
+            self._answer(kind, command_id, outcome)
+        if self._recovery is not None and self.controller.phase is not Phase.RECOVERING:
+            command_id, self._recovery = self._recovery, None
+            is_done = self.controller.phase is Phase.IDLE
+            self._answer(AutomaticErrorRecovery, command_id, Status.SUCCESS if is_done else Status.ABORTED)
+
+    def begin_shutdown(self) -> int:
+        """Ends a motion in progress; returns for how many cycles states are still sent."""
+        self.controller.stop_move()
+        return 0
+
+    def _accept(self, peer: Peer, command_id: int, request: Connect) -> None:
+        version = self.controller.version
+        if request.version != version.number:
+            self._link.send_frame(peer, encode_connect_response(command_id, Status.INCOMPATIBLE, version.number))
+            text = f"refused a client of version {request.version}: this arm has version {version.number} of the FCI"
+            self._link.log("refused", text, request="Connect")
+            return
+        if not self._link.direct_datagrams(peer, request.udp_port):
+            self._link.drop(peer, f"asked for states at port {request.udp_port}, which is not valid")
+            return
+        self._version = version
+        self._link.send_frame(peer, encode_connect_response(command_id, Status.SUCCESS, version.number))
+
+    def _handle(self, peer: Peer, command_id: int, request: Request) -> None:
+        controller, kind = self.controller, type(request)
+        match request:
+            case Move():
+                status = controller.begin_move(request)
+                if status is Status.MOTION_STARTED:
+                    self._move = kind, command_id
+                self._answer(kind, command_id, status)
+            case StopMove():
+                self._answer(kind, command_id, controller.stop_move())
+            case AutomaticErrorRecovery():
+                found = controller.begin_recovery()
+                if found is None:
+                    self._recovery = command_id
+                else:
+                    self._answer(kind, command_id, found)
+            case GetCartesianLimit() | GetRobotModel() | LoadModelLibrary():
+                self._answer(kind, command_id, Status.NOT_POSSIBLE)
+            case _ if kind in SETTERS:
+                status, why = controller.set(request)
+                self._answer(kind, command_id, status, why)
+            case _:
+                self._link.drop(peer, f"sent {kind.__name__} in the wrong place")
+
+    def _answer(self, kind: type[Request], command_id: int, status: Status, why: str = "") -> None:
+        assert self._peer is not None
+        assert self._version is not None
+        self._link.send_frame(self._peer, encode_response(self._version, kind, command_id, status))
+        is_refusal = status not in (Status.SUCCESS, Status.MOTION_STARTED, Status.PREEMPTED)
+        if is_refusal:
+            text = f"{kind.__name__} was answered: {status.value}" + (f"; {why}" if why else "")
+            self._link.log("refused", text, request=kind.__name__, status=status.name)
+
+    def _log_phase(self, before: Phase, after: Phase) -> None:
+        playout = self.controller.playout
+        if after is Phase.MOVING:
+            self._link.log("motion_started", "motion started")
+        elif before in IN_MOTION and after not in IN_MOTION:
+            text = f"motion ended after {playout.cycles} cycles: {playout.lost} commands lost, {playout.late} late"
+            self._link.log("motion_ended", text, cycles=playout.cycles, lost=playout.lost, late=playout.late)

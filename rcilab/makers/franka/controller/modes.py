@@ -1,0 +1,69 @@
+"""The motions of Move: what is commanded, and the law that follows it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rcilab.core.state import ControllerMode, MotionGeneratorMode
+from rcilab.makers.franka.controller.settings import JOINT_STIFFNESS, Settings
+from rcilab.makers.franka.wire.requests import AsyncMove, Move
+from rcilab.makers.franka.wire.versions import FciVersion, MoveController, MoveGenerator
+from rcilab.sim.actuator import ControlLaw
+from rcilab.sim.generators import MotionMode
+
+_CARTESIAN = (MoveGenerator.CARTESIAN_POSITION, MoveGenerator.CARTESIAN_VELOCITY)
+_GENERATORS = {
+    MoveGenerator.JOINT_POSITION: MotionGeneratorMode.JOINT_POSITION,
+    MoveGenerator.JOINT_VELOCITY: MotionGeneratorMode.JOINT_VELOCITY,
+    MoveGenerator.CARTESIAN_POSITION: MotionGeneratorMode.CARTESIAN_POSITION,
+    MoveGenerator.CARTESIAN_VELOCITY: MotionGeneratorMode.CARTESIAN_VELOCITY,
+    MoveGenerator.NONE: MotionGeneratorMode.IDLE,
+}
+_CONTROLLERS = {
+    ControlLaw.POSITION: (ControllerMode.JOINT_POSITION, ControllerMode.CARTESIAN_POSITION),
+    ControlLaw.JOINT_IMPEDANCE: (ControllerMode.JOINT_IMPEDANCE, ControllerMode.JOINT_IMPEDANCE),
+    ControlLaw.CARTESIAN_IMPEDANCE: (ControllerMode.CARTESIAN_IMPEDANCE, ControllerMode.CARTESIAN_IMPEDANCE),
+    ControlLaw.TORQUE: (ControllerMode.TORQUE, ControllerMode.TORQUE),
+}
+
+
+class MotionKind(NamedTuple):
+    """A motion as its client asked for it."""
+
+    controller: MoveController
+    generator: MoveGenerator
+    mode: MotionMode
+    """Of the virtual arm."""
+
+    @property
+    def reported_generator(self) -> MotionGeneratorMode:
+        """The generator in rcilab's states."""
+        return _GENERATORS[self.generator]
+
+    @property
+    def reported_controller(self) -> ControllerMode:
+        """The controller in rcilab's states."""
+        return _CONTROLLERS[self.mode.law][self.mode.is_cartesian]
+
+
+def motion_of(request: Move, version: FciVersion, settings: Settings) -> MotionKind | None:
+    """Returns the motion of a Move; None if its modes are not of this version, or do not go together.
+
+    With the stiffness after power-up the joints are on their servos: the internal impedance is that stiff.
+    """
+    controllers, generators = tuple(MoveController), version.generators
+    if request.controller_mode >= len(controllers) or request.motion_generator_mode not in tuple(generators):
+        return None
+    controller, generator = controllers[request.controller_mode], MoveGenerator(request.motion_generator_mode)
+    if generator is MoveGenerator.NONE and controller is not MoveController.EXTERNAL:
+        return None
+    if isinstance(request, AsyncMove) and request.is_asynchronous and generator is not MoveGenerator.JOINT_POSITION:
+        return None
+    is_cartesian = generator in _CARTESIAN
+    law = ControlLaw.TORQUE
+    if controller is MoveController.JOINT_IMPEDANCE:
+        is_stiff = settings.joint_stiffness == JOINT_STIFFNESS
+        law = ControlLaw.POSITION if is_stiff else ControlLaw.JOINT_IMPEDANCE
+    elif controller is MoveController.CARTESIAN_IMPEDANCE:
+        law = ControlLaw.CARTESIAN_IMPEDANCE
+    return MotionKind(controller, generator, MotionMode(law, is_cartesian))

@@ -1,0 +1,195 @@
+"""The reported state: the neutral one of every maker, for records and displays, and the numbers of Franka's datagram.
+
+Desired values (`_d`) are those of the reference, which the controller follows; commanded ones (`_c`) are the same: no
+filter lies between them that this arm would not follow. While torques move the arm, both are the measured ones.
+
+* The elbow is the angle of joint 3, and +1 where joint 4 is above the angle at which the arm is stretched, else -1.
+* External forces are those that the environment exerts on the arm, at the origin of the stiffness frame K, in axes of
+  the base (`O_F_ext_hat_K`) or of K (`K_F_ext_hat_K`).
+* The drives have no elasticity: theta is q, dtheta is dq.
+* tau_J has gravity; tau_J_d and commanded torques have not: the controller compensates it.
+* The acceleration sensors read a stationary arm's: the reaction to gravity, in the axes of their link.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import Array, make_readonly, readonly_copy
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.reported_pose import ReportedPose
+from rcilab.core.spatial import Pose
+from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
+from rcilab.makers.franka.controller.contact_flags import ContactFlags
+from rcilab.makers.franka.controller.settings import Settings
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.wire.state_packet import ACCELEROMETERS, NUMBERS, PLACES
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import RobotModel
+from rcilab.sim.virtual_arm import CycleSignals
+
+GRAVITY = 9.81  # [m/s^2]
+_JOINT_4 = 3  # From 0.
+
+
+class StateReporter:
+    """Builds the state of each cycle. Owned by the controller.
+
+    Attributes:
+        numbers: Those of the last state's datagram, see `FIELDS`, shape (284,).
+        accelerometers: Shape (36,), [m/s^2].
+
+    Args:
+        model: The arm with its tool and load.
+        settings: The client's settings.
+    """
+
+    def __init__(self, model: RobotModel, settings: Settings) -> None:
+        flip = model.description.elbow_flip
+        assert flip is not None  # Every Franka arm has one.
+        self._flip = flip
+        self.numbers: NDArray[np.float64] = np.zeros(NUMBERS)
+        self.accelerometers: NDArray[np.float64] = np.zeros(ACCELEROMETERS)
+        self._zeros = readonly_copy(np.zeros(model.n))
+        self._zeros6 = readonly_copy(np.zeros(6))
+        self._tau_d = self._zeros
+        self.configure(model, settings)
+
+    def configure(self, model: RobotModel, settings: Settings) -> None:
+        """Sets new frames, loads or thresholds; only at standstill."""
+        self._model, self._settings = model, settings
+        self._flags = ContactFlags(settings.thresholds)
+        self._lever = settings.EE_T_K
+        numbers = self.numbers
+        for name, pose in (
+            ("F_T_EE", settings.T_flange_tool),
+            ("EE_T_K", settings.EE_T_K),
+            ("F_T_NE", settings.F_T_NE),
+            ("NE_T_EE", settings.NE_T_EE),
+        ):
+            numbers[PLACES[name]] = columns_of(pose)
+        _write_body(numbers, "m_ee", "I_ee", "F_x_Cee", settings.end_effector)
+        _write_body(numbers, "m_load", "I_load", "F_x_Cload", settings.client_load)
+        numbers[PLACES["O_ddP_O"]] = (0.0, 0.0, -GRAVITY)
+        self._signals: CycleSignals | None = None
+
+    def report(
+        self,
+        message_id: int,
+        signals: CycleSignals,
+        *,
+        faults: tuple[FrankaError, ...],
+        success_rate: float,
+        motion_generator_mode: MotionGeneratorMode,
+        controller_mode: ControllerMode,
+        robot_mode: RobotMode,
+    ) -> RobotState:
+        """Returns the state of this cycle, and updates the numbers of its datagram."""
+        commanded, tool_c, measured, tool, tau_commanded, _, wrench = signals
+        q_c, dq_c, ddq_c = commanded.arrays
+        if tau_commanded is None:
+            tau_d = self._model.rigid_body.shared_torque(q_c, dq_c, ddq_c)
+        else:
+            tau_d = readonly_copy(tau_commanded)
+        dtau = (tau_d - self._tau_d) / CYCLE_TIME if self._signals is not None else self._zeros
+        self._tau_d = tau_d
+        rates = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
+        self._write(signals, rates, tau_d)
+        self._signals = signals
+        return build_state(
+            (
+                message_id,
+                measured.q,
+                q_c,
+                measured.dq,
+                dq_c,
+                ddq_c,
+                ReportedPose(tool.matrix),
+                ReportedPose(tool_c.matrix),
+                rates[:6],
+                rates[6:],
+                tool.psi,
+                tool_c.psi,
+                tool_c.dpsi,
+                tool_c.ddpsi,
+                measured.tau,
+                measured.tau,
+                tau_d,
+                dtau,
+                wrench,
+                self._wrench_in_K,
+                measured.q,
+                measured.dq,
+                measured.tau,
+                measured.tau,
+                faults,
+                success_rate,
+                motion_generator_mode,
+                controller_mode,
+                robot_mode,
+            )
+        )
+
+    @property
+    def has_collision(self) -> tuple[bool, bool]:
+        """Whether an external torque, and an external force, is above its upper threshold in the last state."""
+        return self._flags.has_torque_collision, self._flags.has_force_collision
+
+    def _write(self, signals: CycleSignals, rates: Array, tau_d: Array) -> None:
+        commanded, tool_c, measured, tool, _, tau_ext, wrench = signals
+        q_c, dq_c, ddq_c = commanded.arrays
+        numbers, place = self.numbers, PLACES
+        last = self._signals
+        numbers[place["O_T_EE"]] = tool.matrix.T.ravel()
+        numbers[place["O_T_EE_d"]] = numbers[place["O_T_EE_c"]] = tool_c.matrix.T.ravel()
+        numbers[place["elbow"]] = tool.psi, self._side(float(measured.q[_JOINT_4]))
+        elbow_d = tool_c.psi, self._side(float(q_c[_JOINT_4]))
+        numbers[place["elbow_d"]] = numbers[place["elbow_c"]] = elbow_d
+        numbers[place["delbow_c"]] = tool_c.dpsi, 0.0
+        numbers[place["ddelbow_c"]] = tool_c.ddpsi, 0.0
+        numbers[place["tau_J"]] = measured.tau
+        numbers[place["tau_J_d"]] = tau_d
+        numbers[place["dtau_J"]] = 0.0 if last is None else (measured.tau - last.measured.tau) / CYCLE_TIME
+        numbers[place["q"]] = numbers[place["theta"]] = measured.q
+        numbers[place["dq"]] = numbers[place["dtheta"]] = measured.dq
+        numbers[place["q_d"]] = q_c
+        numbers[place["dq_d"]] = dq_c
+        numbers[place["ddq_d"]] = ddq_c
+        numbers[place["O_dP_EE_d"]] = numbers[place["O_dP_EE_c"]] = rates[:6]
+        numbers[place["O_ddP_EE_c"]] = rates[6:]
+        numbers[place["tau_ext_hat_filtered"]] = tau_ext
+        at_K, self._wrench_in_K = self._at_stiffness_frame(tool.pose, wrench)
+        numbers[place["O_F_ext_hat_K"]] = at_K
+        numbers[place["K_F_ext_hat_K"]] = self._wrench_in_K
+        is_accelerating = bool(np.abs(ddq_c).max() > 0.0)
+        flags = self._flags.step(tau_ext, self._wrench_in_K, is_accelerating=is_accelerating)
+        for name, values in zip(
+            ("joint_contact", "cartesian_contact", "joint_collision", "cartesian_collision"), flags, strict=True
+        ):
+            numbers[place[name]] = values
+
+    def _at_stiffness_frame(self, T_base_tool: Pose, wrench: Array) -> tuple[Array, Array]:
+        """Returns a wrench on the end effector (base axes, its origin) at the origin of K, in base and in K axes."""
+        if not wrench.any():
+            return self._zeros6, self._zeros6
+        T_base_K = T_base_tool @ self._lever
+        arm = T_base_tool.position - T_base_K.position
+        force = wrench[:3]
+        at_K = np.concatenate((force, wrench[3:] + np.cross(arm, force)))
+        R = T_base_K.rotation
+        return at_K, readonly_copy(np.concatenate((R.T @ at_K[:3], R.T @ at_K[3:])))
+
+    def _side(self, q4: float) -> float:
+        return 1.0 if q4 > self._flip else -1.0
+
+
+def columns_of(pose: Pose) -> tuple[float, ...]:
+    """Returns the 16 numbers of a pose, column-major."""
+    return tuple(pose.matrix.T.ravel().tolist())
+
+
+def _write_body(numbers: NDArray[np.float64], mass: str, inertia: str, center: str, body: Payload) -> None:
+    numbers[PLACES[mass]] = body.mass
+    numbers[PLACES[inertia]] = body.inertia.ravel()
+    numbers[PLACES[center]] = body.center_of_mass

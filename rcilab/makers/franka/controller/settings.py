@@ -1,0 +1,227 @@
+"""All settings of a client over TCP, checked by the controller.
+
+An invalid value is answered with "invalid argument" and changes nothing. Frames are given column-major.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot, inf, isfinite
+
+import numpy as np
+
+from rcilab.core.errors import InvalidValueError
+from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.makers.franka.wire.requests import (
+    Request,
+    SetCartesianImpedance,
+    SetCollisionBehavior,
+    SetEEToK,
+    SetFilters,
+    SetGuidingMode,
+    SetJointImpedance,
+    SetLoad,
+    SetNEToEE,
+)
+from rcilab.model.dynamics.payload import Payload
+from rcilab.robots import RobotDescription
+from rcilab.sim.arm_parameters import ArmParameters, Floats
+from rcilab.sim.arm_setup import ArmSetup
+from rcilab.sim.filters import SAMPLING_RATE
+
+LONGEST_TOOL = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
+HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound; the rated payload is 3 kg.
+LARGEST_JOINT_STIFFNESS = 14250.0  # [N m/rad] Comments of libfranka's robot.h, as the two below.
+CARTESIAN_STIFFNESS = ((10.0, 3000.0), (1.0, 300.0))  # [N/m], [N m/rad] Smallest and largest, along and about an axis.
+LOWEST_FREQUENCY = 1.0  # [Hz]
+JOINT_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N m/rad] After power-up.
+DEFAULT_CARTESIAN_STIFFNESS = (2000.0, 2000.0, 2000.0, 100.0, 100.0, 100.0)  # [N/m], [N m/rad] The same.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Thresholds:
+    """What setCollisionBehavior sets: torques of 7 joints [N m], forces and moments of 6 axes [N, N m]."""
+
+    contact_torque: Floats = (20.0,) * 7
+    """Lower thresholds, while the arm does not accelerate."""
+    collision_torque: Floats = (20.0,) * 7
+    """Upper ones."""
+    contact_torque_accelerating: Floats = (20.0,) * 7
+    collision_torque_accelerating: Floats = (20.0,) * 7
+    contact_force: Floats = (20.0,) * 6
+    collision_force: Floats = (20.0,) * 6
+    contact_force_accelerating: Floats = (20.0,) * 6
+    collision_force_accelerating: Floats = (20.0,) * 6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings(ArmParameters):
+    """All settable values: those of the arm, and those of the controller alone."""
+
+    F_T_NE: Pose = IDENTITY
+    """The nominal end-effector frame in the flange frame: that of the hand, if there is one."""
+    NE_T_EE: Pose = IDENTITY
+    EE_T_K: Pose = IDENTITY
+    end_effector: Payload
+    """The hand, in the flange frame."""
+    client_load: Payload
+    """What setLoad sets; `load` is this and the hand."""
+    thresholds: Thresholds = Thresholds()
+    free_axes: tuple[bool, ...] = (True,) * 6
+    free_elbow: bool = True
+    velocity_filter: float = SAMPLING_RATE
+    """Cut-off frequency of the low pass of commanded joint velocities, [Hz] (version 5)."""
+    twist_filter: float = SAMPLING_RATE
+    """The same for commanded Cartesian velocities, [Hz]."""
+
+    @classmethod
+    def of_arm(cls, arm: RobotDescription) -> Settings:
+        """Returns the settings after power-up."""
+        limits = arm.limits.joint
+        return cls(
+            joint_lower=tuple(limits.lower.tolist()),
+            joint_upper=tuple(limits.upper.tolist()),
+            collision_thresholds=(inf,) * arm.n,
+            joint_stiffness=JOINT_STIFFNESS,
+            cartesian_stiffness=DEFAULT_CARTESIAN_STIFFNESS,
+            end_effector=Payload(),
+            client_load=Payload(),
+        )
+
+
+def apply_setup(settings: Settings, setup: ArmSetup) -> Settings:
+    """Returns the settings with a tool or a load of a configuration.
+
+    Raises:
+        InvalidValueError: The controller has no such setting: no safety box, no soft limits.
+    """
+    if setup.safety_box is not None:
+        raise InvalidValueError("safety box", setup.safety_box, "cannot be set: this controller has none")
+    if setup.soft_limits is not None:
+        raise InvalidValueError("soft limits", setup.soft_limits, "cannot be set: this controller has none")
+    if setup.T_flange_tool is not None:
+        settings = _with_frames(replace(settings, F_T_NE=setup.T_flange_tool, NE_T_EE=IDENTITY))
+    if setup.load is not None:
+        settings = _with_load(settings, setup.load)
+    return settings
+
+
+def apply_request(settings: Settings, request: Request) -> Settings:
+    """Returns the settings with the values of a request.
+
+    Args:
+        settings: The settings before.
+        request: A setter; other requests have no effect.
+
+    Raises:
+        InvalidValueError: A value is out of its bounds; it names the first.
+    """
+    match request:
+        case SetCollisionBehavior():
+            return replace(settings, thresholds=_thresholds(request))
+        case SetJointImpedance(stiffness=values):
+            for number, value in enumerate(values, 1):
+                _require(f"stiffness of joint {number}", value, 0.0, LARGEST_JOINT_STIFFNESS, "N m/rad")
+            return replace(settings, joint_stiffness=values)
+        case SetCartesianImpedance(stiffness=values):
+            for number, value in enumerate(values):
+                lowest, largest = CARTESIAN_STIFFNESS[number // 3]
+                _require(f"stiffness {number + 1}", value, lowest, largest, ("N/m", "N m/rad")[number // 3])
+            return replace(settings, cartesian_stiffness=values)
+        case SetGuidingMode(axes=axes, elbow=elbow):
+            return replace(settings, free_axes=tuple(map(bool, axes)), free_elbow=bool(elbow))
+        case SetEEToK(EE_T_K=numbers):
+            return replace(settings, EE_T_K=pose_from_columns("EE_T_K", numbers))
+        case SetNEToEE(NE_T_EE=numbers):
+            return _with_frames(replace(settings, NE_T_EE=pose_from_columns("NE_T_EE", numbers)))
+        case SetLoad():
+            return _with_load(settings, _load(request))
+        case SetFilters(frequencies=values):
+            for value in values:
+                _require("filter frequency", value, LOWEST_FREQUENCY, SAMPLING_RATE, "Hz")
+            joint, velocity, pose, twist, torque = values
+            return replace(
+                settings,
+                joint_filter=joint,
+                velocity_filter=velocity,
+                cartesian_filter=pose,
+                twist_filter=twist,
+                torque_filter=torque,
+            )
+        case _:
+            return settings
+
+
+def pose_from_columns(name: str, numbers: Sequence[float]) -> Pose:
+    """Returns the pose of a column-major matrix.
+
+    Raises:
+        InvalidValueError: It is not a proper transform, or is farther than `LONGEST_TOOL` away.
+    """
+    pose = Pose.from_row_major(tuple(numbers[column + 4 * row] for column in range(4) for row in range(4)))
+    _require(f"distance of {name}", hypot(*pose.parts[1]), 0.0, LONGEST_TOOL, "m")
+    return pose
+
+
+def _with_frames(settings: Settings) -> Settings:
+    return replace(settings, T_flange_tool=settings.F_T_NE @ settings.NE_T_EE)
+
+
+def _with_load(settings: Settings, load: Payload) -> Settings:
+    return replace(settings, client_load=load, load=_combined(settings.end_effector, load))
+
+
+def _combined(first: Payload, second: Payload) -> Payload:
+    """Returns two bodies at the flange as one."""
+    mass = first.mass + second.mass
+    if not (first.mass and second.mass):
+        return second if second.mass else first
+    center = (first.mass * first.center_of_mass + second.mass * second.center_of_mass) / mass
+    inertia = np.zeros((3, 3))
+    for body in (first, second):
+        d = body.center_of_mass - center
+        inertia += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Payload(mass=mass, center_of_mass=center, inertia=inertia)
+
+
+def _load(request: SetLoad) -> Payload:
+    _require("mass", request.mass, 0.0, HEAVIEST_LOAD, "kg")
+    _require("distance of the centre of mass", hypot(*request.center), 0.0, LONGEST_TOOL, "m")
+    return Payload(
+        mass=request.mass,
+        center_of_mass=np.array(request.center),
+        inertia=np.array(request.inertia).reshape(3, 3) if request.mass else np.zeros((3, 3)),
+    )
+
+
+def _thresholds(request: SetCollisionBehavior) -> Thresholds:
+    pairs = (
+        (request.lower_torque_acceleration, request.upper_torque_acceleration, "torque", "N m"),
+        (request.lower_torque_nominal, request.upper_torque_nominal, "torque", "N m"),
+        (request.lower_force_acceleration, request.upper_force_acceleration, "force", "N or N m"),
+        (request.lower_force_nominal, request.upper_force_nominal, "force", "N or N m"),
+    )
+    for lower, upper, name, unit in pairs:
+        for low, high in zip(lower, upper, strict=True):
+            if not (isfinite(low) and isfinite(high)) or low < 0.0 or high < low:
+                raise InvalidValueError(
+                    f"{name} thresholds",
+                    (low, high),
+                    f"{unit}: the upper one must not be below the lower, nor either below 0",
+                )
+    return Thresholds(
+        contact_torque=request.lower_torque_nominal,
+        collision_torque=request.upper_torque_nominal,
+        contact_torque_accelerating=request.lower_torque_acceleration,
+        collision_torque_accelerating=request.upper_torque_acceleration,
+        contact_force=request.lower_force_nominal,
+        collision_force=request.upper_force_nominal,
+        contact_force_accelerating=request.lower_force_acceleration,
+        collision_force_accelerating=request.upper_force_acceleration,
+    )
+
+
+def _require(name: str, value: float, lowest: float, largest: float, unit: str) -> None:
+    if not lowest <= value <= largest:  # Also True for NaN.
+        raise InvalidValueError(name, float(f"{value:.9g}"), f"{unit} is outside {lowest:g} to {largest:g} {unit}")
