@@ -1,4 +1,4 @@
-"""Franka: the arms Panda and FR3, their errors and conditions. Motions are planned and checked, but not simulated or driven."""
+"""Franka: the arms Panda and FR3, their errors, conditions and virtual controller."""
 
 from __future__ import annotations
 

@@ -34,6 +34,8 @@ def errors_of(
         if isinstance(violation, ArmViolation):
             if violation.condition is ArmCondition.START_TOLERANCE:
                 return (_start_error(is_cartesian),)
+            if violation.condition is ArmCondition.START_ARM_ANGLE:
+                return (FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID,)
             found.add(_ARM_ERRORS[violation.condition])
             continue
         name = violation.condition.id.replace("arm_angle", "elbow")

@@ -15,6 +15,7 @@ from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
+from rcilab.makers.franka.conditions import START_TOLERANCE
 from rcilab.makers.franka.controller.error_of import errors_of
 from rcilab.makers.franka.controller.modes import MotionKind, motion_of
 from rcilab.makers.franka.controller.phases import (
@@ -37,14 +38,22 @@ from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_setup import ArmSetup, require_stand
+from rcilab.sim.generators.start import StartTolerance
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
+SUCCESS_WINDOW = 100  # [cycles] Over which the share of commands in time is reported.
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _BRAKED = (Phase.USER_STOPPED,)
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
+_START = StartTolerance(
+    joint=(START_TOLERANCE,) * 7,
+    translation=START_TOLERANCE,
+    rotation=START_TOLERANCE,
+    arm_angle=START_TOLERANCE,
+)
 _USER_STOP = Remark("the user stop was pressed", "estop")
 
 
@@ -89,6 +98,8 @@ class FciController:
         self._motion: MotionKind | None = None
         self._countdown = 0
         self._message_id = 0
+        arm.on_loss = "bridge"
+        arm.playout.window = SUCCESS_WINDOW
         arm.configure(self.settings)
         arm.resting_law = ControlLaw.POSITION
         self._reporter = StateReporter(arm.model, self.settings)
@@ -233,7 +244,7 @@ class FciController:
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
         self.arm.prepare_motion(motion.mode)
-        self.arm.begin_motion(self.model.limits)
+        self.arm.begin_motion(self.model.limits, start=_START)
         self._enter(Phase.MOVING)
         return Status.MOTION_STARTED
 

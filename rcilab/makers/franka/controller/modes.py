@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import NamedTuple
 
 from rcilab.core.state import ControllerMode, MotionGeneratorMode
@@ -9,9 +10,15 @@ from rcilab.makers.franka.controller.settings import JOINT_STIFFNESS, Settings
 from rcilab.makers.franka.wire.requests import AsyncMove, Move
 from rcilab.makers.franka.wire.versions import FciVersion, MoveController, MoveGenerator
 from rcilab.sim.actuator import ControlLaw
-from rcilab.sim.generators import MotionMode
+from rcilab.sim.generators import CommandKind, MotionMode
 
-_CARTESIAN = (MoveGenerator.CARTESIAN_POSITION, MoveGenerator.CARTESIAN_VELOCITY)
+_KINDS = {
+    MoveGenerator.JOINT_POSITION: CommandKind.JOINT_ANGLES,
+    MoveGenerator.JOINT_VELOCITY: CommandKind.JOINT_VELOCITIES,
+    MoveGenerator.CARTESIAN_POSITION: CommandKind.POSES,
+    MoveGenerator.CARTESIAN_VELOCITY: CommandKind.TWISTS,
+    MoveGenerator.NONE: CommandKind.TORQUES,
+}
 _GENERATORS = {
     MoveGenerator.JOINT_POSITION: MotionGeneratorMode.JOINT_POSITION,
     MoveGenerator.JOINT_VELOCITY: MotionGeneratorMode.JOINT_VELOCITY,
@@ -57,13 +64,15 @@ def motion_of(request: Move, version: FciVersion, settings: Settings) -> MotionK
     controller, generator = controllers[request.controller_mode], MoveGenerator(request.motion_generator_mode)
     if generator is MoveGenerator.NONE and controller is not MoveController.EXTERNAL:
         return None
-    if isinstance(request, AsyncMove) and request.is_asynchronous and generator is not MoveGenerator.JOINT_POSITION:
-        return None
-    is_cartesian = generator in _CARTESIAN
+    kind, velocity = _KINDS[generator], ()
+    if isinstance(request, AsyncMove) and request.is_asynchronous:
+        if generator is not MoveGenerator.JOINT_POSITION or not all(0.0 < v < inf for v in request.largest_velocity):
+            return None
+        kind, velocity = CommandKind.JOINT_GOALS, request.largest_velocity
     law = ControlLaw.TORQUE
     if controller is MoveController.JOINT_IMPEDANCE:
         is_stiff = settings.joint_stiffness == JOINT_STIFFNESS
         law = ControlLaw.POSITION if is_stiff else ControlLaw.JOINT_IMPEDANCE
     elif controller is MoveController.CARTESIAN_IMPEDANCE:
         law = ControlLaw.CARTESIAN_IMPEDANCE
-    return MotionKind(controller, generator, MotionMode(law, is_cartesian))
+    return MotionKind(controller, generator, MotionMode(law, kind, velocity))
