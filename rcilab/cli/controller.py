@@ -126,7 +126,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--patience",
         type=float,
         metavar="S",
-        help="lock-step: timeout for a command (60; 0.05 with --corrupt)",
+        help="wait up to S for the command of a cycle before it counts as lost (by the clock: 0 for xMate; lock-step: "
+        "60, 0.05 with --corrupt); time then slips instead",
     )
     parser.add_argument(
         "--lost-limit",

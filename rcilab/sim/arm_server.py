@@ -6,6 +6,9 @@ does not lose commands for which it had no state to answer (see `CycleTimer`). A
 vendor's does with its old state, has then sent more commands than cycles. Such cycles are caught up, one in each
 millisecond and without sending a state; otherwise the delay of its commands would grow.
 
+A maker whose clients are not expected to keep real time gives its server patience: from the first command of a motion
+on, a cycle waits that long for its command before it counts as lost, and the grid moves on with it (soft lock-step).
+
 In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
 commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
 client answers the state after the last one.
@@ -240,7 +243,9 @@ class ArmServer:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
                     self._serve_until(due - (CYCLE_TIME if self._is_idle else LEAD_TIME))
-                if self._timer.postpones(self.controller.is_starved):
+                if self._patience > 0.0:
+                    self._await_late_command()
+                elif self._timer.postpones(self.controller.is_starved):
                     continue
             has_served = self._step(self._timer.deadline)
             if not is_ready:
@@ -298,6 +303,20 @@ class ArmServer:
                 self._has_timed_out = True
                 return
 
+    def _await_late_command(self) -> None:
+        """Serves the sockets until the command of this cycle arrives or is lost, or patience ends.
+
+        The cycles after it keep their distance: time that the client takes is not a missed cycle.
+        """
+        deadline = self._timer.deadline + self._patience
+        while self.controller.is_starved and not (self._network.has_lost or self._is_ending):
+            remaining = deadline - self._clock.now()
+            if remaining <= 0.0:
+                break
+            self._poll(min(remaining, _CHECK_PERIOD))
+            self._check_periodically()
+        self._timer.delay(self._clock.now())
+
     def _await_recorder(self) -> None:
         """Waits, in lock-step, until the recorder has read the oldest rows; not for one that was stopped or killed."""
         if self._capture is None or self._recorder_is_lost:
@@ -308,6 +327,11 @@ class ArmServer:
                 self._recorder_is_lost = True
                 return
             self._clock.sleep_until(self._clock.now() + CYCLE_TIME)
+
+    @property
+    def _patience(self) -> float:
+        """Timeout for a command outside of lock-step, [s]; 0: a cycle does not wait for it."""
+        return self._server.patience if self.config.patience is None else self.config.patience
 
     @property
     def _command_timeout(self) -> float:

@@ -57,6 +57,8 @@ class TcpChannel:
 class UdpChannel:
     """A UDP port, for datagrams from and to one client of the main channel. A controller has one, or none.
 
+    A client of another channel can receive datagrams from it, at a port of its own (`ClientLink.direct_datagrams`).
+
     Only datagrams from the client's address (or the configured one) and its state port are accepted. If the client
     sends from another port, the port of its first datagram is accepted until one arrives from the state port. Others
     are unknown senders: they are ignored and counted.
@@ -91,12 +93,21 @@ class ClientLink(Protocol):
         """Sends bytes with a single call. A client that does not read them is disconnected."""
         ...
 
-    def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram to the current destination; does nothing without a client."""
+    def send_datagram(self, datagram: bytes, peer: Peer | None = None) -> None:
+        """Sends a datagram to the current destination; does nothing without a client.
+
+        Args:
+            datagram: The bytes.
+            peer: A client of another channel than the main one, for the port that it named; None: the destination of
+                states.
+        """
         ...
 
     def direct_datagrams(self, peer: Peer, port: int) -> bool:
-        """Directs datagrams to a port of this client while it is connected; returns False for an invalid port."""
+        """Directs datagrams to a port of this client while it is connected; returns False for an invalid port.
+
+        For a client of the main channel this is the destination of states, and datagrams are accepted from there.
+        """
         ...
 
     def drop(self, peer: Peer, reason: str) -> None:

@@ -86,8 +86,8 @@ class ControllerConfig:
     """Cycles by which the playback of commands is delayed, to absorb jitter; None: 10, and 2 for torques, or 0 in
     lock-step."""
     patience: float | None = None
-    """Timeout of lock-step for a command before it counts as lost, [s]; None: 60, so that a client may be paused in a
-    debugger; 0.05 while corruption is simulated."""
+    """Timeout for a command before it counts as lost, [s]. None: in lock-step 60, so that a client may be paused in a
+    debugger, or 0.05 while corruption is simulated; by the clock that of the maker; 0: none."""
     lost_limit: int | None = MOST_LOST
     """Lost commands in a row that are an instability, 10 to 20; None: no number is. While commands are held, one counts
     as lost when it is more than 30 cycles late."""
@@ -150,8 +150,9 @@ class ControllerConfig:
         require_loss_behaviour(self.on_loss)
         if self.mode_delay is not None and not 0.0 <= self.mode_delay <= 5.0:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
-        if self.patience is not None and not 0.01 <= self.patience <= 3600.0:
-            raise InvalidValueError("patience", self.patience, "needs 0.01 to 3600 s")
+        by_clock = not self.lockstep and self.patience == 0.0
+        if not (self.patience is None or by_clock or 0.01 <= self.patience <= 3600.0):
+            raise InvalidValueError("patience", self.patience, "needs 0.01 to 3600 s, or 0 without lock-step")
         if self.prefill is not None and not 0 <= self.prefill <= 100:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:

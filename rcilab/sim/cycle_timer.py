@@ -34,6 +34,10 @@ class CycleTimer:
         """Restarts the grid, after cycles that were not on it, as in lock-step."""
         self.deadline = now
 
+    def delay(self, now: float) -> None:
+        """Moves the current cycle, and with it the grid, to a later time, [s]; an earlier one has no effect."""
+        self.deadline = max(self.deadline, now)
+
     def next(self, now: float) -> float:
         """Returns the time at which the next cycle is due, [s], at most a cycle ago; earlier ones are skipped."""
         self.deadline += self._period

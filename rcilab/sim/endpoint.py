@@ -73,6 +73,7 @@ class Endpoint:
         self._target = self._fixed_target
         self._connections: dict[socket.socket, _Connection] = {}
         self._sockets: dict[Peer, socket.socket] = {}
+        self._ports: dict[Peer, int] = {}  # For datagrams to clients of other channels than the main one.
         self._owner: Peer | None = None  # The client of the main channel whose datagrams are accepted.
         self._sender: tuple[str, int] | None = None  # Its UDP address, once a datagram has arrived.
         self._has_reported_unknown = False
@@ -152,11 +153,17 @@ class Endpoint:
         self._arrivals.clear()
         return arrivals
 
-    def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram to the current destination, if one is known. If it cannot be sent, it is lost."""
-        if self._target is not None and self._datagrams is not None:
+    def send_datagram(self, datagram: bytes, peer: Peer | None = None) -> None:
+        """Sends a datagram to a destination, if it is known. If it cannot be sent, it is lost.
+
+        Args:
+            datagram: The bytes.
+            peer: A client of another channel than the main one; None: the destination of states.
+        """
+        target = self._target if peer is None else self._target_of(peer)
+        if target is not None and self._datagrams is not None:
             try:
-                self._datagrams[0].sendto(datagram, self._target)
+                self._datagrams[0].sendto(datagram, target)
             except OSError:  # No route or no buffer: the state is lost, as on any network.
                 return
 
@@ -180,6 +187,7 @@ class Endpoint:
             return
         sock.close()
         del self._connections[sock]
+        self._ports.pop(peer, None)
         if peer is self._owner:
             self._owner = self._sender = None
             self._state_port = self._own_port
@@ -191,10 +199,13 @@ class Endpoint:
     def direct_datagrams(self, peer: Peer, port: int) -> bool:
         """Directs datagrams to a UDP port of this client until it disconnects; returns False for an invalid port.
 
-        A host given with `--client` is kept.
+        A host given with `--client` is kept. A client of another channel than the main one only receives datagrams.
         """
         if not LOWEST_CLIENT_PORT <= port <= 65535 or peer not in self._sockets:
             return False
+        if peer.channel is not self._main:
+            self._ports[peer] = port
+            return True
         if peer is not self._owner:
             self._own(peer)
         self._state_port = port
@@ -208,8 +219,13 @@ class Endpoint:
             sock.close()
         self._connections.clear()
         self._sockets.clear()
+        self._ports.clear()
         self._client_sockets.clear()
         self._watched = []
+
+    def _target_of(self, peer: Peer) -> tuple[str, int] | None:
+        port = self._ports.get(peer)
+        return None if port is None else (peer.address if self.fixed_host is None else self.fixed_host, port)
 
     def _own(self, peer: Peer) -> None:
         """Makes a client the one whose datagrams are accepted."""

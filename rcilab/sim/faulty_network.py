@@ -82,9 +82,11 @@ class FaultyNetwork:
                 self._send_due()
                 return arrivals
 
-    def send_datagram(self, datagram: bytes) -> None:
-        """Sends a datagram, with the faults."""
-        if self._states.is_clean:
+    def send_datagram(self, datagram: bytes, peer: Peer | None = None) -> None:
+        """Sends a datagram; the faults apply to states alone."""
+        if peer is not None:
+            self._endpoint.send_datagram(datagram, peer)
+        elif self._states.is_clean:
             self.has_lost = False
             self._endpoint.send_datagram(datagram)
         else:

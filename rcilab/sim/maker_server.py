@@ -151,6 +151,15 @@ class MakerServer(Protocol):
         ...
 
     @property
+    def patience(self) -> float:
+        """How long a cycle of a motion waits for its command outside of lock-step, [s]; 0: not at all.
+
+        The controller then follows a client that does not keep real time, as in lock-step, but never faster than 1 kHz;
+        see `ArmServer`. The configuration may replace it.
+        """
+        ...
+
+    @property
     def is_quiet(self) -> bool:
         """Whether nothing moves and no response is pending: a cycle may then be computed early."""
         ...
