@@ -127,6 +127,7 @@ DESCRIPTION = build_franka(
         near_ends=_NEAR_ENDS,
         sources={
             "joint": f"{LIMITS}, joint space; ranges, velocities and torques: {URDF}",
+            "near_ends": URDF,
             "translation": f"{LIMITS}, Cartesian space, Translation",
             "rotation": f"{LIMITS}, Cartesian space, Rotation",
             "elbow": f"{LIMITS}, Cartesian space, Elbow",
