@@ -180,8 +180,10 @@ class FciController:
 
     @property
     def wants_commands(self) -> bool:
-        """Whether a client's motion is in progress."""
-        return self.phase is Phase.MOVING and not self.playout.is_finished
+        """Whether a client's motion is in progress; from its first command on, before which it reads several states."""
+        playout = self.playout
+        has_begun = playout.is_playing or len(playout) > 0
+        return self.phase is Phase.MOVING and has_begun and not playout.is_finished
 
     @property
     def is_starved(self) -> bool:
