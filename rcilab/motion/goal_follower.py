@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from rcilab.core.limits import JointLimits
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN
@@ -15,7 +17,8 @@ class GoalFollower:
     """Moves every joint by itself and time-optimally to standstill at its goal. Owned by the thread of the cycle.
 
     It starts at standstill, also outside the range of a joint. Velocity, acceleration and jerk stay inside the limits,
-    `LIMIT_MARGIN` of them at most.
+    `LIMIT_MARGIN` of them at most. Where the velocity bound decreases towards the ends of the range, a joint keeps that
+    of its goal on the whole way.
 
     Args:
         limits: Bounds of the joints; their range is not checked.
@@ -25,8 +28,10 @@ class GoalFollower:
 
     def __init__(self, limits: JointLimits, q: Sequence[float], velocity: Sequence[float]) -> None:
         zero = [0.0] * len(q)
-        bounds = (LIMIT_MARGIN * limits.velocity).tolist()
-        self._velocity = list(map(min, velocity, bounds))
+        self._limits = limits
+        self._largest = velocity
+        self._goal: list[float] | None = None
+        self._velocity = zero
         acceleration, jerk = (LIMIT_MARGIN * limits.acceleration).tolist(), (LIMIT_MARGIN * limits.jerk).tolist()
         self._axes = _ruckig.Stepper(q, zero, zero, acceleration, jerk)
         self._zero = zero
@@ -37,17 +42,25 @@ class GoalFollower:
         slow, weak = _STANDSTILL
         return all(-slow < v < slow for v in self._axes.dq) and all(-weak < a < weak for a in self._axes.ddq)
 
-    def step(self, goal: Sequence[float] | None) -> list[float]:
-        """Advances one cycle and returns the joint angles, n plain floats, [rad].
+    def set_goal(self, q: Sequence[float]) -> None:
+        """Moves to these joint angles, n finite numbers, [rad], from the next step on."""
+        self._goal = list(q)
+        lowest, highest = self._limits.velocity_bounds(np.array(self._goal))
+        bounds: list[float] = (LIMIT_MARGIN * np.minimum(-lowest, highest)).tolist()
+        self._velocity = list(map(min, self._largest, bounds))
 
-        Args:
-            goal: Joint angles to move to, n finite numbers, [rad]; None: every joint stops.
+    def stop(self) -> None:
+        """Stops every joint from the next step on."""
+        self._goal = None
+
+    def step(self) -> list[float]:
+        """Advances one cycle and returns the joint angles, n plain floats, [rad].
 
         Raises:
             PlanningError: The planner found no stop; not observed inside the limits.
         """
-        if goal is None:
+        if self._goal is None:
             self._axes.step_to_velocity(self._zero)
         else:
-            self._axes.step_to_positions(goal, self._velocity)
+            self._axes.step_to_positions(self._goal, self._velocity)
         return list(self._axes.q)

@@ -31,7 +31,6 @@ class GoalGenerator:
 
     def __init__(self, bounds: MotionLimits, velocity: Sequence[float], q: list[float]) -> None:
         self._n = bounds.model.n
-        self._goal: list[float] | None = None
         self._follower = GoalFollower(bounds.model.limits.joint, q, velocity)
         self._goal_monitor = JointMonitor(bounds.limits.joint)
         self._reference = JointReference(bounds, q, checks_box=True)
@@ -45,7 +44,7 @@ class GoalGenerator:
         command = playback.command
         assert command is not None  # No cycle is lost.
         if command.finished:
-            self._goal = None
+            self._follower.stop()
             return self._advance()
         goal = list(command.q[: self._n])
         if not isfinite(sum(goal)):
@@ -55,7 +54,7 @@ class GoalGenerator:
         violations = self._goal_monitor.step(goal)
         if violations:
             return GeneratorOutput(violations=tuple(violations))
-        self._goal = goal
+        self._follower.set_goal(goal)
         return self._advance()
 
     @property
@@ -68,4 +67,4 @@ class GoalGenerator:
         return None if self._follower.is_stationary else self._advance()
 
     def _advance(self) -> GeneratorOutput:
-        return self._reference.step(self._follower.step(self._goal), 1)
+        return self._reference.step(self._follower.step(), 1)
