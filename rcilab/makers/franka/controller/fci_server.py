@@ -6,9 +6,14 @@ at the beginning and at the end of the motion, with one id.
 
 from __future__ import annotations
 
-from rcilab.core.errors import DecodeError
+from typing import NamedTuple
+
+from rcilab.core.errors import DecodeError, ModelError
 from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
+from rcilab.makers.franka.controller.model_library import build_model_library, runs_here
 from rcilab.makers.franka.controller.phases import IN_MOTION, Phase
+from rcilab.makers.franka.controller.robot_model import build_robot_model
 from rcilab.makers.franka.wire.command_packet import decode_command
 from rcilab.makers.franka.wire.frame import (
     FrameReader,
@@ -30,6 +35,7 @@ from rcilab.makers.franka.wire.requests import (
 )
 from rcilab.makers.franka.wire.state_packet import encode_state
 from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, FciVersion, Status
+from rcilab.robots import RobotDescription
 from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
@@ -43,9 +49,32 @@ _VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
 def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
     """Returns the FCI server of an arm with a configuration."""
     version = _VERSIONS[arm.model.name]
+    # Its clients filter and limit their commands against q_d of the state, which a delay would make unstable.
+    arm.playout.prefill = 0 if config.prefill is None else config.prefill
     controller = FciController(arm, version)
     controller.limit_table = config.limit_table
     return FciServer(controller, DEFAULT_PORT if config.port is None else config.port, config.udp_port)
+
+
+class _Models(NamedTuple):
+    """What clients get as the model of the arm; made before the first cycle, because it takes longer than one."""
+
+    urdf: bytes
+    library: bytes
+    """Empty in version 10, or where it cannot be compiled."""
+    problem: str
+    """Why it cannot be."""
+
+    @classmethod
+    def of(cls, description: RobotDescription, version: FciVersion) -> _Models:
+        """Returns the models of an arm."""
+        urdf = build_robot_model(description).encode()
+        if LoadModelLibrary not in version.commands:
+            return cls(urdf, b"", "")
+        try:
+            return cls(urdf, build_model_library(description), "")
+        except ModelError as error:
+            return cls(urdf, b"", str(error))
 
 
 class FciServer:
@@ -66,6 +95,9 @@ class FciServer:
             TcpChannel(protocol=_PROTOCOL, port=port, open_framer=FrameReader),
             UdpChannel(port=0 if udp_port is None else udp_port, target_port=0),
         )
+        self._hand = HandServer(HAND_PORT if port else 0)
+        self.channels = (*self.channels, self._hand.channel)
+        self._models = _Models.of(controller.model.description, controller.version)
         self._link: ClientLink
         self._peer: Peer | None = None
         self._version: FciVersion | None = None
@@ -81,18 +113,28 @@ class FciServer:
     def attach(self, link: ClientLink) -> None:
         """Sets the link to clients."""
         self._link = link
+        self._hand.attach(link)
 
     def connect(self, peer: Peer) -> None:
         """Accepts a client; states flow after its Connect."""
-        self._peer, self._version = peer, None
+        if peer.channel is self._hand.channel:
+            self._hand.connect(peer)
+        else:
+            self._peer, self._version = peer, None
 
     def disconnect(self, peer: Peer) -> bool:
-        """Stops the arm; returns whether this ends a motion."""
+        """Stops the arm, or the fingers; returns whether this ends a motion of the arm."""
+        if peer.channel is self._hand.channel:
+            self._hand.disconnect()
+            return False
         self._peer = self._version = self._move = self._recovery = None
         return self.controller.lose_client()
 
     def receive(self, peer: Peer, frame: bytes) -> None:
         """Handles a request."""
+        if peer.channel is self._hand.channel:
+            self._hand.receive(peer, frame)
+            return
         header = decode_header(frame)
         try:
             request = decode_request(frame, self._version)
@@ -119,11 +161,13 @@ class FciServer:
     def step(self, *, is_sent: bool = True) -> None:
         """Advances by one cycle."""
         self.controller.step(is_sent=is_sent)
+        self._hand.step()
 
     def send_states(self) -> None:
         """Sends the last state."""
         if self._version is not None:
             self._link.send_datagram(encode_state(self.controller.packet, self._version))
+        self._hand.send_state()
 
     def settle(self) -> None:
         """Sends the answers that the state just sent has made due."""
@@ -173,18 +217,31 @@ class FciServer:
                     self._recovery = command_id
                 else:
                     self._answer(kind, command_id, found)
-            case GetCartesianLimit() | GetRobotModel() | LoadModelLibrary():
-                self._answer(kind, command_id, Status.NOT_POSSIBLE)
+            case GetRobotModel():
+                self._answer(kind, command_id, Status.SUCCESS, content=self._models.urdf)
+            case LoadModelLibrary(architecture=architecture, system=system):
+                self._send_library(command_id, architecture, system)
+            case GetCartesianLimit():
+                self._answer(kind, command_id, Status.NOT_POSSIBLE, "no virtual walls are set")
             case _ if kind in SETTERS:
                 status, why = controller.set(request)
                 self._answer(kind, command_id, status, why)
             case _:
                 self._link.drop(peer, f"sent {kind.__name__} in the wrong place")
 
-    def _answer(self, kind: type[Request], command_id: int, status: Status, why: str = "") -> None:
+    def _send_library(self, command_id: int, architecture: int, system: int) -> None:
+        models = self._models
+        why = models.problem if runs_here(architecture, system) else "the client's machine is of another kind"
+        status = Status.ERROR if why else Status.SUCCESS
+        self._answer(LoadModelLibrary, command_id, status, why, content=models.library)
+
+    def _answer(
+        self, kind: type[Request], command_id: int, status: Status, why: str = "", *, content: bytes = b""
+    ) -> None:
         assert self._peer is not None
         assert self._version is not None
-        self._link.send_frame(self._peer, encode_response(self._version, kind, command_id, status))
+        content = content if status is Status.SUCCESS else b""
+        self._link.send_frame(self._peer, encode_response(self._version, kind, command_id, status, content))
         is_refusal = status not in (Status.SUCCESS, Status.MOTION_STARTED, Status.PREEMPTED)
         if is_refusal:
             text = f"{kind.__name__} was answered: {status.value}" + (f"; {why}" if why else "")

@@ -7,7 +7,6 @@ its width; it is set from outside, and none is there after power-up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.franka.wire.gripper import Grasp, HandStatus, Homing, MoveFingers
@@ -68,10 +67,9 @@ class FrankaHand:
         self.is_grasped = False
         return None
 
-    def stop(self) -> Literal[True] | None:
-        """Stops the fingers and lets go; returns whether this ends a command."""
-        was_moving, self._task, self.is_grasped = self._task is not None, None, False
-        return True if was_moving else None
+    def stop(self) -> None:
+        """Stops the fingers and lets go."""
+        self._task, self.is_grasped = None, False
 
     def step(self) -> HandStatus | None:
         """Advances by one cycle; returns the status of a command that has ended."""
