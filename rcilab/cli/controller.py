@@ -149,7 +149,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "leaves the commanded pose",
     )
     parser.add_argument("--loop-back", action="store_true", help="connect digital outputs to the inputs")
-    parser.add_argument("--limits", metavar="TABLE", help="Cartesian limits: manual or sdk (manual)")
+    parser.add_argument("--limits", metavar="TABLE", help="Cartesian limits: manual or sdk (RCI: manual; FCI: sdk)")
     parser.add_argument(
         "--force-sign",
         metavar="SIGN",
@@ -292,7 +292,7 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         on_loss=option("on_loss", "hold"),
         auto_limit=option("auto_limit", False),
         loop_back=option("loop_back", False),
-        limit_table=option("limits", "manual"),
+        limit_table=option("limits"),
         force_sign=option("force_sign", "on-arm"),
         start=_parsed(option("start"), lambda text: parse_joints(text, n)),
         tool=_parsed(option("tool"), parse_tool),

@@ -98,8 +98,9 @@ class ControllerConfig:
     """Whether commanded joint angles are stopped inside the soft limits, instead of raising a fault beyond them."""
     loop_back: bool = False
     """Whether every digital output is wired to the input of the same number."""
-    limit_table: str = "manual"
-    """Whose Cartesian limits commands are checked against: the manual's, or those of the vendor's SDK."""
+    limit_table: str | None = None
+    """Whose Cartesian limits commands are checked against: "manual", or "sdk" for those of the vendor's library; None:
+    the maker's default."""
     force_sign: ForceSign = "on-arm"
     """Sign of `tau_ext_in_base` and `tau_ext_in_stiff`. That of a real arm is not verified: the manual does not say."""
     start: Floats | None = None

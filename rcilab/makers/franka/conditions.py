@@ -110,7 +110,9 @@ def _inverse_row(row: Condition) -> Condition:
 def _tool_row(row: Condition) -> Condition:
     source = f"{_PAGE}, Cartesian trajectory, necessary; {_ERRORS}"
     if row.signal != "arm_angle":
-        return replace(row, fault=_TOOL_ERRORS[row.order], source=f"{source} (norm: rcilab)")
+        is_library = (row.signal, row.order) == ("translation", 1)
+        note = _LIBRARY_VELOCITY if is_library else "norm: rcilab"
+        return replace(row, fault=_TOOL_ERRORS[row.order], source=f"{source} ({note})")
     elbow = replace(
         row,
         quantity=row.quantity.replace("arm angle", "elbow"),
@@ -122,6 +124,9 @@ def _tool_row(row: Condition) -> Condition:
     if row.order:
         return elbow
     return replace(elbow, formula="q_3,min < q_3,c < q_3,max", bounds=_elbow_range)
+
+
+_LIBRARY_VELOCITY = "norm: rcilab; bound: rate limiter of the client library, where the page has 1.7 m/s"
 
 
 def _elbow_range(limits: AnyLimits) -> Bounds:
@@ -271,6 +276,8 @@ def _fr3_row(row: Condition) -> Condition:
         return replace(row, fault=FrankaError.JOINT_POSITION_LIMITS_VIOLATION)
     if row.id in ("joint.velocity", "inverse.joint.velocity"):
         return replace(row, formula="dq_min(q) < dq_c < dq_max(q)", source=f"{_FR3_VELOCITY}; {_ERRORS}")
+    if row.id == "cartesian.velocity.translation":
+        return replace(row, source=row.source.replace(_LIBRARY_VELOCITY, "norm: rcilab"))
     return row
 
 

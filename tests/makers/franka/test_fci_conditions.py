@@ -15,8 +15,9 @@ from rcilab.conformance.common_conditions import condition_table
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
-from rcilab.makers.franka.conditions import FCI_CONDITIONS
+from rcilab.makers.franka.conditions import FCI_CONDITIONS, FR3_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.limit_tables import cartesian_limits
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
@@ -63,12 +64,24 @@ def test_bounds_are_the_numbers_of_the_page():
     assert bound("joint.torque") == [87] * 4 + [12] * 3
     assert bound("torque.rate") == [1000] * 7
     assert [bound(f"cartesian.{name}.translation") for name in ("velocity", "acceleration", "jerk")] == [
-        [1.7], [13.0], [6500.0]]  # fmt: skip
+        [2.0], [13.0], [6500.0]]  # fmt: skip
     assert [bound(f"cartesian.{name}.rotation") for name in ("velocity", "acceleration", "jerk")] == [
         [2.5], [25.0], [12500.0]]  # fmt: skip
     assert [bound(f"elbow.{name}") for name in ("position", "velocity", "acceleration", "jerk")] == [
         [2.8973], [2.175], [10.0], [5000.0]]  # fmt: skip
     assert bound("lost.commands") == [20]
+
+
+def test_the_stricter_translation_velocity_of_the_page_is_a_setting_and_the_report_says_which_applies():
+    strict = cartesian_limits(PANDA.limits, "manual")
+    assert FCI.find("cartesian.velocity.translation").bounds(strict)[1].tolist() == [1.7]
+    assert cartesian_limits(PANDA.limits) is PANDA.limits
+    assert "page has 1.7 m/s" in str(check(MOTION, PANDA, mode="cartesian_position", distance=None))
+    fr3 = load_model("FR3")
+    assert cartesian_limits(fr3.limits, "manual") is fr3.limits
+    assert not any("1.7" in row.source for row in FR3_CONDITIONS.conditions)
+    with pytest.raises(InvalidValueError, match="known: sdk, manual"):
+        cartesian_limits(PANDA.limits, "page")
 
 
 def test_a_condition_that_raises_an_error_is_necessary_and_ids_are_unique():

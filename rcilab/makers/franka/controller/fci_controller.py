@@ -29,6 +29,7 @@ from rcilab.makers.franka.controller.phases import (
 from rcilab.makers.franka.controller.reporter import StateReporter
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
 from rcilab.makers.franka.wire.command_packet import CommandPacket
 from rcilab.makers.franka.wire.requests import Move, Request
 from rcilab.makers.franka.wire.state_packet import NO_ERRORS, StatePacket, flags_of
@@ -97,6 +98,7 @@ class FciController:
         self._table = conditions()
         self._motion: MotionKind | None = None
         self._countdown = 0
+        self._limit_table = DEFAULT_TABLE
         self._message_id = 0
         arm.on_loss = "bridge"
         arm.playout.window = SUCCESS_WINDOW
@@ -117,13 +119,12 @@ class FciController:
 
     @property
     def limit_table(self) -> str:
-        """Whose limits of the tool's motion apply."""
-        return "manual"
+        """Whose limits of the tool's motion apply, from the next motion on: "sdk" or "manual"."""
+        return self._limit_table
 
     @limit_table.setter
     def limit_table(self, table: str) -> None:
-        if table != "manual":
-            raise InvalidValueError("limit table", table, "is unknown; known: manual")
+        self._limit_table = require_table(table)
 
     @property
     def cycle_number(self) -> int:
@@ -246,7 +247,7 @@ class FciController:
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
         self.arm.prepare_motion(motion.mode)
-        self.arm.begin_motion(self.model.limits, start=_START)
+        self.arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table), start=_START)
         self._enter(Phase.MOVING)
         return Status.MOTION_STARTED
 

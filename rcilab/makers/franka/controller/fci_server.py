@@ -52,7 +52,8 @@ def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
     # Its clients filter and limit their commands against q_d of the state, which a delay would make unstable.
     arm.playout.prefill = 0 if config.prefill is None else config.prefill
     controller = FciController(arm, version)
-    controller.limit_table = config.limit_table
+    if config.limit_table is not None:
+        controller.limit_table = config.limit_table
     return FciServer(controller, DEFAULT_PORT if config.port is None else config.port, config.udp_port)
 
 

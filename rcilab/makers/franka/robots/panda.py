@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from rcilab.makers.franka.conditions import fci_conditions
+from rcilab.makers.franka.limit_tables import PANDA_SDK_TRANSLATION
 from rcilab.makers.franka.robots.arm import PANDA_PAGE, build_franka, craig_link, franka_limits
 
 IDENTIFIED = (
@@ -37,12 +38,13 @@ DESCRIPTION = build_franka(
     name="Panda",
     limits=franka_limits(
         _TABLE,
-        translation=(1.7, 13.0, 6500.0),
+        translation=(PANDA_SDK_TRANSLATION, 13.0, 6500.0),
         rotation=(2.5, 25.0, 12500.0),
         elbow=(2.175, 10.0, 5000.0),
         sources={
             "joint": f"{PANDA_PAGE}, joint space limits",
-            "translation": f"{PANDA_PAGE}, Cartesian limits, Translation",
+            "translation": f"{PANDA_PAGE}, Cartesian limits, Translation; velocity: rate limiter of the client library, "
+            "where the page has 1.7 m/s",
             "rotation": f"{PANDA_PAGE}, Cartesian limits, Rotation",
             "elbow": f"{PANDA_PAGE}, Cartesian limits, Elbow",
         },

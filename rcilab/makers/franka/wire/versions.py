@@ -103,6 +103,8 @@ _NEAREST = {
     Status.NOT_POSSIBLE: Status.ERROR,
     Status.EMERGENCY_ABORTED: Status.ABORTED,
     Status.REFLEX_ABORTED: Status.ABORTED,
+    Status.INPUT_ERROR_ABORTED: Status.ABORTED,
+    Status.ABORTED: Status.NOT_POSSIBLE,
 }
 """Which status stands for one that a version lacks."""
 

@@ -41,7 +41,8 @@ def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
     controller = RciController(arm, mode_delay=config.mode_delay_cycles, force_sign=config.force_sign)
     controller.auto_limit = config.auto_limit
     controller.loop_back = config.loop_back
-    controller.limit_table = config.limit_table
+    if config.limit_table is not None:
+        controller.limit_table = config.limit_table
     port = DEFAULT_PORT if config.port is None else config.port
     return RciServer(controller, port, config.udp_port, config.client_port)
 
