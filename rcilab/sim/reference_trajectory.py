@@ -14,6 +14,9 @@ from rcilab.core.limits import JointLimits
 from rcilab.motion.differences import derivatives_from_differences, differences_from_derivatives
 from rcilab.motion.stop import plan_stop
 
+STEADY = (
+    0.01  # [rad/s^2] Below it a commanded velocity is constant: far above rounding, far below a motion's. A choice.
+)
 JOIN_SHARE = 2.0  # Upper bound for the start of a stop, in units of the arm's limits; a tuning value.
 
 
@@ -52,6 +55,11 @@ class ReferenceTrajectory:
             rows = np.frombuffer(self._pack(*self.q, *self.dq, *self.ddq))  # Faster than np.array of a list.
             self._arrays, self._arrays_version = (rows[:n], rows[n : 2 * n], rows[2 * n :]), self.version
         return self._arrays
+
+    @property
+    def is_accelerating(self) -> bool:
+        """Whether the commanded velocity of a joint changes by more than rounding."""
+        return max(self.ddq) > STEADY or min(self.ddq) < -STEADY
 
     def reset(self, q: Sequence[float]) -> None:
         """Sets the commanded angles of a stationary arm."""

@@ -31,7 +31,6 @@ import numpy as np
 from rcilab.core.arrays import Array, make_readonly, readonly_copy, scalar
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
-from rcilab.core.spatial import Rotation9
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 from rcilab.makers.rokae.controller.settings import Settings
 from rcilab.makers.rokae.faults import Fault
@@ -41,6 +40,7 @@ from rcilab.sim.drive_report import DriveReport
 from rcilab.sim.force_frame import ForceAxes
 from rcilab.sim.tool_kinematics import ToolKinematics
 from rcilab.sim.virtual_arm import CycleSignals
+from rcilab.sim.wrench import wrench_at, wrench_in
 
 _CYCLE = scalar(CYCLE_TIME)  # [s]
 
@@ -165,20 +165,9 @@ class StateReporter:
         self._axes.follow(velocity, tool)
         if self._is_wrench_at_tool:
             return wrench
-        fx, fy, fz, mx, my, mz = wrench.tolist()
-        if not (fx or fy or fz or mx or my or mz):
+        if not wrench.any():
             return wrench
         T_base_tool = tool.pose
-        x, y, z = (T_base_tool @ self._axes.T_tool_force).parts[1]
-        tx, ty, tz = T_base_tool.parts[1]
-        ax, ay, az = tx - x, ty - y, tz - z
-        mx, my, mz = mx + ay * fz - az * fy, my + az * fx - ax * fz, mz + ax * fy - ay * fx
-        if self._axes.is_world:
-            return readonly_copy((fx, fy, fz, mx, my, mz))
-        r = self._axes.rotation(T_base_tool)
-        return readonly_copy((*_in_axes(r, fx, fy, fz), *_in_axes(r, mx, my, mz)))
-
-
-def _in_axes(r: Rotation9, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Returns a vector in base axes as a vector in the axes that are the columns of a rotation."""
-    return r[0] * x + r[3] * y + r[6] * z, r[1] * x + r[4] * y + r[7] * z, r[2] * x + r[5] * y + r[8] * z
+        T_base_force = T_base_tool @ self._axes.T_tool_force
+        moved = wrench_at(wrench, T_base_tool.parts[1], T_base_force.parts[1])
+        return moved if self._axes.is_world else wrench_in(moved, self._axes.rotation(T_base_tool))

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from rcilab.core.arrays import JointVector
 from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import DecodeError, InvalidValueError
-from rcilab.core.state import RobotState
 from rcilab.core.message_layout import Field, Layout
+from rcilab.core.state import RobotState
 
 COMMAND = Layout(
     "robot command",

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from rcilab.core.errors import DecodeError, InvalidValueError
+from rcilab.core.message_layout import Field, Layout
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 from rcilab.makers.rokae.faults import FAULT_COUNT, Fault
-from rcilab.core.message_layout import Field, Layout
 
 STATE = Layout(
     "robot state",
