@@ -265,6 +265,7 @@ class FciController:
         if refusal is not None:
             return refusal
         if self.phase is Phase.IDLE:
+            self._reporter.reset_collisions()
             return Status.SUCCESS
         self._countdown = RECOVERY_TIME
         self._enter(Phase.RECOVERING)
@@ -313,6 +314,7 @@ class FciController:
         self._countdown -= 1
         if self._countdown <= 0 and self.arm.commanded.is_stationary:
             self.faults = ()
+            self._reporter.reset_collisions()
             self._enter(Phase.IDLE)
 
     def _check_reflex(self) -> None:

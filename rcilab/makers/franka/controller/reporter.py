@@ -4,8 +4,10 @@ Desired values (`_d`) are those of the reference, which the controller follows; 
 filter lies between them that this arm would not follow. While torques move the arm, both are the measured ones.
 
 * The elbow is the angle of joint 3, and +1 where joint 4 is above the angle at which the arm is stretched, else -1.
-* External forces are those that the environment exerts on the arm, at the origin of the stiffness frame K, in axes of
-  the base (`O_F_ext_hat_K`) or of K (`K_F_ext_hat_K`).
+* External torques and forces have the sign of libfranka's robot_state.h: those that the arm exerts on its environment
+  are positive. The wrench is at the origin of the stiffness frame K, in axes of the base (`O_F_ext_hat_K`) or of K
+  (`K_F_ext_hat_K`). In rcilab's own state they are those that the environment exerts on the arm.
+* A contact disappears with its force, a collision with the error recovery.
 * The drives have no elasticity: theta is q, dtheta is dq.
 * tau_J has gravity; tau_J_d and commanded torques have not: the controller compensates it.
 * The acceleration sensors read a stationary arm's: the reaction to gravity, in the axes of their link.
@@ -21,13 +23,14 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
-from rcilab.makers.franka.controller.contact_flags import ContactFlags
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.state_packet import ACCELEROMETERS, NUMBERS, PLACES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
+from rcilab.sim.contact_detector import ContactDetector, Contacts
 from rcilab.sim.virtual_arm import CycleSignals
+from rcilab.sim.wrench import wrench_at, wrench_in
 
 GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
@@ -59,7 +62,7 @@ class StateReporter:
     def configure(self, model: RobotModel, settings: Settings) -> None:
         """Sets new frames, loads or thresholds; only at standstill."""
         self._model, self._settings = model, settings
-        self._flags = ContactFlags(settings.thresholds)
+        self._contacts = ContactDetector(settings.thresholds)
         self._lever = settings.EE_T_K
         numbers = self.numbers
         for name, pose in (
@@ -134,7 +137,12 @@ class StateReporter:
     @property
     def has_collision(self) -> tuple[bool, bool]:
         """Whether an external torque, and an external force, is above its upper threshold in the last state."""
-        return self._flags.has_torque_collision, self._flags.has_force_collision
+        present = self._contacts.present
+        return any(present.joint_collision), any(present.cartesian_collision)
+
+    def reset_collisions(self) -> None:
+        """Clears the flags of collisions, as an error recovery does."""
+        self._contacts.reset()
 
     def _write(self, signals: CycleSignals, rates: Array, tau_d: Array) -> None:
         commanded, tool_c, measured, tool, _, tau_ext, wrench = signals
@@ -158,27 +166,22 @@ class StateReporter:
         numbers[place["ddq_d"]] = ddq_c
         numbers[place["O_dP_EE_d"]] = numbers[place["O_dP_EE_c"]] = rates[:6]
         numbers[place["O_ddP_EE_c"]] = rates[6:]
-        numbers[place["tau_ext_hat_filtered"]] = tau_ext
+        numbers[place["tau_ext_hat_filtered"]] = 0.0 - tau_ext  # Not -0.0 without any.
         at_K, self._wrench_in_K = self._at_stiffness_frame(tool.pose, wrench)
-        numbers[place["O_F_ext_hat_K"]] = at_K
-        numbers[place["K_F_ext_hat_K"]] = self._wrench_in_K
-        is_accelerating = bool(np.abs(ddq_c).max() > 0.0)
-        flags = self._flags.step(tau_ext, self._wrench_in_K, is_accelerating=is_accelerating)
-        for name, values in zip(
-            ("joint_contact", "cartesian_contact", "joint_collision", "cartesian_collision"), flags, strict=True
-        ):
-            numbers[place[name]] = values
+        numbers[place["O_F_ext_hat_K"]] = 0.0 - at_K
+        numbers[place["K_F_ext_hat_K"]] = 0.0 - self._wrench_in_K
+        contacts = self._contacts
+        contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
+        for name, flags in zip(Contacts._fields, contacts.shown, strict=True):
+            numbers[place[name]] = flags
 
     def _at_stiffness_frame(self, T_base_tool: Pose, wrench: Array) -> tuple[Array, Array]:
         """Returns a wrench on the end effector (base axes, its origin) at the origin of K, in base and in K axes."""
         if not wrench.any():
             return self._zeros6, self._zeros6
         T_base_K = T_base_tool @ self._lever
-        arm = T_base_tool.position - T_base_K.position
-        force = wrench[:3]
-        at_K = np.concatenate((force, wrench[3:] + np.cross(arm, force)))
-        R = T_base_K.rotation
-        return at_K, readonly_copy(np.concatenate((R.T @ at_K[:3], R.T @ at_K[3:])))
+        at_K = wrench_at(wrench, T_base_tool.parts[1], T_base_K.parts[1])
+        return at_K, wrench_in(at_K, T_base_K.parts[0])
 
     def _side(self, q4: float) -> float:
         return 1.0 if q4 > self._flip else -1.0

@@ -26,8 +26,9 @@ from rcilab.makers.franka.wire.requests import (
 )
 from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
-from rcilab.sim.arm_parameters import ArmParameters, Floats
+from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.arm_setup import ArmSetup
+from rcilab.sim.contact_detector import ContactThresholds
 from rcilab.sim.filters import SAMPLING_RATE
 
 LONGEST_TOOL = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
@@ -39,20 +40,17 @@ JOINT_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N
 DEFAULT_CARTESIAN_STIFFNESS = (2000.0, 2000.0, 2000.0, 100.0, 100.0, 100.0)  # [N/m], [N m/rad] The same.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Thresholds:
-    """What setCollisionBehavior sets: torques of 7 joints [N m], forces and moments of 6 axes [N, N m]."""
-
-    contact_torque: Floats = (20.0,) * 7
-    """Lower thresholds, while the arm does not accelerate."""
-    collision_torque: Floats = (20.0,) * 7
-    """Upper ones."""
-    contact_torque_accelerating: Floats = (20.0,) * 7
-    collision_torque_accelerating: Floats = (20.0,) * 7
-    contact_force: Floats = (20.0,) * 6
-    collision_force: Floats = (20.0,) * 6
-    contact_force_accelerating: Floats = (20.0,) * 6
-    collision_force_accelerating: Floats = (20.0,) * 6
+DEFAULT_THRESHOLDS = ContactThresholds(
+    contact_torque=(20.0,) * 7,
+    collision_torque=(20.0,) * 7,
+    contact_torque_accelerating=(20.0,) * 7,
+    collision_torque_accelerating=(20.0,) * 7,
+    contact_force=(20.0,) * 6,
+    collision_force=(20.0,) * 6,
+    contact_force_accelerating=(20.0,) * 6,
+    collision_force_accelerating=(20.0,) * 6,
+)
+"""After power-up; rcilab's own choice."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +65,8 @@ class Settings(ArmParameters):
     """The hand, in the flange frame."""
     client_load: Payload
     """What setLoad sets; `load` is this and the hand."""
-    thresholds: Thresholds = Thresholds()
+    thresholds: ContactThresholds = DEFAULT_THRESHOLDS
+    """Of setCollisionBehavior."""
     free_axes: tuple[bool, ...] = (True,) * 6
     free_elbow: bool = True
     velocity_filter: float = SAMPLING_RATE
@@ -195,7 +194,7 @@ def _load(request: SetLoad) -> Payload:
     )
 
 
-def _thresholds(request: SetCollisionBehavior) -> Thresholds:
+def _thresholds(request: SetCollisionBehavior) -> ContactThresholds:
     pairs = (
         (request.lower_torque_acceleration, request.upper_torque_acceleration, "torque", "N m"),
         (request.lower_torque_nominal, request.upper_torque_nominal, "torque", "N m"),
@@ -210,7 +209,7 @@ def _thresholds(request: SetCollisionBehavior) -> Thresholds:
                     (low, high),
                     f"{unit}: the upper one must not be below the lower, nor either below 0",
                 )
-    return Thresholds(
+    return ContactThresholds(
         contact_torque=request.lower_torque_nominal,
         collision_torque=request.upper_torque_nominal,
         contact_torque_accelerating=request.lower_torque_acceleration,

@@ -1,0 +1,84 @@
+"""External forces in the state, the flags of contacts and collisions, and the reflex that a collision causes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rcilab.core.spatial import Pose
+from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.controller.phases import Phase
+from rcilab.makers.franka.controller.settings import DEFAULT_THRESHOLDS
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.franka.wire.command_packet import CommandPacket
+from rcilab.makers.franka.wire.requests import Move
+from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.versions import VERSION_5, Status
+from rcilab.model.robot_model import load_model
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
+
+MODEL = load_model("Panda")
+SETTLED = 300  # [cycles]
+ZERO = (0.0,) * 7
+
+
+@pytest.fixture
+def controller() -> FciController:
+    arm = VirtualArm(MODEL, build_plant("mujoco", MODEL), prefill=0)
+    return FciController(arm, VERSION_5)
+
+
+def field(controller: FciController, name: str) -> np.ndarray:
+    return controller.packet.numbers[PLACES[name]].copy()
+
+
+def push(controller: FciController, wrench: tuple[float, ...], cycles: int = SETTLED) -> None:
+    controller.arm.plant.push(wrench)
+    for _ in range(cycles):
+        controller.step()
+
+
+def test_forces_have_the_sign_of_what_the_arm_exerts_and_the_place_of_K(controller: FciController) -> None:
+    controller._configure(replace(controller.settings, EE_T_K=Pose.from_rpy([0.0, 0.1, 0.0], [0.0, 0.0, 0.5])))
+    push(controller, (0.0, 4.0, -10.0, 0.0, 0.0, 0.0))
+    found, in_K = field(controller, "O_F_ext_hat_K"), field(controller, "K_F_ext_hat_K")
+    assert found[:3] == pytest.approx([0.0, -4.0, 10.0], abs=0.1)
+    T_base_K = controller.arm.signals.tool.pose @ controller.settings.EE_T_K
+    lever = controller.arm.signals.tool.position - T_base_K.position
+    assert found[3:] == pytest.approx(np.cross(lever, found[:3]), abs=0.05)
+    assert in_K[:3] == pytest.approx(T_base_K.rotation.T @ found[:3], abs=1e-9)
+    J = MODEL.jacobian(controller.arm.signals.measured.q)
+    assert field(controller, "tau_ext_hat_filtered") == pytest.approx(J.T @ [0, -4.0, 10.0, 0, 0, 0], abs=0.1)
+
+
+def test_a_contact_disappears_and_a_collision_stays_until_the_recovery(controller: FciController) -> None:
+    thresholds = replace(DEFAULT_THRESHOLDS, contact_force=(5.0,) * 6, contact_torque=(100.0,) * 7)
+    controller._configure(replace(controller.settings, thresholds=thresholds))
+    push(controller, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
+    assert field(controller, "cartesian_contact").any()
+    assert not field(controller, "cartesian_collision").any()
+    push(controller, (0.0, 0.0, -60.0, 0.0, 0.0, 0.0))
+    push(controller, (0.0,) * 6)
+    assert not field(controller, "cartesian_contact").any()
+    assert field(controller, "cartesian_collision").any()
+    assert controller.begin_recovery() is Status.SUCCESS
+    controller.step()
+    assert not field(controller, "cartesian_collision").any()
+
+
+def test_a_collision_in_a_motion_is_a_reflex(controller: FciController) -> None:
+    thresholds = replace(DEFAULT_THRESHOLDS, collision_torque=(500.0,) * 7, collision_torque_accelerating=(500.0,) * 7)
+    controller._configure(replace(controller.settings, thresholds=thresholds))
+    assert controller.begin_move(Move(0, 0, (0.01,) * 3, (0.01,) * 3)) is Status.MOTION_STARTED
+    q = tuple(controller.arm.commanded.q)
+    controller.arm.plant.push((0.0, 0.0, -60.0, 0.0, 0.0, 0.0))
+    for k in range(SETTLED):
+        controller.receive(CommandPacket(k, q, ZERO, (0.0,) * 16, (0.0,) * 6, (0.0, -1.0), False, False, ZERO, False))
+        controller.step()
+        if controller.faults:
+            break
+    assert controller.faults == (FrankaError.CARTESIAN_REFLEX,)
+    assert controller.phase is Phase.REFLEX
