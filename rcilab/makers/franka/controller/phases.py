@@ -56,7 +56,7 @@ STOP_STATUSES: Final = {
     Phase.MOVING: Status.SUCCESS,
     Phase.STOPPING: Status.SUCCESS,
     Phase.GUIDING: Status.NOT_POSSIBLE,
-    Phase.REFLEX: Status.REFLEX_ABORTED,
+    Phase.REFLEX: Status.SUCCESS,
     Phase.USER_STOPPED: Status.EMERGENCY_ABORTED,
     Phase.RECOVERING: Status.NOT_POSSIBLE,
 }
