@@ -156,6 +156,8 @@ class RobotDescription:
     """Response of the joints to commands that stop coming, one per joint; None: no figures."""
     imperfections: tuple[JointImperfection, ...] | None = None
     """Friction and torque sensors of real joints, one per joint; None: no figures."""
+    rotor_inertia: JointVector | None = None
+    """Rotor inertia at the joints under commanded torques, shape (n,), [kg m^2]; None: the drives compensate it."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
     friction: tuple[JointVector, JointVector, JointVector] | None = None

@@ -128,12 +128,14 @@ def _joint_body(description: RobotDescription, number: int) -> list[str]:
     joint, i = upright_joints(description)[number - 1], number - 1
     limits = description.limits.joint
     torque = float(limits.torque[i])
+    rotors = description.rotor_inertia
+    armature = ARMATURE_PER_TORQUE * torque if rotors is None else float(rotors[i])
     pad = "  " * (number + 2)
     return [
         f'{pad}<body name="link{number}" pos="{vector_text(joint.origin)}">',
         f'{pad}  <joint name="joint{number}" axis="{vector_text(joint.axis)}"'
         f' range="{number_text(limits.lower[i])} {number_text(limits.upper[i])}"'
-        f' armature="{number_text(ARMATURE_PER_TORQUE * torque)}"'
+        f' armature="{number_text(armature)}"'
         f' damping="{number_text(DAMPING_PER_TORQUE * torque)}"/>',
     ]
 

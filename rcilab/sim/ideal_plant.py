@@ -42,6 +42,7 @@ class IdealPlant:
         self._model = model
         self._mounted: Payload | None = None
         self._body = model.rigid_body
+        self._moved = self._with_rotors()
         self._push = Push(model, np.zeros(6))
         self.reset(model.home)
 
@@ -56,7 +57,17 @@ class IdealPlant:
         self._mounted = load
         model = self._model
         self._body = model.rigid_body if load is None else RigidBody(model.description, load, model.T_flange_tool)
+        self._moved = self._with_rotors()
         self._is_stationary = False
+
+    def _with_rotors(self) -> RigidBody:
+        """Returns the body that torques move: with the rotor inertia that the drives do not compensate."""
+        model, load = self._model, self._mounted
+        rotors = model.description.rotor_inertia
+        if rotors is None:
+            return self._body
+        load = model.load if load is None else load
+        return RigidBody(model.description, load, model.T_flange_tool, rotor_inertia=rotors)
 
     def reset(self, q: JointVector) -> Measurement:
         """Places the arm at `q`, shape (n,), [rad], at standstill."""
@@ -128,7 +139,7 @@ class IdealPlant:
         q, dq = self._measurement.q, self._measurement.dq
         external = self._push.torque(q) if self._push.is_active else None
         tau = tau_c if external is None else tau_c + external
-        accelerate = self._body.weightless_acceleration if self._mounted is None else self._acceleration
+        accelerate = self._moved.weightless_acceleration if self._mounted is None else self._acceleration
         ddq = accelerate(q, dq, tau)
         ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)
         dq = dq + _CYCLE * ddq
@@ -141,4 +152,4 @@ class IdealPlant:
 
     def _acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
         """Returns the acceleration with a load that differs from the controller's gravity compensation."""
-        return self._body.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))
+        return self._moved.acceleration(q, dq, tau + self._model.rigid_body.gravity(q))

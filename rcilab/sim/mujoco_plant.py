@@ -169,7 +169,7 @@ class MuJoCoPlant:
         mj.mj_step1(model, data)  # Forces and contacts at the new position.
         # The motor torque less rotor inertia and friction, at the end of the millisecond.
         loss = self._friction * self._dq
-        if self._has_rotor_inertia:
+        if self._has_rotor_inertia or not self._compensates_rotors:
             loss += self._rotors * ((self._dq - dq) / _STEP)
         self._measurement = self._measure(motor - loss + (self._bias - bias))
         self._settle(setpoint)
@@ -232,7 +232,7 @@ class MuJoCoPlant:
     def _set_rotor_inertia(self, on: bool) -> None:
         if on is not self._has_rotor_inertia:
             self._has_rotor_inertia = on
-            self._armature[:] = self._rotors if on else 0.0
+            self._armature[:] = 0.0 if self._compensates_rotors and not on else self._rotors
             if self._coulomb is not None:
                 self._model.dof_frictionloss[:] = 0.0 if on else self._coulomb
             self._mj.mj_step1(self._model, self._data)
@@ -264,7 +264,9 @@ class MuJoCoPlant:
         torque = model.limits.joint.torque
         self._peak: Array = PEAK_TORQUE * torque
         self._trough = -self._peak
-        self._rotors: Array = ARMATURE_PER_TORQUE * torque
+        rotors = model.description.rotor_inertia
+        self._compensates_rotors = rotors is None
+        self._rotors: Array = ARMATURE_PER_TORQUE * torque if rotors is None else np.array(rotors)
         self._friction: Array = self._friction_scale * DAMPING_PER_TORQUE * torque
         self._known_friction = FRICTION_KNOWN * self._friction
         self._product = np.zeros(model.n)

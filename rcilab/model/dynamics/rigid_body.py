@@ -121,9 +121,17 @@ class RigidBody:
         description: The arm.
         load: The load at the flange.
         tool: Pose of the tool in the flange; it has no mass.
+        rotor_inertia: Rotor inertia at the joints, which accelerations include, shape (n,), [kg m^2]; None: none.
     """
 
-    def __init__(self, description: RobotDescription, load: Payload, tool: Pose = IDENTITY) -> None:
+    def __init__(
+        self,
+        description: RobotDescription,
+        load: Payload,
+        tool: Pose = IDENTITY,
+        *,
+        rotor_inertia: JointVector | None = None,
+    ) -> None:
         model = pin.Model()
         model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
         self._link_frames: list[pin.SE3] | None = None
@@ -141,6 +149,10 @@ class RigidBody:
         self._data = model.createData()
         self._weightless = pin.Model(model)
         self._weightless.gravity.linear = np.zeros(3)
+        self._falling = model
+        if rotor_inertia is not None:
+            self._falling = pin.Model(model)
+            self._falling.armature = self._weightless.armature = rotor_inertia.copy()
         self.tool_solver = SymmetricSolver(6)
         self._tool_terms: ToolTerms | None = None
         self._shared_args: tuple[JointVector, ...] = ()
@@ -206,7 +218,7 @@ class RigidBody:
             dq: Joint velocities, shape (n,), [rad/s].
             tau: Joint torques, gravity included, shape (n,), [N m].
         """
-        return pin.aba(self._model, self._data, q, dq, tau).copy()
+        return pin.aba(self._falling, self._data, q, dq, tau).copy()
 
     def weightless_acceleration(self, q: JointVector, dq: JointVector, tau: JointVector) -> JointVector:
         """Returns the joint accelerations of torques that are added to gravity compensation; as `acceleration`."""

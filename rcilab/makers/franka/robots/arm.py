@@ -34,6 +34,9 @@ CRAIG = (
 )
 """The table as the page prints it, by Craig's convention; the last row is the flange."""
 
+ROTOR_INERTIA = 0.1
+"""At each joint, [kg m^2]. The maker publishes none; public simulation models of the arm have this figure, and without
+it the maker's own impedance examples are unstable."""
 ELBOW_FLIP = -0.467002423653011  # [rad] Joint 4 with the arm stretched as far as possible; PANDA_PAGE.
 
 _SHOULDER = 0.333  # [m]
@@ -178,6 +181,7 @@ def build_franka(
         faults=FrankaError,
         conditions=conditions,
         elbow_flip=ELBOW_FLIP,
+        rotor_inertia=readonly_copy([ROTOR_INERTIA] * 7),
         dh=rows_from_craig(CRAIG),
         dh_source=dh_source,
         base=base,
