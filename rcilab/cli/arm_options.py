@@ -38,7 +38,8 @@ def add_arm_options(parser: ArgumentParser | _ArgumentGroup) -> None:
     parser.add_argument(
         "--tool",
         metavar=TOOL_FORM,
-        help="tool in the flange frame, with turns about the fixed x, y and z axes: 0,0,120mm or 0,0,0.12,0,0,90deg",
+        help="tool in the flange frame, with turns about the fixed x, y and z axes: 0,0,120mm or 0,0,0.12,0,0,90deg; "
+        "or the name of a tool of the maker, with its mass: hand (Franka)",
     )
     parser.add_argument(
         "--load", metavar=LOAD_FORM, help="load and its centre of mass in the flange frame: 2 or 2@0,0,50mm"
@@ -118,6 +119,32 @@ def parse_tool(text: str, option: str = "--tool") -> Pose:
         InvalidValueError: The text is not valid.
     """
     return _pose(text, text, option, TOOL_FORM)
+
+
+def parse_tool_and_load(tool: str | None, load: str | None, model: str | None) -> tuple[Pose | None, Payload | None]:
+    """Parses `--tool` and `--load`; a tool may be given by name, and its mass is then the load unless one is given.
+
+    Args:
+        tool: The pose, or a name such as `hand`; None: not given.
+        load: The load; None: not given.
+        model: Name of the arm, for tools by name; None: there are none.
+
+    Raises:
+        InvalidValueError: A text is not valid, or the arm has no tool of this name.
+    """
+    from rcilab.model.robot_model import find_tool
+    from rcilab.robots import describe_robot
+
+    body = None if load is None else parse_load(load)
+    if tool is None:
+        return None, body
+    if model is None or not tool[:1].isalpha():
+        return parse_tool(tool), body
+    try:
+        pose, own = find_tool(describe_robot(model), tool)
+    except InvalidValueError as error:
+        raise _named(error, "--tool") from error
+    return pose, own if body is None else body
 
 
 def parse_load(text: str, option: str = "--load") -> Payload:

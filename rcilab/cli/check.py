@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcilab.cli.arm_options import add_arm_options, describe_arm, parse_box, parse_load, parse_tool
+from rcilab.cli.arm_options import add_arm_options, describe_arm, parse_box, parse_tool_and_load
 from rcilab.cli.motion_file import HELP, add_max_rows, as_motion, read_file
 from rcilab.cli.output import show
 from rcilab.core.errors import InvalidValueError, RcilabError, UsageError
@@ -150,7 +150,8 @@ def _read_motion(args: Namespace) -> _Subject:
     from rcilab.motion.program import box_numbers, payload_numbers, tool_numbers
 
     found = read_file(args.file, args.max_rows)
-    tool, load, box = _arm_options(args)
+    named = found.model if isinstance(found, Program) and args.model is None else args.model
+    tool, load, box = _arm_options(args, named)
     if isinstance(found, Program):
         found = replace(
             found,
@@ -176,7 +177,8 @@ def _read_run(args: Namespace) -> _Subject:
     from rcilab.recording.sent_motion import recorded_mode
 
     run = load_run(args.file, max_rows=args.max_rows)
-    tool, load, box = _arm_options(args)
+    named = args.model or (None if run.model is None else run.model.name)
+    tool, load, box = _arm_options(args, named)
     if run.model is None and args.model is None:
         raise UsageError("this run does not name its arm: add --model NAME, such as --model xMatePro7")
     model = run.model
@@ -204,12 +206,10 @@ def _read_run(args: Namespace) -> _Subject:
     )
 
 
-def _arm_options(args: Namespace) -> tuple[Pose | None, Payload | None, SafetyBox | None]:
-    return (
-        None if args.tool is None else parse_tool(args.tool),
-        None if args.load is None else parse_load(args.load),
-        None if args.box is None else parse_box(args.box),
-    )
+def _arm_options(args: Namespace, model: str | None) -> tuple[Pose | None, Payload | None, SafetyBox | None]:
+    """Returns tool, load and safety box; `model` is the name of the arm, if it is known."""
+    box = None if args.box is None else parse_box(args.box)
+    return *parse_tool_and_load(args.tool, args.load, model), box
 
 
 def _slow_down_as_json(slowed: SlowDown | None, file: Path | None) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from rcilab.cli.arm_options import (
     parse_joints,
     parse_load,
     parse_soft_limits,
-    parse_tool,
+    parse_tool_and_load,
 )
 from rcilab.cli.output import print_interruptibly
 from rcilab.cli.signal_handlers import Handler, handled_signals
@@ -275,6 +275,11 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
     client_host, client_port = _client(option("client"))
     network, states_network = _networks(options)
     parent, is_lockstep = option("exit_with_parent"), option("lockstep", False)
+    tool, load = option("tool"), option("load")
+    if isinstance(tool, str):
+        tool, named = parse_tool_and_load(tool, None, options["model"])
+        load = named if load is None else load
+    load = _parsed(load, parse_load)
     return ControllerConfig(
         model=options["model"],
         host=option("host", _HOST),
@@ -295,8 +300,8 @@ def _config(options: Mapping[str, Any]) -> ControllerConfig:
         limit_table=option("limits"),
         force_sign=option("force_sign", "on-arm"),
         start=_parsed(option("start"), lambda text: parse_joints(text, n)),
-        tool=_parsed(option("tool"), parse_tool),
-        load=_parsed(option("load"), parse_load),
+        tool=tool,
+        load=load,
         safety_box=_parsed(option("box"), parse_box),
         soft_limits=_parsed(option("soft_limits"), lambda text: _soft_limits(text, n)),
         inputs=_parsed(option("di", ()), _signals),

@@ -36,25 +36,44 @@ _SET_LIMIT = "soft limit, set by a user"
 __all__ = ["RobotModel", "load_model", "require_model"]
 
 
-def load_model(name: str, *, tool: Pose | None = None, load: Payload | None = None) -> RobotModel:
+def load_model(name: str, *, tool: Pose | str | None = None, load: Payload | None = None) -> RobotModel:
     """Returns the model of a robot by name, in any case; `rcilab.robots.ROBOT_NAMES` lists the names.
 
     Args:
         name: Name of the robot, or the file of one arm, "my_arm.json", as written by `save` of
             `robot.rci.load_robot_model()`.
-        tool: Pose of the tool in the flange frame (RCI setCoor); the flange itself when absent.
-        load: The load at the flange (RCI setLoad); none when absent.
+        tool: Pose of the tool in the flange frame (RCI setCoor), or the name of one of its maker, such as "hand", with
+            its mass; the flange itself when absent.
+        load: The load at the flange (RCI setLoad), including the tool; when absent, that of a named tool, or none.
 
     Raises:
         ModelError: No robot has this name; the message lists those that exist.
-        InvalidValueError: The file does not exist or is not that of an arm, the tool is not a `Pose`, the load not a
-            `Payload`, or it exceeds the rated payload.
+        InvalidValueError: The file does not exist or is not that of an arm, the tool is not a `Pose` or known by name,
+            the load not a `Payload`, or it exceeds the rated payload.
     """
     if isinstance(name, str) and name.lower().endswith(ENDING):
         description = load_arm(name)
     else:
         description = describe_robot(name)
+    if isinstance(tool, str):
+        tool, body = find_tool(description, tool)
+        load = body if load is None else load
     return RobotModel(description, IDENTITY if tool is None else tool, NO_LOAD if load is None else load)
+
+
+def find_tool(description: RobotDescription, name: str) -> tuple[Pose, Payload]:
+    """Returns a tool of an arm's maker: its pose in the flange frame, and its body.
+
+    Raises:
+        InvalidValueError: There is no such tool; the message lists those that exist.
+    """
+    for tool in description.tools:
+        if tool.name == name.lower():
+            body = Payload(mass=tool.mass, center_of_mass=tool.center_of_mass, inertia=tool.inertia)
+            return tool.T_flange_tool, body
+    known = ", ".join(tool.name for tool in description.tools)
+    hint = f"known: {known}" if known else "its maker has none in rcilab"
+    raise InvalidValueError("tool", name, f"is not a tool of the {description.name} by name; {hint}")
 
 
 def require_model(model: object) -> RobotModel:
@@ -117,12 +136,16 @@ class RobotModel(ReachingArm):
         """Joint angles away from limits and singularities, shape (n,), [rad]."""
         return self.description.home
 
-    def with_tool(self, tool: Pose) -> RobotModel:
+    def with_tool(self, tool: Pose | str) -> RobotModel:
         """Returns this arm with another tool, given by its pose in the flange frame (SetCoor).
 
+        A name, such as "hand", is that of a tool of the maker (`description.tools`), whose mass becomes the load.
+
         Raises:
-            InvalidValueError: It is not a `Pose`.
+            InvalidValueError: It is not a `Pose`, or not known by name.
         """
+        if isinstance(tool, str):
+            return RobotModel(self.description, *find_tool(self.description, tool), self.T_tool_stiffness)
         return RobotModel(self.description, tool, self.load, self.T_tool_stiffness)
 
     def with_load(self, load: Payload) -> RobotModel:

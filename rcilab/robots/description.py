@@ -10,6 +10,7 @@ from rcilab.core.arrays import JointVector, Matrix, Vector3, readonly_copy
 from rcilab.core.condition import ConditionTable
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
+from rcilab.core.spatial import Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,6 +103,23 @@ class Link:
         return f"<Link of {self.mass:.4g} kg, centre of mass at {centre} m: .inertia, .origin_height, .source>"
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MountedTool:
+    """A tool that a maker sells for an arm: a hand, a gripper."""
+
+    name: str
+    """In small letters, such as "hand"."""
+    T_flange_tool: Pose
+    mass: float
+    """[kg]."""
+    center_of_mass: Vector3
+    """In the flange frame, shape (3,), [m]."""
+    inertia: Matrix
+    """About the centre of mass, axes of the flange frame, shape (3, 3), [kg m^2]."""
+    source: str
+    """Source of pose, mass, centre and tensor."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoFigures:
     """The position servo of a joint, as a second-order system."""
@@ -163,6 +181,8 @@ class RobotDescription:
     friction: tuple[JointVector, JointVector, JointVector] | None = None
     """Identified joint friction: viscous [N m s/rad], Coulomb [N m] and offset [N m], each of shape (n,); None if it is
     not known."""
+    tools: tuple[MountedTool, ...] = ()
+    """Tools of the maker, which `load_model` and `with_tool` take by name."""
     nominal: RobotDescription | None = None
     """The arm of the maker's table if this one is calibrated: its shapes, and the frames of its links."""
 

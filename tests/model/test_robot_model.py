@@ -77,7 +77,7 @@ def test_a_name_where_a_model_belongs_says_what_to_write():
         require_model(None)
 
 
-@pytest.mark.parametrize("value", [None, 3, "tool"])
+@pytest.mark.parametrize("value", [None, 3, b"tool"])
 def test_what_is_no_tool_or_load_is_refused_in_words(value):
     model = load_model("xMate3")
     with pytest.raises(InvalidValueError, match=r"tool must be a Pose"):

@@ -7,7 +7,7 @@ The flange looks down at zero pose. `PANDA_PAGE` is the maker's page for the Pan
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import inf, pi
+from math import cos, inf, pi, sin
 from types import MappingProxyType
 from typing import Any
 
@@ -16,8 +16,9 @@ import numpy as np
 from rcilab.core.arrays import readonly_copy
 from rcilab.core.condition import ConditionTable
 from rcilab.core.limits import ArmAngleLimits, CartesianLimits, EndVelocity, JointLimits, Limits
+from rcilab.core.spatial import Pose
 from rcilab.makers.franka.errors import FrankaError
-from rcilab.robots.description import CraigRow, Link, RobotDescription, Rod, rows_from_craig
+from rcilab.robots.description import CraigRow, Link, MountedTool, RobotDescription, Rod, rows_from_craig
 
 PANDA_PAGE = "Franka's page Robot and interface specifications (Panda)"
 LIBRARY = "comments of libfranka's robot.h"
@@ -154,6 +155,16 @@ _RODS = (
     (_rod((0.0, 0.0, 0.100), (0.0, 0.0, 0.045), 0.045),),
 )  # After pictures of the arm: rounder than an xMate, and inside the real housings' reach.
 
+HAND = MountedTool(
+    name="hand",
+    T_flange_tool=Pose((0.0, 0.0, 0.1034), (cos(pi / 8.0), 0.0, 0.0, -sin(pi / 8.0))),
+    mass=0.73,
+    center_of_mass=readonly_copy([-0.01, 0.0, 0.03]),
+    inertia=readonly_copy(np.diag([0.001, 0.0025, 0.0017])),
+    source="the state of an arm with its hand that the maker's client library shows on its page Getting started",
+)
+"""The hand; its frame is between the fingertips, turned by -45 degrees."""
+
 
 def build_franka(
     *,
@@ -191,4 +202,5 @@ def build_franka(
         rated_payload=3.0,
         rated_payload_source=rated_payload_source,
         rods=_RODS,
+        tools=(HAND,),
     )

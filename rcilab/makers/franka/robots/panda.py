@@ -43,8 +43,8 @@ DESCRIPTION = build_franka(
         elbow=(2.175, 10.0, 5000.0),
         sources={
             "joint": f"{PANDA_PAGE}, joint space limits",
-            "translation": f"{PANDA_PAGE}, Cartesian limits, Translation; velocity: rate limiter of the client library, "
-            "where the page has 1.7 m/s",
+            "translation": f"{PANDA_PAGE}, Cartesian limits, Translation; velocity: rate limiter of the client "
+            "library, where the page has 1.7 m/s",
             "rotation": f"{PANDA_PAGE}, Cartesian limits, Rotation",
             "elbow": f"{PANDA_PAGE}, Cartesian limits, Elbow",
         },
