@@ -151,6 +151,8 @@ class Environment:
             case Floor(on):
                 self._plant.set_floor(on)
             case Walls(on):
+                if on:
+                    self._plant.require_contact("walls")  # Also without an active box: one may follow.
                 self._plant.set_walls(self._active_box() if on else None)
                 self._has_walls, self._walls = on, self._active_box()
             case Mount():

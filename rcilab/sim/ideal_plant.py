@@ -80,7 +80,7 @@ class IdealPlant:
 
     def place_box(self, name: str, size: ArrayLike, pose: Pose) -> None:
         """Refuses: this plant does not simulate contact."""
-        raise UsageError(f"box {name!r}: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
+        self.require_contact(f"box {name!r}")
 
     def remove_box(self, name: str) -> None:
         """Refuses: this plant does not simulate contact."""
@@ -94,12 +94,16 @@ class IdealPlant:
     def set_floor(self, on: bool) -> None:
         """Refuses a floor."""
         if on:
-            raise UsageError(f"floor: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
+            self.require_contact("floor")
+
+    def require_contact(self, what: str) -> None:
+        """Refuses: this plant does not simulate contact."""
+        raise UsageError(f"{what}: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
 
     def set_walls(self, box: SafetyBox | None) -> None:
         """Refuses walls."""
         if box is not None:
-            raise UsageError(f"walls: the ideal plant does not simulate contact; {_REMEDY}").coded("no_contact")
+            self.require_contact("walls")
 
     def step(self, setpoint: Setpoint) -> Measurement:
         """Advances by one cycle."""

@@ -138,6 +138,9 @@ class MuJoCoPlant:
         self._obstacles.set_floor(on)
         self._is_stationary = False
 
+    def require_contact(self, what: str) -> None:
+        """Does nothing: this plant simulates contact."""
+
     def set_walls(self, box: SafetyBox | None) -> None:
         """Makes the faces of a safety box solid walls for the links; None removes them."""
         self._obstacles.set_walls(box)

@@ -146,6 +146,17 @@ class Plant(Protocol):
         """
         ...
 
+    def require_contact(self, what: str) -> None:
+        """Requires a plant that simulates contact.
+
+        Args:
+            what: What it is needed for, such as "walls", for the message.
+
+        Raises:
+            UsageError: It does not.
+        """
+        ...
+
     def set_walls(self, box: SafetyBox | None) -> None:
         """Makes the faces of a safety box solid walls for the links; None removes them.
 

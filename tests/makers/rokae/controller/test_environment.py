@@ -110,3 +110,11 @@ def test_a_stall_counts_from_when_it_is_asked_for_and_can_be_taken_back(place) -
     assert [place.stalls.pop(now) for now in (100.0, 101.9, 102.0, 102.9, 103.0)] == [0.0, 0.0, 0.5, 0.0, 0.5]
     place.handle(world.StallClock(0.0))
     assert place.stalls.pop(1e6) == 0.0
+
+
+def test_walls_are_refused_where_nothing_touches_also_before_there_is_a_box(place) -> None:
+    is_solid = place.cycle.arm.plant.kind == "mujoco"
+    assert (place.handle(world.Walls(True)) == world.Done()) is is_solid
+    assert place.handle(world.SetBox((1.9, 1.9, 1.9), (0.0, 0.0, 0.5))) == world.Done()
+    place.step(3)
+    assert np.isfinite(place.cycle.state.q).all()

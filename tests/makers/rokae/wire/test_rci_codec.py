@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
 from rcilab.core.errors import DecodeError, InvalidValueError
-from rcilab.makers.rokae import wire as rci
 from rcilab.core.message_layout import Field
+from rcilab.makers.rokae import wire as rci
 
 NUMBERS = st.floats(allow_nan=False)
 FIELD_VALUES = {
