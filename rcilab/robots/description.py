@@ -176,6 +176,8 @@ class RobotDescription:
     """Friction and torque sensors of real joints, one per joint; None: no figures."""
     rotor_inertia: JointVector | None = None
     """Rotor inertia at the joints under commanded torques, shape (n,), [kg m^2]; None: the drives compensate it."""
+    damping: JointVector | None = None
+    """Viscous friction at the joints under commanded torques, shape (n,), [N m s/rad]; None: it is compensated."""
     rods: tuple[tuple[Rod, ...], ...] | None = None
     """Shapes of base and links for drawing and collisions, base first; None for arms with designed housings."""
     friction: tuple[JointVector, JointVector, JointVector] | None = None

@@ -143,6 +143,9 @@ class IdealPlant:
         q, dq = self._measurement.q, self._measurement.dq
         external = self._push.torque(q) if self._push.is_active else None
         tau = tau_c if external is None else tau_c + external
+        damping = self._model.description.damping
+        if damping is not None:
+            tau = tau - damping * dq
         accelerate = self._moved.weightless_acceleration if self._mounted is None else self._acceleration
         ddq = accelerate(q, dq, tau)
         ddq = accelerate(q + _HALF * dq, dq + _HALF * ddq, tau)

@@ -182,7 +182,8 @@ class MuJoCoPlant:
         """Returns the torque of the drives in addition to their compensation, shape (n,), [N m]."""
         q, dq = self._q, self._dq
         if setpoint.drive is Drive.TORQUE:
-            return np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
+            tau = np.zeros(self._n) if setpoint.tau is None else np.array(setpoint.tau, dtype=np.float64)
+            return tau if self._damping is None else tau - self._damping * dq
         if setpoint.drive is Drive.BRAKED:
             return self._times_inertia(dq * (-1.0 / BRAKE_TIME)) - self._push_torque()
         # The setpoint is for the end of this millisecond; q and dq are those of its beginning:
@@ -269,6 +270,7 @@ class MuJoCoPlant:
         self._trough = -self._peak
         rotors = model.description.rotor_inertia
         self._compensates_rotors = rotors is None
+        self._damping = model.description.damping
         self._rotors: Array = ARMATURE_PER_TORQUE * torque if rotors is None else np.array(rotors)
         self._friction: Array = self._friction_scale * DAMPING_PER_TORQUE * torque
         self._known_friction = FRICTION_KNOWN * self._friction

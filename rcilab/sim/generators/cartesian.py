@@ -43,6 +43,7 @@ class CartesianGenerator:
         self._has_begun = False
         self._reference = reference = PoseReference(bounds, q)
         self._psi = reference.psi
+        self._is_free = bounds.mode.has_free_elbow
         limits = bounds.limits.arm_angle
         self._had_psi = False  # Whether this motion's commands have had an arm angle.
         self._smallest_psi = 2.0 * CYCLE_TIME * limits.velocity if limits is not None else 0.0
@@ -84,6 +85,8 @@ class CartesianGenerator:
             return self._reference.hold()
         between = self._end_pause(values, cycles)
         self._stream.take(values)
+        if command is not None:
+            self._is_free = self._bounds.mode.has_free_elbow and not command.has_psi
         self._psi = remainder(values[7], tau) if command is None or is_lost else self._arm_angle(command)
         self._had_psi |= command is not None and command.has_psi
         try:
@@ -92,7 +95,7 @@ class CartesianGenerator:
             pose, psi = self._filter.step(_pose(values), self._psi)
         except InvalidValueError as error:  # Extreme numbers, from which bridge or filter gave no pose.
             return invalid_pose(Remark(f"commanded pose: {error}", "no_pose"))
-        return self._reference.step(pose, psi, cycles)
+        return self._reference.step(pose, None if self._is_free else psi, cycles)
 
     def _end_pause(self, values: list[float], cycles: int) -> list[list[float]]:
         """Returns the poses on the way over a pause, for the filter if it is on; none without a pause."""

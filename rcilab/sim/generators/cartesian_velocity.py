@@ -36,6 +36,7 @@ class CartesianVelocityGenerator:
     def __init__(self, bounds: MotionLimits, q: list[float]) -> None:
         self._reference = reference = PoseReference(bounds, q)
         self._pose = reference.pose
+        self._is_free = self._has_free_elbow = bounds.mode.has_free_elbow
         self._stream = RateExtrapolator(6)
         self._psi = CommandExtrapolator([reference.psi])
         self._has_begun = False
@@ -62,7 +63,9 @@ class CartesianVelocityGenerator:
                 self._psi = CommandExtrapolator([psi])
         self._psi.take([psi])
         self._pose = _moved(self._pose, twist)
-        return self._reference.step(self._pose, remainder(psi, tau), cycles)
+        if command is not None:
+            self._is_free = self._has_free_elbow and not command.has_psi
+        return self._reference.step(self._pose, None if self._is_free else remainder(psi, tau), cycles)
 
     def _next_psi(self, playback: Playback) -> float:
         """Returns the arm angle of this cycle, [rad], continuous with the last one."""

@@ -41,6 +41,8 @@ class MotionMode(NamedTuple):
 
     law: ControlLaw
     kind: CommandKind
+    has_free_elbow: bool = False
+    """Whether, without a commanded arm angle, the joints move least; otherwise the arm angle is held."""
     goal_velocity: tuple[float, ...] = ()
     """For JOINT_GOALS: the largest joint velocities, n numbers, [rad/s]; the limits apply where they are smaller."""
 
@@ -69,6 +71,7 @@ class MotionMode(NamedTuple):
 class MotionLimits:
     """Filters and bounds of a motion."""
 
+    mode: MotionMode
     model: RobotModel
     """The arm with its tool and load."""
     parameters: ArmParameters
@@ -124,6 +127,7 @@ def build_motion_limits(
         joint = range_from(joint, q)
     has_walls = mode.law in _SPRINGS and parameters.guiding_box is not None
     return MotionLimits(
+        mode=mode,
         model=model,
         parameters=parameters,
         limits=replace(limits, joint=joint),

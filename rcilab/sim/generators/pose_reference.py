@@ -94,12 +94,12 @@ class PoseReference:
         self._monitor = self._monitor_from(pose, psi)
         return True
 
-    def step(self, pose: Pose, psi: float, cycles: int) -> GeneratorOutput:
+    def step(self, pose: Pose, psi: float | None, cycles: int) -> GeneratorOutput:
         """Processes the pose of this cycle.
 
         Args:
             pose: Pose of the tool in base.
-            psi: Arm angle, [rad]; without effect for an arm without one.
+            psi: Arm angle, [rad]; without effect for an arm without one. None: the joints move least.
             cycles: Cycles since the last command; 0 if this pose replaces a lost command.
         """
         if self._jump is not None and self._bounds.is_strict_start:
@@ -110,7 +110,7 @@ class PoseReference:
                 return GeneratorOutput(violations=with_jump(self._jump, violations))
             self._jump = None
         try:
-            q = self._tracker.solve(pose, psi, self._q)
+            q = self._tracker.follow(pose, self._q) if psi is None else self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a bridged pose: {error}", "no_angles"))

@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.safety_box import SafetyBox
@@ -44,6 +46,7 @@ from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
+SINGULAR = 0.01  # Smallest singular value of the Jacobian, in metres and radians, at which a Cartesian motion begins.
 SUCCESS_WINDOW = 100  # [cycles] Over which the share of commands in time is reported.
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
@@ -243,13 +246,18 @@ class FciController:
         motion = motion_of(request, self.version, self.settings)
         if motion is None:
             return Status.INVALID_ARGUMENT
-        if motion.mode.is_cartesian and self.model.solver.singularity(self.arm.commanded.q) is not None:
+        if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
         self.arm.prepare_motion(motion.mode)
         self.arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table), start=_START)
         self._enter(Phase.MOVING)
         return Status.MOTION_STARTED
+
+    def _is_singular(self) -> bool:
+        """Returns whether the end effector cannot move in every direction."""
+        J = self.model.jacobian(self.arm.commanded.q)
+        return bool(np.linalg.svd(J, compute_uv=False)[-1] < SINGULAR)
 
     def stop_move(self) -> Status:
         """Ends a motion; returns the status of the answer."""

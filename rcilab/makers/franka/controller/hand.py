@@ -1,7 +1,7 @@
 """The hand of a Franka arm: two fingers that open, close, and hold an object between them. No sockets, no clock.
 
 The figures are those of the data sheet of the Franka hand: 80 mm of stroke, 50 mm/s for each finger. An object is only
-its width; it is set from outside, and none is there after power-up.
+its width; unless it is set from outside, an object of the expected width is there for every grasp.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class FrankaHand:
         width: Distance of the fingers, [m].
         max_width: Largest distance, known after homing; before, 0, [m].
         is_grasped: Whether an object is held.
-        object_width: Width of the object between the fingers, [m]; 0: none.
+        object_width: Width of the object between the fingers, [m]; 0: none; None: what a grasp expects.
     """
 
     def __init__(self) -> None:
-        self.width = STROKE / 2.0
+        self.width = STROKE
         self.max_width = 0.0
         self.is_grasped = False
-        self.object_width = 0.0
+        self.object_width: float | None = None
         self._task: _Task | None = None
 
     @property
@@ -76,7 +76,9 @@ class FrankaHand:
         task = self._task
         if task is None:
             return None
-        goal = max(task.widths[0], self.object_width if isinstance(task.request, Grasp) else 0.0)
+        goal = task.widths[0]
+        if isinstance(task.request, Grasp):
+            goal = task.request.width if self.object_width is None else self.object_width
         step = task.speed * CYCLE_TIME
         way = goal - self.width
         if abs(way) > step:

@@ -75,4 +75,4 @@ def motion_of(request: Move, version: FciVersion, settings: Settings) -> MotionK
         law = ControlLaw.POSITION if is_stiff else ControlLaw.JOINT_IMPEDANCE
     elif controller is MoveController.CARTESIAN_IMPEDANCE:
         law = ControlLaw.CARTESIAN_IMPEDANCE
-    return MotionKind(controller, generator, MotionMode(law, kind, velocity))
+    return MotionKind(controller, generator, MotionMode(law, kind, has_free_elbow=True, goal_velocity=velocity))

@@ -38,6 +38,8 @@ CRAIG = (
 ROTOR_INERTIA = 0.1
 """At each joint, [kg m^2]. The maker publishes none; public simulation models of the arm have this figure, and without
 it the maker's own impedance examples are unstable."""
+DAMPING = 1.0
+"""Of each joint, [N m s/rad], from the same models."""
 ELBOW_FLIP = -0.467002423653011  # [rad] Joint 4 with the arm stretched as far as possible; PANDA_PAGE.
 
 _SHOULDER = 0.333  # [m]
@@ -193,6 +195,7 @@ def build_franka(
         conditions=conditions,
         elbow_flip=ELBOW_FLIP,
         rotor_inertia=readonly_copy([ROTOR_INERTIA] * 7),
+        damping=readonly_copy([DAMPING] * 7),
         dh=rows_from_craig(CRAIG),
         dh_source=dh_source,
         base=base,
