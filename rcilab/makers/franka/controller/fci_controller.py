@@ -252,6 +252,7 @@ class FciController:
         self.arm.prepare_motion(motion.mode)
         self.arm.begin_motion(cartesian_limits(self.model.limits, self.limit_table), start=_START)
         self._enter(Phase.MOVING)
+        self.state = self._report()
         return Status.MOTION_STARTED
 
     def _is_singular(self) -> bool:
