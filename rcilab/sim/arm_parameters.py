@@ -53,6 +53,10 @@ class ArmParameters:
     """The same for commanded poses, [Hz]."""
     torque_filter: float = SAMPLING_RATE
     """The same for commanded torques, [Hz]."""
+    velocity_filter: float = SAMPLING_RATE
+    """The same for commanded joint velocities, [Hz]."""
+    twist_filter: float = SAMPLING_RATE
+    """The same for commanded velocities of the tool, [Hz]."""
     safety_box: SafetyBox | None = None
     T_flange_force: Pose = IDENTITY
     """Force-control frame."""

@@ -274,6 +274,8 @@ def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
         "joint_filter": parameters.joint_filter,
         "cartesian_filter": parameters.cartesian_filter,
         "torque_filter": parameters.torque_filter,
+        "velocity_filter": parameters.velocity_filter,
+        "twist_filter": parameters.twist_filter,
         "force_frame": parameters.T_flange_force.as_row_major(),
         "force_axes": parameters.force_axes.value,
         "virtual_guide": parameters.virtual_guide,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from rcilab.core.spatial import rotation_between
 from rcilab.model.robot_model import load_model
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.filters import low_pass_gain
 from rcilab.sim.generators.motion_limits import CommandKind, MotionMode
 from rcilab.sim.generators.start import StartTolerance
 from rcilab.sim.plants import build_plant
@@ -33,12 +35,14 @@ def following(
     *,
     start: StartTolerance | None = None,
     goal_velocity: Sequence[float] = (),
+    **parameters: float,
 ) -> VirtualArm:
     """Returns an arm that follows commands of this kind from the next cycle on."""
     arm = VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0, lost_limit=20)
+    arm.configure(replace(arm.parameters, **parameters))  # type: ignore[arg-type]
     arm.resting_law = ControlLaw.POSITION
     arm.step()
-    arm.prepare_motion(MotionMode(law, kind, tuple(goal_velocity)))
+    arm.prepare_motion(MotionMode(law, kind, goal_velocity=tuple(goal_velocity)))
     arm.begin_motion(MODEL.limits, start=start)
     arm.is_monitored = law is ControlLaw.POSITION
     return arm
@@ -103,6 +107,20 @@ def test_velocities_that_are_missing_continue_with_the_same_acceleration(kind, f
     assert steps == pytest.approx(steps[0], rel=1e-3)  # Not held, though that is what this arm does with angles.
     assert steps[0] == pytest.approx(1e-5 * 2 * 59, rel=2e-2)
     assert arm.playout.lost == 5
+
+
+@pytest.mark.parametrize("kind", [CommandKind.JOINT_VELOCITIES, CommandKind.TWISTS])
+def test_velocities_pass_their_filter(kind: CommandKind) -> None:
+    arm = following(kind, velocity_filter=10.0, twist_filter=10.0)
+    gain, expected = low_pass_gain(10.0), 0.0
+    for k in range(50):
+        speed = 1e-5 * k * k
+        expected += gain * (speed - expected)
+        command = ArmCommand(k, dq=speed_of(1, speed), twist=(speed, *(0.0,) * 5))
+        assert arm.step(command).command_violations == ()
+    found = arm.commanded.dq[0] if kind is CommandKind.JOINT_VELOCITIES else arm.tool_c.twist[0]
+    assert found == pytest.approx(expected, rel=1e-2)
+    assert expected < 0.8 * speed
 
 
 def test_twenty_lost_velocities_end_the_motion() -> None:

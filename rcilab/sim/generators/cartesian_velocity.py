@@ -1,8 +1,9 @@
 """Velocities of the tool commanded one by one; their integral is the reference.
 
-A twist turns and shifts the tool by the exponential map in the axes of the base, so that the difference of two poses is
-the commanded twist again. Poses pass the conditions and the inverse kinematics of commanded poses. A lost cycle
-continues with the acceleration of the last commands, or, if a later command is already known, on the way to it.
+The commanded twists pass the twist filter. A twist turns and shifts the tool by the exponential map in the axes of the
+base, so that the difference of two poses is the twist again. Poses pass the conditions and the inverse kinematics of
+commanded poses. A lost cycle continues with the acceleration of the last commands, or, if a later command is already
+known, on the way to it.
 
 The arm angle of a 7-axis arm is the commanded one if it is valid; otherwise it is held.
 """
@@ -16,6 +17,7 @@ from rcilab.core.spatial import Pose, rotation_from_wxyz
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
+from rcilab.sim.filters import LowPass
 from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.pose_reference import PoseReference, find_arm_angle_error, invalid_pose
@@ -38,6 +40,7 @@ class CartesianVelocityGenerator:
         self._pose = reference.pose
         self._is_free = self._has_free_elbow = bounds.mode.has_free_elbow
         self._stream = RateExtrapolator(6)
+        self._filter = LowPass(bounds.parameters.twist_filter, [0.0] * 6)
         self._psi = CommandExtrapolator([reference.psi])
         self._has_begun = False
         self._gap = MissedCycles()
@@ -62,7 +65,7 @@ class CartesianVelocityGenerator:
             if self._reference.begin(self._pose, psi):
                 self._psi = CommandExtrapolator([psi])
         self._psi.take([psi])
-        self._pose = _moved(self._pose, twist)
+        self._pose = _moved(self._pose, self._filter.step(twist))
         if command is not None:
             self._is_free = self._has_free_elbow and not command.has_psi
         return self._reference.step(self._pose, None if self._is_free else remainder(psi, tau), cycles)

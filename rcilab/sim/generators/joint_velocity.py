@@ -1,7 +1,8 @@
 """Joint velocities commanded one by one; their integral is the reference.
 
-A lost cycle continues with the acceleration of the last commands, or, if a later command is already known, on the way
-to it. The conditions of joint angles apply to the integral, whose backward difference is the commanded velocity.
+The commanded velocities pass the velocity filter. A lost cycle continues with the acceleration of the last commands,
+or, if a later command is already known, on the way to it. The conditions of joint angles apply to the integral, whose
+backward difference is the filtered velocity.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from math import isfinite
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
+from rcilab.sim.filters import LowPass
 from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.rate_extrapolator import RateExtrapolator
@@ -30,6 +32,7 @@ class JointVelocityGenerator:
         self._n = bounds.model.n
         self._q = list(q)
         self._stream = RateExtrapolator(self._n)
+        self._filter = LowPass(bounds.parameters.velocity_filter, [0.0] * self._n)
         self._gap = MissedCycles()
         self._reference = JointReference(bounds, q, checks_box=True)
 
@@ -45,6 +48,7 @@ class JointVelocityGenerator:
         if not isfinite(sum(dq)):
             reason = Remark(f"commanded velocities {dq} rad/s are not all finite numbers", "no_numbers")
             return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
+        dq = self._filter.step(dq)
         self._q = [angle + CYCLE_TIME * rate for angle, rate in zip(self._q, dq, strict=True)]
         return self._reference.step(self._q, cycles)
 

@@ -185,6 +185,8 @@ class FciController:
     @property
     def wants_commands(self) -> bool:
         """Whether a client's motion is in progress; from its first command on, before which it reads several states."""
+        if self._motion is None or not self._motion.mode.is_streamed:
+            return False
         playout = self.playout
         has_begun = playout.is_playing or len(playout) > 0
         return self.phase is Phase.MOVING and has_begun and not playout.is_finished

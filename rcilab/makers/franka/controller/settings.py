@@ -69,10 +69,6 @@ class Settings(ArmParameters):
     """Of setCollisionBehavior."""
     free_axes: tuple[bool, ...] = (True,) * 6
     free_elbow: bool = True
-    velocity_filter: float = SAMPLING_RATE
-    """Cut-off frequency of the low pass of commanded joint velocities, [Hz] (version 5)."""
-    twist_filter: float = SAMPLING_RATE
-    """The same for commanded Cartesian velocities, [Hz]."""
 
     @classmethod
     def of_arm(cls, arm: RobotDescription) -> Settings:
