@@ -14,6 +14,7 @@ from rcilab.core.limits import JointLimits, Limits
 from rcilab.model.robot_model import require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN, angle_text, require_inside
+from rcilab.motion.end_velocity import plan_within_end_velocity, require_approachable
 from rcilab.motion.motion import Motion, stationary_motion
 from rcilab.motion.piecewise import PiecewisePolynomial, join_pieces
 from rcilab.motion.s_curve import STANDSTILL_DISTANCE, plan_s_curve, synchronize
@@ -83,7 +84,9 @@ def plan_joint(
     Raises:
         InvalidValueError: Wrong shape, not finite, more than two turns, an unknown law, a speed out of range, or not an
             arm.
-        PlanningError: A joint is outside its limits, or cannot stay inside them.
+        PlanningError: A joint is outside its limits, or cannot stay inside them. Where an arm bounds its velocities
+            near the ends of the joints' ranges, the motion is slowed down as a whole, and refused if that is not
+            enough.
     """
     if not hasattr(model, "limits"):
         require_model(model)
@@ -121,10 +124,14 @@ def _plan_jerk_limited(
         return stationary_motion(goal, speed=speed)
     if not is_stationary:
         _require_possible(limits, dq, ddq)
+    require_approachable(limits, start, goal)
     scale = LIMIT_MARGIN * speed
-    curve = _ruckig.plan_profile(
-        start, goal, scale * limits.velocity, scale * limits.acceleration, LIMIT_MARGIN * limits.jerk, dq, ddq
-    )
+    velocity, acceleration, jerk = scale * limits.velocity, scale * limits.acceleration, LIMIT_MARGIN * limits.jerk
+
+    def plan(part: float) -> PiecewisePolynomial:
+        return _ruckig.plan_profile(start, goal, part * velocity, part * part * acceleration, jerk, dq, ddq)
+
+    curve = plan_within_end_velocity(limits, plan)
     if not is_stationary:  # From standstill every joint moves straight from start to goal, and both are inside.
         _require_room(curve, limits)
     return Motion(polynomial=curve, goal=goal, law="jerk_limited", speed=speed)

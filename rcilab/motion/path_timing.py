@@ -15,9 +15,11 @@ import numpy as np
 from rcilab.core.arrays import Array, JointPath, JointVector, as_number, make_readonly
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import InvalidValueError, PlanningError
+from rcilab.core.limits import JointLimits
 from rcilab.model.robot_model import RobotModel
 from rcilab.motion.bounds import LIMIT_MARGIN, limit_touched
 from rcilab.motion.cycle_quintics import cycle_quintics, peak_derivatives
+from rcilab.motion.end_velocity import bounds_along, end_excess, find_blocked
 from rcilab.motion.hermite import central_state
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.joint import MIN_SPEED
@@ -54,6 +56,8 @@ class _Bounds:
     jerk: Array
     tool: tuple[float, float, float]
     """Velocity, acceleration and jerk of the tool's translation."""
+    ends: JointLimits | None
+    """The joints' limits if their velocity bounds decrease towards the ends of the ranges; else None."""
 
 
 def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> Motion:
@@ -80,7 +84,12 @@ def plan_along(model: RobotModel, q: JointVector, path: Path, speed: float) -> M
     if path.distance == 0.0:
         return stationary_motion(q, speed=speed)
     bounds = _bounds(model, LIMIT_MARGIN * speed)
-    allowed = _path_bounds(path, require_path(model, q, path), bounds)
+    knots = require_path(model, q, path)
+    blocked = find_blocked(model.limits.joint, knots)
+    if blocked is not None:
+        row, error = blocked
+        raise path_error(path, row / (len(knots) - 1), error)
+    allowed = _path_bounds(path, knots, bounds)
     cycles = max(2, math.ceil(_longest_reversal(bounds) / CYCLE_TIME))
     fastest, slowdown = FastestLaw(allowed), np.ones(len(allowed.knots))
     worst = 0.0
@@ -177,6 +186,7 @@ def _bounds(model: RobotModel, part: float) -> _Bounds:
             part * tool.translation_acceleration,
             LIMIT_MARGIN * tool.translation_jerk,
         ),
+        ends=None if joint.near_ends is None else joint,
     )
 
 
@@ -219,6 +229,10 @@ def _path_bounds(path: Path, knots: JointPath, bounds: _Bounds) -> PathBounds:
     sizes = [np.full(len(rows), limit) for rows, limit in zip(firsts, velocities, strict=True)]
     first = np.vstack(firsts)
     fastest = (np.concatenate(sizes)[:, np.newaxis] / np.maximum(np.abs(first), MIN_SLOPE)).min(axis=0)
+    if bounds.ends is not None:
+        slopes = first[: knots.shape[1]].T
+        allowed = LIMIT_MARGIN * bounds_along(bounds.ends, knots, slopes)
+        np.minimum(fastest, (allowed / np.maximum(np.abs(slopes), MIN_SLOPE)).min(axis=1), out=fastest)
     limits = [np.full(len(rows), limit) for rows, limit in zip(firsts, accelerations, strict=True)]
     return path_bounds(shares, first, np.vstack(seconds), np.concatenate(limits)[:, np.newaxis], fastest)
 
@@ -256,7 +270,10 @@ def _excess(bounds: _Bounds, path: Path, rows: JointPath, shares: Array) -> Arra
             span = CYCLE_TIME**order
             joints = (np.abs(column) / (span * limit)[:, np.newaxis]).max(axis=0)
             tool = np.sqrt((position * position).sum(axis=0)) / (span * tool_limit)
-            _accumulate(excess[block], np.maximum(joints, tool), order)
+            ratio = np.maximum(joints, tool)
+            if order == 1 and bounds.ends is not None:
+                np.maximum(ratio, end_excess(bounds.ends, rows[clamped]), out=ratio)
+            _accumulate(excess[block], ratio, order)
         if _has_via_orientation(path):
             turn = turns_between(path.sample(u)[0][:, :3, :3]).T
             for order, limit in enumerate(limits, start=1):

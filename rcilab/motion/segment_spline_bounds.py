@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcilab.core.arrays import Array
-from rcilab.core.limits import Limits
+from rcilab.core.limits import JointLimits, Limits
 from rcilab.motion.bounds import LIMIT_MARGIN
-from rcilab.motion.path_bounds import POLYGON_FACTOR, PathBounds, half_planes, path_bounds
+from rcilab.motion.end_velocity import bounds_along
+from rcilab.motion.path_bounds import MIN_SLOPE, POLYGON_FACTOR, PathBounds, half_planes, path_bounds
 from rcilab.motion.segment_spline import SegmentSpline, knot_derivatives
 
 
@@ -22,6 +23,8 @@ class ColumnLimits:
     """Shape (n + 3,), [rad/s]; of the translation [m/s]. The others likewise."""
     acceleration: Array
     jerk: Array
+    ends: JointLimits | None
+    """The joints' limits if their velocity bounds decrease towards the ends of the ranges; else None."""
 
 
 def column_limits(limits: Limits) -> ColumnLimits:
@@ -37,6 +40,7 @@ def column_limits(limits: Limits) -> ColumnLimits:
         velocity=LIMIT_MARGIN * np.concatenate((joint.velocity, velocity)),
         acceleration=LIMIT_MARGIN * np.concatenate((joint.acceleration, acceleration)),
         jerk=LIMIT_MARGIN * np.concatenate((joint.jerk, jerk)),
+        ends=None if joint.near_ends is None else joint,
     )
 
 
@@ -55,6 +59,10 @@ def spline_bounds(spline: SegmentSpline, limits: ColumnLimits) -> PathBounds:
         fastest = np.minimum(
             (velocity / first_norms).min(axis=1), (limits.jerk / third_norms).min(axis=1) ** (1.0 / 3.0)
         )
+    if limits.ends is not None:
+        slopes = first[:, :n]
+        allowed = LIMIT_MARGIN * bounds_along(limits.ends, spline.values(spline.knots, slice(n)), slopes)
+        np.minimum(fastest, (allowed / np.maximum(np.abs(slopes), MIN_SLOPE)).min(axis=1), out=fastest)
     first[:, n:] *= moves_tool[:, np.newaxis]
     second[:, n:] *= moves_tool[:, np.newaxis]
     translation = half_planes(first[:, n + 1 : n + 4], second[:, n + 1 : n + 4])

@@ -13,6 +13,7 @@ from rcilab.core.errors import PlanningError
 from rcilab.core.limits import JointLimits, Limits
 from rcilab.motion.bounds import limit_touched
 from rcilab.motion.cycle_quintics import cycle_quintics, peak_derivatives
+from rcilab.motion.end_velocity import end_excess, find_blocked
 from rcilab.motion.rows import OVERCORRECTION, blocks, spread
 from rcilab.motion.segment_spline import Rows, SegmentSpline
 from rcilab.motion.segment_spline_bounds import ColumnLimits, column_limits, spline_bounds
@@ -45,6 +46,7 @@ def plan_segment_spline(
         PlanningError: A joint limit or a singularity is in the way.
     """
     bounds = column_limits(limits)
+    _require_approachable(spline, limits.joint)
     allowed = spline_bounds(spline, bounds)
     finite = np.isfinite(bounds.acceleration)
     # From full deceleration to full acceleration.
@@ -117,8 +119,10 @@ def _excess(
     for block in blocks(last):
         ends = slice(block.start, block.stop + 1)
         if is_checked[ends].any():
-            powers = _quintics(spline, law, ends)[1]
+            q, powers = _quintics(spline, law, ends)
             excess[block] = _joint_excess(spline, limits, powers, interval[ends])
+            if limits.ends is not None:
+                np.maximum(excess[block], end_excess(limits.ends, q), out=excess[block])
             np.maximum(excess[ends], _tool_excess(spline, limits, law, interval, ends), out=excess[ends])
     return excess
 
@@ -178,6 +182,17 @@ def _tables(limits: ColumnLimits, columns: slice) -> tuple[Array, Array, Array]:
 def _with_previous(values: Array, combine: np.ufunc) -> Array:
     """Returns the combined values of each row from the fourth on and the three before it, shape (N - 3,)."""
     return combine(combine(values[3:], values[2:-1]), combine(values[1:-2], values[:-3]))
+
+
+def _require_approachable(spline: SegmentSpline, limits: JointLimits) -> None:
+    blocked = find_blocked(limits, spline.values(spline.knots, slice(spline.n)))
+    if blocked is not None:
+        row, error = blocked
+        s = float(spline.knots[row])
+        segment = spline.segment_at(s)
+        raise PlanningError(f"{spline.describe_position(s)}: {error}", waypoint=segment.number).coded(
+            "waypoint", number=segment.number, kind=segment.waypoint.type, reason=error
+        )
 
 
 def _require_inside(spline: SegmentSpline, q: Array, law: TimeParametrization, limits: JointLimits) -> None:
