@@ -32,6 +32,7 @@ from rcilab.robots import ROBOT_NAMES
 
 MODELS = {name: load_model(name) for name in ROBOT_NAMES}
 MODEL, PANDA = MODELS["xMatePro7"], MODELS["Panda"]
+FRANKA = ("FR3", "Panda")
 NEAR = 1e-4
 """Share of a range around a bound in which check and monitor may disagree: a third difference over 1 ms makes 1e-3
 rad/s^3 of the 1e-12 rad to which the inverse is settled."""
@@ -193,13 +194,13 @@ def test_they_agree_where_a_joint_leaves_its_range_turns_the_elbow_or_meets_a_si
         if cycle > lost:
             break
         q = rows[min(cycle, len(rows) - 1)]
-        side = model.elbow(q)[1] if name == "Panda" else None
+        side = model.elbow(q)[1] if name in FRANKA else None
         found = {(violation.condition.id, violation.axis) for violation in monitor.step(command, side=side)}
         wanted = {(row, axis) for row, places in broken.items() for at, axis in places if at == cycle}
         close = {(row, axis) for row, places in near.items() for at, axis in places if at == cycle}
         assert found - close == wanted - close, cycle
     if not frame:
-        assert broken["inverse.joint.position" if name == "Panda" else "joint.position"]
+        assert broken["inverse.joint.position" if name in FRANKA else "joint.position"]
 
 
 SPOILS = {  # What is displaced, by how much; the highest difference that must notice, and its name.
@@ -229,7 +230,7 @@ def test_a_spoiled_pose_is_flagged_in_exactly_its_differences(name, what, seed, 
         spoiled_pose, psi = T, psi + size
     rows = still.copy()
     rows[place] = model.inverse(spoiled_pose, psi, model.home).nearest(model.home)
-    if what == "elbow" and name == "Panda":
+    if what == "elbow" and name in FRANKA:
         row = "elbow.{}"
     report = check(Motion.from_cycles(rows), model, distance=None, mode="cartesian_position")
     found = from_violations(report)
@@ -249,7 +250,7 @@ def test_a_joint_spoiled_in_position_velocity_acceleration_or_jerk_is_flagged_wh
     joint = int(rng.integers(model.n))
     rows = np.repeat(model.home[np.newaxis], 60, axis=0)
     bound = {1: model.limits.joint.velocity, 2: model.limits.joint.acceleration, 3: model.limits.joint.jerk}
-    prefix = "inverse." if name == "Panda" else ""
+    prefix = "inverse." if name in FRANKA else ""
     kind = ("position", "velocity", "acceleration", "jerk")[order]
     if order == 0:
         rows[place, joint] = model.limits.joint.upper[joint] + 1e-3
@@ -280,7 +281,7 @@ def test_a_spoiled_torque_is_flagged_in_exactly_its_two_differences(name, seed, 
         tau = np.zeros(model.n)
         tau[joint] = rng.choice((-1.3, 1.3)) * bound if cycle == place else 0.0
         found += [(cycle, b.condition.id, b.axis, b.condition.fault) for b in monitor.step(JointTorque(tau))]
-    fault = FrankaError.CONTROLLER_TORQUE_DISCONTINUITY if name == "Panda" else Fault.COMMAND_TORQUE_DISCONTINUITY
+    fault = FrankaError.CONTROLLER_TORQUE_DISCONTINUITY if name in FRANKA else Fault.COMMAND_TORQUE_DISCONTINUITY
     assert found == [(cycle, "torque.rate", joint + 1, fault) for cycle in (place, place + 1)]
 
 

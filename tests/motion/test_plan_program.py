@@ -22,7 +22,7 @@ from rcilab.motion.segment import build_segments
 from rcilab.motion.segment_spline import build_segment_spline
 
 TOOL = Pose((0.0, 0.02, 0.1))
-MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda")}
+MODELS = {name: load_model(name, tool=TOOL) for name in ("xMatePro3", "xMatePro7", "xMate3", "xMate7", "Panda", "FR3")}
 SEVEN, SIX = MODELS["xMatePro7"], MODELS["xMate3"]
 TYPES = ("joint", "line", "arc", "circle", "nullspace")
 names, seeds = st.sampled_from(sorted(MODELS)), st.integers(0, 2**32)
