@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from rcilab.core.arrays import Array, JointPath, JointVector
+from rcilab.core.arrays import Array, JointPath, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import PlanningError
 from rcilab.core.limits import SMALLEST_END_VELOCITY, JointLimits
@@ -19,6 +20,7 @@ _PRECISION = 2e-3
 """Relative tolerance of the part of the speed."""
 _LEAST_STEP = 1.05
 """Least factor from one attempt to the next. Tuning value."""
+_END_ROOM = 0.03  # [rad] Before the angle where the bound is zero. Tuning value: less needs gentler braking.
 _STILL = 1e-9  # [rad] A smaller step is rounding.
 
 
@@ -100,6 +102,27 @@ def plan_within_end_velocity(limits: JointLimits, plan: Callable[[float], Piecew
         else:
             high = middle
     return curve
+
+
+def braking_limits(limits: JointLimits) -> tuple[JointLimits, Array]:
+    """Returns limits with which every stop at some distance from the ends keeps the velocity bounds there.
+
+    A stop from speed v with at most the acceleration a takes at least v^2 / (2 a). So a joint that can always stop at
+    that distance is never faster than sqrt(2 a x), x before it, which is below the bound.
+
+    Returns:
+        The limits, with lower accelerations, and the distance from the ends, shape (n,), [rad]; 0 without such bounds.
+    """
+    ends = limits.near_ends
+    if ends is None:
+        return limits, np.zeros(len(limits.velocity))
+    offset, twice = ends.offset, 2.0 * ends.deceleration
+    distance = offset**2 / twice + _END_ROOM
+    x = np.geomspace(1e-4, np.pi, 200)[:, np.newaxis]
+    allowed = np.minimum(np.sqrt(twice * (x + distance)) - offset, limits.velocity)
+    slowest = np.where(allowed < limits.velocity, allowed**2 / (2.0 * x), np.inf).min(axis=0)
+    acceleration = readonly_copy(np.minimum(limits.acceleration, slowest))
+    return replace(limits, acceleration=acceleration), distance
 
 
 def _worst_excess(limits: JointLimits, curve: PiecewisePolynomial) -> float:

@@ -14,6 +14,7 @@ from rcilab.core.limits import JointLimits
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion import _ruckig
 from rcilab.motion.bounds import LIMIT_MARGIN
+from rcilab.motion.end_velocity import braking_limits
 from rcilab.motion.joint import MIN_SPEED
 from rcilab.motion.stop import plan_stop
 from rcilab.motion.twist import Frame, TwistController
@@ -30,7 +31,8 @@ class Jog:
     Owned by the thread that runs the cycle: one `step` per cycle of 1 ms returns the joint angles to command. For any
     command at any time, velocity, acceleration and jerk of every joint stay `LIMIT_MARGIN` inside the limits, and a
     joint that moves towards the end of its range stops `POSITION_MARGIN` inside it. A command that exceeds a limit is
-    not an error: it is followed as far as the limits allow; see `part` and `is_damped`.
+    not an error: it is followed as far as the limits allow; see `part` and `is_damped`. Where an arm bounds its
+    velocities near the ends of the ranges, a joint stops farther inside, and all accelerate less (`braking_limits`).
 
         jog = Jog(model, robot.state.q_c)
         jog.set_twist([0.05, 0, 0, 0, 0, 0], frame="tool")
@@ -70,9 +72,10 @@ class Jog:
             raise InvalidValueError(
                 "speed", speed, f"must be from {MIN_SPEED:g} to 1: the part of the limits to use"
             ).coded("span", low=f"{MIN_SPEED:g}", high="1")
+        limits, from_ends = braking_limits(limits)
         require_stoppable(limits, start, velocity, acceleration)
-        self._lower = (limits.lower + POSITION_MARGIN).tolist()
-        self._upper = (limits.upper - POSITION_MARGIN).tolist()
+        self._lower = (limits.lower + POSITION_MARGIN + from_ends).tolist()
+        self._upper = (limits.upper - POSITION_MARGIN - from_ends).tolist()
         self._speeds: list[float] = (LIMIT_MARGIN * speed * limits.velocity).tolist()
         a: list[float] = (LIMIT_MARGIN * limits.acceleration).tolist()
         j: list[float] = (LIMIT_MARGIN * limits.jerk).tolist()

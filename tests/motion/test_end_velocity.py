@@ -8,7 +8,7 @@ import pytest
 from rcilab.conformance.check import check
 from rcilab.core.errors import PlanningError
 from rcilab.model.robot_model import load_model
-from rcilab.motion import Program, Waypoint, plan_joint, plan_line, plan_program
+from rcilab.motion import Jog, Motion, Program, Waypoint, plan_joint, plan_line, plan_program
 from rcilab.motion.end_velocity import end_excess
 
 FR3 = load_model("FR3")
@@ -87,3 +87,39 @@ def test_a_program_that_passes_close_to_the_end_of_a_range_conforms() -> None:
     planned = plan_program(FR3, Program(model="FR3", start=FR3.home, waypoints=waypoints))
     assert planned.q[:, 5].max() > LIMITS.upper[5] - 0.2
     assert check(planned, FR3, distance=None).ok
+
+
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_jog_into_the_end_of_a_range_keeps_the_bounds_and_stops_there(joint: int, way: float) -> None:
+    jog = Jog(FR3, FR3.home)
+    dq = np.zeros(7)
+    dq[joint] = way * LIMITS.velocity[joint]
+    jog.set_joint_velocity(dq)
+    rows = [jog.q, *(jog.step() for _ in range(6000))]
+    assert jog.is_stationary
+    end = (LIMITS.upper if way > 0.0 else LIMITS.lower)[joint]
+    assert abs(rows[-1][joint] - end) < 0.05
+    assert end_excess(LIMITS, np.array(rows)).max() <= 1.0 + 1e-9  # Rounding of the difference.
+    assert check(Motion.from_cycles(np.array(rows)), FR3, distance=None).ok
+
+
+def test_a_jog_of_the_tool_keeps_the_bounds_near_the_end_of_a_range() -> None:
+    start = np.array([2.2, 0.3, 0.0, -1.8, 0.0, 2.1, 0.8])
+    jog = Jog(FR3, start)
+    jog.set_twist([*(1.5 * FR3.jacobian(start)[:3, 0]), 0.0, 0.0, 0.0])
+    rows = np.array([jog.q, *(jog.step() for _ in range(4000))])
+    assert rows[:, 0].max() > 2.4
+    assert check(Motion.from_cycles(rows), FR3, distance=None).ok
+
+
+def test_a_jog_may_start_where_the_arm_may_not_move_outwards() -> None:
+    jog = Jog(FR3, home_but(0, LIMITS.upper[0] - 0.5 * ZONE[0]))
+    jog.set_joint_velocity([1.0, 0, 0, 0, 0, 0, 0])
+    assert np.ptp([jog.step()[0] for _ in range(50)]) == 0.0
+    jog.set_joint_velocity([-1.0, 0, 0, 0, 0, 0, 0])
+    rows = [jog.q, *(jog.step() for _ in range(500))]
+    jog.stop()
+    rows += [jog.step() for _ in range(500)]
+    assert rows[-1][0] < 2.6
+    assert check(Motion.from_cycles(np.array(rows)), FR3, distance=None).violations == ()

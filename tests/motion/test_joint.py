@@ -10,7 +10,7 @@ from rcilab.model.robot_model import load_model
 from rcilab.motion import LIMIT_MARGIN, _ruckig, plan_joint
 from rcilab.motion.joint import MIN_SPEED
 
-ALL = [load_model(name) for name in ("xMatePro7", "xMate3", "Panda", "xMatePro3", "xMate7", "FR3")]
+ALL = [load_model(name) for name in ("xMatePro7", "xMate3", "Panda", "xMatePro3", "xMate7")]
 MODEL = ALL[0]
 LIMITS = MODEL.limits.joint
 
