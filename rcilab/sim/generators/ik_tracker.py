@@ -6,12 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rcilab.core.arrays import Array
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import IDENTITY, Pose, rotation_between
 from rcilab.model.robot_model import RobotModel
 
-_CLOSE = 1e-11  # [m], [rad]
+_CONVERGING = 1e-8  # [m], [rad] The next step reduces a smaller error to rounding, as each squares it.
 _MOST_STEPS = 10
+_LARGEST_STEP = 0.1  # [rad] A larger one leaves the last angles.
 _SMALLEST = 1e-8  # Determinant of J J^T, in metres and radians: about 1e-3 in a usual pose.
 
 
@@ -25,10 +27,14 @@ class IkTracker:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        self._model = model
+        self._body = model.rigid_body
         self._solver = model.solver
         self._T_tool_flange = model.T_flange_tool.inverse()
         self._has_tool = not model.T_flange_tool.is_close(IDENTITY, 0.0)
+        joint = model.redundancy.joint
+        self._held = None if joint is None else joint - 1
+        self._moving = [i for i in range(model.n) if i != self._held]
+        self._still = np.zeros(model.n)
 
     def solve(self, T_base_tool: Pose, psi: float, near: Sequence[float]) -> list[float]:
         """Returns the joint angles of a pose, [rad]: those closest to `near`, full turns counted.
@@ -42,11 +48,13 @@ class IkTracker:
             UnreachableError: The pose is out of reach, even without joint limits.
             SingularError: The arm would be at a singularity; the message names it.
         """
-        flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
-        q = self._solver.solve_near(flange, psi, near)
+        q = None if self._held is None else self._step_to(T_base_tool, self._held, psi, near)
         if q is None:
-            self._solver.at(flange, near).branches(psi)  # Raises an error with the distance.
-            raise UnreachableError("no joint angles near the last ones put the tool there")
+            flange = T_base_tool @ self._T_tool_flange if self._has_tool else T_base_tool
+            q = self._solver.solve_near(flange, psi, near)
+            if q is None:
+                self._solver.at(flange, near).branches(psi)  # Raises an error with the distance.
+                raise UnreachableError("no joint angles near the last ones put the tool there")
         singularity = self._solver.singularity(q)
         if singularity is not None:
             raise SingularError(singularity)
@@ -63,19 +71,38 @@ class IkTracker:
             UnreachableError: The pose is out of reach, or too far from the last one.
             SingularError: The tool would lose a direction of motion.
         """
-        model, q = self._model, np.array(near)
-        rotation, position = T_base_tool.parts
-        for _ in range(_MOST_STEPS):
-            here = model.forward(q)
-            p = here.parts[1]
-            error = np.array(
-                [*(a - b for a, b in zip(position, p, strict=True)), *rotation_between(here.parts[0], rotation)]
-            )
-            if np.abs(error).max() < _CLOSE:
-                return q.tolist()
-            J = model.jacobian(q)
+        q = np.array(near)
+        for number in range(_MOST_STEPS):
+            J, error = self._differential(q, T_base_tool)
             square = J @ J.T
-            if np.linalg.det(square) < _SMALLEST:
+            if number == 0 and np.linalg.det(square) < _SMALLEST:
                 raise SingularError("the tool cannot move in every direction there")
             q = q + J.T @ np.linalg.solve(square, error)
+            if np.abs(error).max() < _CONVERGING:
+                return q.tolist()
         raise UnreachableError("no joint angles near the last ones put the tool there")
+
+    def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:
+        """Returns the joint angles near the last ones with one joint held at `psi`, or None if they are not near."""
+        q, moving = np.array(near), self._moving
+        q[held] = psi
+        for _ in range(_MOST_STEPS):
+            J, error = self._differential(q, T_base_tool)
+            try:
+                step = np.linalg.solve(J[:, moving], error)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.abs(step).max() < _LARGEST_STEP:
+                return None
+            q = q.copy()
+            q[moving] += step
+            if np.abs(error).max() < _CONVERGING:
+                return q.tolist()
+        return None
+
+    def _differential(self, q: Array, T_base_tool: Pose) -> tuple[Array, Array]:
+        """Returns the Jacobian at joint angles, and the twist from their pose to another, shape (6,), [m, rad]."""
+        here = self._body.tool_motion(q, self._still)
+        (rotation, position), (R, p) = T_base_tool.parts, here.pose.parts
+        away = [a - b for a, b in zip(position, p, strict=True)]
+        return here.jacobian, np.array([*away, *rotation_between(R, rotation)])

@@ -82,3 +82,45 @@ def test_where_none_is_named_the_tool_can_be_moved_in_every_direction(name: str)
     for q in rng.uniform(model.limits.joint.lower, model.limits.joint.upper, (1000, model.n)):
         if find_singularity(geometry, q.tolist()) is None:
             assert model.dexterity(q).smallest > 1e-4
+
+
+@pytest.mark.parametrize("name", ["Panda", "FR3"])
+def test_with_a_joint_as_redundancy_the_solution_is_that_of_the_solver(name: str) -> None:
+    model, rng = load_model(name, tool=TOOL), np.random.default_rng(5)
+    limits, tracker, count = model.limits.joint, IkTracker(model), 0
+    for q in rng.uniform(limits.lower, limits.upper, (300, model.n)):
+        if model.solver.singularity(q.tolist()) is not None:
+            continue
+        near = q + rng.normal(scale=1e-3, size=model.n)
+        found = tracker.solve(model.forward(q), model.arm_angle(q), near.tolist())
+        assert model.forward(found).is_close(model.forward(q), 1e-10)
+        assert found[2] == q[2]
+        assert np.allclose(found, q, rtol=0, atol=1e-6)  # Weakly determined near a singularity.
+        count += 1
+    assert count > 200
+
+
+def test_a_pose_far_from_the_last_one_is_that_of_the_solver() -> None:
+    model = load_model("FR3")
+    q = model.home + 0.4
+    found = IkTracker(model).solve(model.forward(q), model.arm_angle(q), model.home.tolist())
+    assert model.forward(found).is_close(model.forward(q), 1e-11)
+
+
+@pytest.mark.parametrize("name", ["xMatePro7", "FR3"])
+def test_without_a_redundancy_angle_the_joints_move_least(name: str) -> None:
+    model = load_model(name, tool=TOOL)
+    q = model.home + 0.2
+    goal = Pose.from_rpy([1e-4, -2e-4, 1e-4], [1e-4, 0.0, 3e-4]) @ model.forward(q)
+    found = np.array(IkTracker(model).follow(goal, q.tolist()))
+    assert model.forward(found).is_close(goal, 1e-12)
+    *_, null = np.linalg.svd(model.jacobian(q))[2]
+    assert abs(null @ (found - q)) < 1e-3 * np.linalg.norm(found - q)
+
+
+def test_without_a_redundancy_angle_a_stretched_arm_is_singular() -> None:
+    model = load_model("xMatePro7")
+    q = np.array(model.home)
+    q[3] = 0.0
+    with pytest.raises(SingularError, match="every direction"):
+        IkTracker(model).follow(model.forward(q), q.tolist())
