@@ -174,6 +174,15 @@ def test_a_twist_without_a_pose_is_not_followed(number: float) -> None:
     assert arm.commanded.q == pytest.approx(HOME, abs=0.0)
 
 
+@pytest.mark.parametrize("kind", [CommandKind.POSES, CommandKind.TWISTS])
+@pytest.mark.parametrize("psi", [math.nan, math.inf, 1e308, 4.0])
+def test_an_arm_angle_beyond_a_turn_is_a_violation_also_after_lost_commands(kind: CommandKind, psi: float) -> None:
+    arm = following(kind)
+    arm.step(ArmCommand(0, (), pose_at(0.0), twist=(0.0,) * 6))
+    command = ArmCommand(4, (), pose_at(0.0), has_psi=True, psi=psi, twist=(0.0,) * 6)
+    assert conditions(arm.step(command).command_violations) == {ArmCondition.ARM_ANGLE_RANGE}
+
+
 # Goals
 
 
@@ -261,6 +270,17 @@ def test_without_torques_their_last_ones_are_held_and_the_motion_is_bridged() ->
     arm.step()
     assert arm.signals.tau_c == pytest.approx(speed_of(7, 0.049))
     assert arm.commanded.dq[1] == pytest.approx(1e-4 * 50, abs=1e-9)
+
+
+@pytest.mark.parametrize("torque", [1e308, 1e9, 100.0])
+def test_a_torque_beyond_its_limits_is_not_approached_in_the_cycles_before_it(torque: float) -> None:
+    arm = following(CommandKind.TORQUES, ControlLaw.TORQUE)
+    for k in range(10):
+        arm.step(ArmCommand(k, tau=speed_of(7, 0.1 * k)))
+    violations = arm.step(ArmCommand(12, tau=speed_of(7, torque))).command_violations
+    assert "torque.rate" in conditions(violations)
+    assert arm.signals.tau_c is None
+    assert abs(arm.measured_state.measured.dq[6]) < 10.0
 
 
 # Start

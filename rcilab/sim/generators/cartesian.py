@@ -55,7 +55,7 @@ class CartesianGenerator:
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
-        if find_frame_error(command.T_base_tool) is not None:
+        if find_frame_error(command.T_base_tool) is not None or find_arm_angle_error(command) is not None:
             return True  # `step` refuses it.
         return self._stream.is_next(self._read(command), steps, in_doubt)
 

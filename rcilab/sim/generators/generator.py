@@ -57,18 +57,22 @@ class MotionGenerator(Protocol):
 
 
 class MissedCycles:
-    """Counts the cycles between two commands. Owned by a motion generator."""
+    """Counts the cycles between two commands. Owned by a motion generator.
+
+    Attributes:
+        missing: Cycles without a command up to now.
+    """
 
     def __init__(self) -> None:
-        self._missing = 0
+        self.missing = 0
 
     def step(self, playback: Playback) -> int:
         """Returns the number of cycles since the last command; 0 in a cycle without a command."""
         if playback.is_lost:
-            self._missing += 1
+            self.missing += 1
             return 0
-        cycles = 1 + self._missing + playback.skipped
-        self._missing = 0
+        cycles = 1 + self.missing + playback.skipped
+        self.missing = 0
         return cycles
 
 

@@ -8,8 +8,10 @@ cycles between them.
 
 from __future__ import annotations
 
+from copy import copy
 from math import isfinite
 
+from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
@@ -52,6 +54,8 @@ class TorqueGenerator:
             if not isfinite(sum(tau)):
                 reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
                 return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_TORQUES, reason),))
+            if is_lost and (violations := self._check_ahead(tau, steps)):
+                return GeneratorOutput(violations=tuple(violations))
             if is_lost:
                 tau = [last + (goal - last) / steps for last, goal in zip(self._tau, tau, strict=True)]
         self._tau = tau
@@ -60,6 +64,10 @@ class TorqueGenerator:
         if cycles > 0 and (violations := self._monitor.step(tau, cycles)):
             return GeneratorOutput(violations=tuple(violations))
         return GeneratorOutput(tau=tau)
+
+    def _check_ahead(self, tau: list[float], steps: int) -> list[LimitViolation]:
+        """Returns the violations of torques that are due later: the way to them begins in this cycle."""
+        return copy(self._monitor).step(copy(self._filter).step(tau), self._gap.missing - 1 + steps)
 
     @property
     def is_off_commands(self) -> bool:
