@@ -9,7 +9,6 @@ from rcilab.makers.franka.errors import FrankaError
 from rcilab.sim.violations import ArmCondition, ArmViolation, CycleViolation
 
 _ARM_ERRORS = {
-    ArmCondition.FINITE_ANGLES: FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION,
     ArmCondition.FINITE_TORQUES: FrankaError.CONTROLLER_TORQUE_DISCONTINUITY,
     ArmCondition.VALID_POSE: FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME_FLAG,
     ArmCondition.ARM_ANGLE_RANGE: FrankaError.CARTESIAN_MOTION_GENERATOR_ELBOW_LIMIT_VIOLATION,
@@ -36,9 +35,12 @@ def errors_of(
                 return (_start_error(is_cartesian),)
             if violation.condition is ArmCondition.START_ARM_ANGLE:
                 return (FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID,)
-            found.add(_ARM_ERRORS[violation.condition])
-            continue
-        name = violation.condition.id.replace("arm_angle", "elbow")
+            if violation.condition is not ArmCondition.FINITE_ANGLES:
+                found.add(_ARM_ERRORS[violation.condition])
+                continue
+            name = "joint.position"
+        else:
+            name = violation.condition.id.replace("arm_angle", "elbow")
         if is_cartesian and name.startswith("joint."):
             name = f"inverse.{name}"
         fault = names.get(name)
