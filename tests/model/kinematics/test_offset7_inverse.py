@@ -68,3 +68,16 @@ def test_one_and_many_configurations_are_judged_alike_for_singularities(case):
     q = case[0][:50]
     one = [held_singularity(ARM, row) for row in q.tolist()]
     np.testing.assert_allclose(one, held_singularity_path(ARM, q), rtol=1e-9)
+
+
+def test_every_branch_of_a_thousand_poses_of_the_fr3_reaches_them() -> None:
+    fr3 = load_model("FR3")
+    limits = fr3.limits.joint
+    q = np.random.default_rng(11).uniform(limits.lower, limits.upper, (1000, 7))
+    T = fr3.forward_path(q)
+    found = fr3.inverse_batch(T, q[:, 2]).q
+    rows, branches = np.nonzero(np.isfinite(found[:, :, 0]))
+    assert np.abs(fr3.forward_path(found[rows, branches]) - T[rows]).max() < 1e-9
+    distance = np.abs(wrapped(found - q[:, np.newaxis])).max(axis=2)
+    assert np.nanmin(distance, axis=1).max() < 1e-6
+    assert np.bincount(rows).max() > 4
