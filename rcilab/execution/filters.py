@@ -18,11 +18,15 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import Limits
 from rcilab.core.rotation import as_rotation9, rotation_matrix, rotation_vector
 from rcilab.motion import LIMIT_MARGIN
+from rcilab.motion.end_velocity import followable_bounds
 from rcilab.motion.path import slerp
 
 FILTER_OFF = 1000.0  # [Hz] Cut-off frequency from which on nothing is filtered: the rate of the commands.
 _CATCH_UP = 300.0  # [1/s] Largest rate at which a lag decays: about three cycles, slower than the 1 kHz sampling.
 _BRAKING = 0.7  # Part of the acceleration used for braking: the rest covers the delay of a limited jerk. Tuning value.
+_LOOKAHEAD = (
+    4.0  # [cycles] In which the deceleration builds up that a decreasing velocity bound requires. Tuning value.
+)
 _HALVINGS = 16  # Steps of a search: 1/65536 of the acceleration.
 _ROUNDING = 1.0 + 1e-6
 _NEAR = 1e-7  # [rad, m or N m] In one cycle that is a jerk of 100 units/s^3.
@@ -191,6 +195,8 @@ class RateLimiter:
 
     def __init__(self, limits: Limits, period: int = 1) -> None:
         joint, c, psi = limits.joint, limits.cartesian, limits.arm_angle
+        self._limits = joint
+        self._period = period
         self._joint = _bounds(joint.velocity, joint.acceleration, joint.jerk, period)
         self._translation = _bounds(c.translation_velocity, c.translation_acceleration, c.translation_jerk, period)
         self._rotation = _bounds(c.rotation_velocity, c.rotation_acceleration, c.rotation_jerk, period)
@@ -221,7 +227,9 @@ class RateLimiter:
             isinstance(command, JointPosition) and isinstance(before, JointPosition) and isinstance(sent, JointPosition)
         ):
             command_velocity = (command.q - before.q) / CYCLE_TIME
-            self._rates[0] = limit_rate(command.q - sent.q, command_velocity, self._rates[0], self._joint)
+            lag = command.q - sent.q
+            bounds = self._joint if self._limits.near_ends is None else self._bounds_near_ends(sent.q, lag)
+            self._rates[0] = limit_rate(lag, command_velocity, self._rates[0], bounds)
             q = sent.q + self._rates[0].velocity * CYCLE_TIME
             self._sent = JointPosition(_snapped(q, command.q), command.finished)
         elif isinstance(before, CartesianPosition) and isinstance(sent, CartesianPosition):
@@ -233,6 +241,14 @@ class RateLimiter:
             )
         assert self._sent is not None
         return self._sent
+
+    def _bounds_near_ends(self, q: Array, lag: Array) -> Bounds:
+        """Returns the bounds of the joints, with those of the velocity some cycles ahead."""
+        joint, last = self._joint, self._rates[0].velocity
+        ahead = q + _LOOKAHEAD * CYCLE_TIME * last
+        lower, upper = followable_bounds(self._limits, _BRAKING * self._limits.acceleration, ahead)
+        velocity = np.where(np.where(last == 0.0, lag, last) < 0.0, -lower, upper)
+        return joint._replace(velocity=LIMIT_MARGIN * velocity * self._period)
 
     def _pose(self, T: Array, T_before: Array, T_sent: Array) -> Array:
         p, p_sent = T[:3, 3], T_sent[:3, 3]

@@ -125,6 +125,30 @@ def braking_limits(limits: JointLimits) -> tuple[JointLimits, Array]:
     return replace(limits, acceleration=acceleration), distance
 
 
+def followable_bounds(limits: JointLimits, acceleration: Array, q: JointVector) -> tuple[Array, Array]:
+    """Returns the velocity bounds at joint angles, decreasing no faster than a joint can brake, shape (n,), [rad/s].
+
+    Towards an end the bound decreases with deceleration v / (v + offset), v being the bound itself. Above the velocity
+    at which that is the given acceleration, it is replaced by the velocity from which a joint brakes to it.
+
+    Args:
+        limits: Limits of the joints, with `near_ends`.
+        acceleration: Used for braking, shape (n,), [rad/s^2].
+        q: Joint angles, shape (n,), [rad].
+    """
+    ends, own = limits.near_ends, limits if limits.own is None else limits.own
+    lower, upper = limits.velocity_bounds(q)
+    assert ends is not None
+    excess = ends.deceleration - acceleration
+    velocity = np.where(excess > 0.0, acceleration * ends.offset / np.maximum(excess, _STILL), np.inf)
+    distance = (velocity + ends.offset) ** 2 / (2.0 * ends.deceleration)
+    down, up = (
+        np.where(room > distance, np.sqrt(velocity**2 + 2.0 * acceleration * np.maximum(room - distance, 0.0)), np.inf)
+        for room in (q - own.lower, own.upper - q)
+    )
+    return np.maximum(lower, -down), np.minimum(upper, up)
+
+
 def _worst_excess(limits: JointLimits, curve: PiecewisePolynomial) -> float:
     times = np.arange(0.0, curve.duration + CYCLE_TIME, CYCLE_TIME)
     return float(end_excess(limits, curve.sample(times)).max(initial=0.0))

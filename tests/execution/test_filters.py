@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcilab.conformance.cartesian_monitor import CartesianMonitor
+from rcilab.conformance.check import check
 from rcilab.conformance.joint_monitor import JointMonitor
 from rcilab.conformance.torque_monitor import TorqueMonitor
 from rcilab.core.command import CartesianPosition, JointPosition, JointTorque
@@ -19,7 +20,7 @@ from rcilab.execution.filters import LowPass, RateLimiter, is_near, low_pass, sm
 from rcilab.makers.rokae.conditions import rci_faults
 from rcilab.makers.rokae.limit_tables import cartesian_limits
 from rcilab.model.robot_model import load_model
-from rcilab.motion import plan_joint
+from rcilab.motion import Motion, plan_joint
 from rcilab.motion.cartesian import schedule
 from rcilab.motion.path import build_line
 
@@ -169,3 +170,22 @@ def test_commands_of_any_period_keep_the_limits_over_that_period(period):
         assert (np.abs(np.diff(rows, order, axis=0)) / h**order <= bound).all()
     assert np.abs(rows[-1] - HOME - 0.5).max() < 1e-3
     assert smoothing(100.0, period) == pytest.approx(h / (h + 1.0 / (200.0 * math.pi)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_jumps_towards_the_ends_of_ranges_keep_velocity_bounds_that_decrease_there(seed: int) -> None:
+    fr3 = load_model("FR3")
+    joint, rng = fr3.limits.joint, np.random.default_rng(seed)
+    is_up = rng.integers(0, 2, 7) == 1
+    goal = np.where(is_up, joint.upper - 0.02, joint.lower + 0.02)
+    limiter = RateLimiter(fr3.limits)
+    limiter.begin(JointPosition(fr3.home))
+    rows = [fr3.home]
+    for cycle in range(6000):
+        target = fr3.home if cycle < 1500 and rng.random() < 0.3 else goal
+        command = limiter.step(JointPosition(target))
+        assert isinstance(command, JointPosition)
+        rows.append(command.q)
+    report = check(Motion.from_cycles(np.array(rows)), fr3, distance=None)
+    assert report.violations == ()
+    assert np.abs(rows[-1] - goal).max() < 1e-6
