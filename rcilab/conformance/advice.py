@@ -35,6 +35,7 @@ def advise(
     ratio: float,
     is_off_start: bool,
     soft_limit: float | None = None,
+    is_near_end: bool = False,
 ) -> Phrase:
     """Returns the remedy for a violation.
 
@@ -46,6 +47,7 @@ def advise(
         ratio: Ratio of the worst value to the bound.
         is_off_start: Whether the motion does not start at the start state of the check.
         soft_limit: The soft limit that the joint exceeds, [rad]; None if it exceeds the arm's own range.
+        is_near_end: Whether the bound is lower than elsewhere, because the joint is near the end of its range.
     """
     if condition.stage == "start" and condition.signal == "torque":
         return Phrase("advice.torque.rate")
@@ -70,6 +72,8 @@ def advise(
     # One displaced sample changes two first differences, three second and four third ones.
     if not isfinite(ratio) or (count <= condition.order + 1 and motion.law == "samples"):
         return Phrase("advice.jump")
+    if is_near_end:
+        return Phrase("advice.near_end", factor=f"{ceil(1000.0 * ratio) / 1000.0:.3f}")
     if motion.law in JOINT_LAWS:
         lower = floor(100.0 * motion.speed / ratio) / 100.0
         if 0.0 < lower < motion.speed:

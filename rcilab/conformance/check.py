@@ -316,6 +316,8 @@ class _MotionChecker:
         joint = _axis(condition, column)
         is_angle = condition.signal == "joint" and condition.order == 0
         soft_limit = self._limits.joint.exceeded_soft_limit(joint, value) if is_angle else None
+        bound = _nearest_bound(value, *bounds, row, column)
+        is_near_end = bounds[0].ndim == 2 and abs(bound) < self._limits.joint.velocity[column]
         advice = advise(
             condition,
             self._motion,
@@ -324,6 +326,7 @@ class _MotionChecker:
             ratio=worst,
             is_off_start=is_off_start,
             soft_limit=soft_limit,
+            is_near_end=bool(is_near_end),
         )
         return Violation(
             condition=condition,
@@ -332,7 +335,7 @@ class _MotionChecker:
             count=end - begin,
             value=value,
             worst_time=first_time + row * CYCLE_TIME,
-            bound=_nearest_bound(value, *bounds, row, column),
+            bound=bound,
             ratio=worst,
             advice=advice,
             links=self._signals.links(condition, row),

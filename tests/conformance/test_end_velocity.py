@@ -89,6 +89,8 @@ def test_a_slow_down_takes_a_motion_below_the_bound() -> None:
     q[:, 0] = 2.1 + 0.6 * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
     report = check(Motion.from_cycles(q), FR3, distance=None)
     assert {v.condition.id for v in report.violations} == {"joint.velocity"}
+    assert "the bound decreases towards the end of the range" in report.explain()
+    assert "越接近限位，限值越低" in report.explain("zh")
     found = report.slow_down()
     assert found.ok
     assert found.decisive is not None
