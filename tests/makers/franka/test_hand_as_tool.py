@@ -8,7 +8,14 @@ import pytest
 from rcilab.cli.arm_options import parse_tool_and_load
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
+from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.wire.requests import SetLoad
+from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.versions import VERSION_10, Status
 from rcilab.model.robot_model import load_model
+from rcilab.sim.arm_setup import ArmSetup
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 ARMS = pytest.mark.parametrize("name", ["Panda", "FR3"])
 
@@ -50,3 +57,24 @@ def test_on_the_command_line_a_load_replaces_that_of_the_tool() -> None:
     assert parse_tool_and_load(None, None, None) == (None, None)
     with pytest.raises(InvalidValueError, match="--tool: tool: 'claw' is not a tool of the Panda"):
         parse_tool_and_load("claw", None, "Panda")
+
+
+def test_a_virtual_arm_with_the_hand_reports_it_as_end_effector_beside_the_load_of_a_client() -> None:
+    fr3 = load_model("FR3")
+    controller = FciController(VirtualArm(fr3, build_plant("ideal", fr3), prefill=0), VERSION_10)
+    tool, load = parse_tool_and_load("hand", None, "FR3")
+    controller.set_up(ArmSetup(T_flange_tool=tool, load=load))
+    assert controller.set(SetLoad(0.5, (0.0, 0.0, 0.1), (0.0,) * 9))[0] is Status.SUCCESS
+    controller.step()
+
+    def shown(name: str) -> list[float]:
+        return controller.packet.numbers[PLACES[name]].tolist()
+
+    s = float(np.sqrt(0.5))
+    hand = [s, -s, 0.0, 0.0, s, s, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.1034, 1.0]
+    assert shown("F_T_EE") == shown("F_T_NE") == pytest.approx(hand)
+    assert shown("m_ee") == [0.73]
+    assert shown("F_x_Cee") == [-0.01, 0.0, 0.03]
+    assert shown("I_ee") == [0.001, 0.0, 0.0, 0.0, 0.0025, 0.0, 0.0, 0.0, 0.0017]
+    assert shown("m_load") == [0.5]
+    assert controller.settings.load.mass == pytest.approx(1.23)

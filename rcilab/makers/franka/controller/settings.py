@@ -86,7 +86,9 @@ class Settings(ArmParameters):
 
 
 def apply_setup(settings: Settings, setup: ArmSetup) -> Settings:
-    """Returns the settings with a tool or a load of a configuration.
+    """Returns the settings with a tool or a load of a configuration, as on Franka's Desk: those of the end effector.
+
+    What a client sets with setNEToEE and setLoad comes on top of them.
 
     Raises:
         InvalidValueError: The controller has no such setting: no safety box, no soft limits.
@@ -98,7 +100,7 @@ def apply_setup(settings: Settings, setup: ArmSetup) -> Settings:
     if setup.T_flange_tool is not None:
         settings = _with_frames(replace(settings, F_T_NE=setup.T_flange_tool, NE_T_EE=IDENTITY))
     if setup.load is not None:
-        settings = _with_load(settings, setup.load)
+        settings = _with_bodies(replace(settings, end_effector=setup.load))
     return settings
 
 
@@ -131,7 +133,7 @@ def apply_request(settings: Settings, request: Request) -> Settings:
         case SetNEToEE(NE_T_EE=numbers):
             return _with_frames(replace(settings, NE_T_EE=pose_from_columns("NE_T_EE", numbers)))
         case SetLoad():
-            return _with_load(settings, _load(request))
+            return _with_bodies(replace(settings, client_load=_load(request)))
         case SetFilters(frequencies=values):
             for value in values:
                 _require("filter frequency", value, LOWEST_FREQUENCY, SAMPLING_RATE, "Hz")
@@ -163,8 +165,8 @@ def _with_frames(settings: Settings) -> Settings:
     return replace(settings, T_flange_tool=settings.F_T_NE @ settings.NE_T_EE)
 
 
-def _with_load(settings: Settings, load: Payload) -> Settings:
-    return replace(settings, client_load=load, load=_combined(settings.end_effector, load))
+def _with_bodies(settings: Settings) -> Settings:
+    return replace(settings, load=_combined(settings.end_effector, settings.client_load))
 
 
 def _combined(first: Payload, second: Payload) -> Payload:
