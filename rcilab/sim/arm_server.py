@@ -381,18 +381,28 @@ class ArmServer:
                 self.request_stop()
 
     def _catch_up(self) -> None:
-        """Advances by cycles without sending their states if too many commands are queued."""
+        """Advances by cycles without sending their states if the client is ahead of the arm.
+
+        It is if more commands are queued than the prefill. Where cycles wait for commands it also is if it skipped
+        states that were sent before its first command arrived; it would otherwise stay ahead, and not be waited for.
+        """
         if not self.controller.wants_commands:
             return
-        playout = self.controller.arm.playout
-        extra = (
-            len(playout) - 1 - self.config.prefill_cycles if self.config.lockstep else int(playout.pop_extra_cycle())
-        )
-        for _ in range(extra):
-            if self.controller.wants_commands:
-                self._advance(is_sent=False)
-                if self._capture is not None:
-                    self._capture.write()
+        arm = self.controller.arm
+        playout = arm.playout
+        if not (self.config.lockstep or self._patience > 0.0):
+            if playout.pop_extra_cycle():
+                self._advance_unsent()
+            return
+        while self.controller.wants_commands and (
+            len(playout) - 1 > playout.prefill or (playout.prefill == 0 and arm.is_behind)
+        ):
+            self._advance_unsent()
+
+    def _advance_unsent(self) -> None:
+        self._advance(is_sent=False)
+        if self._capture is not None:
+            self._capture.write()
 
     def _log_event(self, kind: str, text: str, **facts: object) -> None:
         """Logs an event of the maker's controller, after the fault that caused it."""

@@ -185,15 +185,22 @@ class JitterBuffer:
         is_repeating, self._is_repeating = self._is_repeating, False
         if not self._queue:
             return self._bridge_repeat() if is_repeating else self._lose(_EMPTY)
+        command, steps = self._find_next(is_next)
+        return self._play(command, skipped) if steps == 1 else self._lose(Playback(command, steps, True))
+
+    def is_behind(self, is_next: Callable[[ArmCommand, int, bool], bool]) -> bool:
+        """Returns whether the next cycle is lost although the command of a later one is queued; see `take`."""
+        return self.is_playing and len(self._queue) > 0 and self._find_next(is_next)[1] > 1
+
+    def _find_next(self, is_next: Callable[[ArmCommand, int, bool], bool]) -> tuple[ArmCommand, int]:
+        """Returns the next command of the queue, and the number of cycles until it is due, 1 for now."""
         command = self._queue[0]
         steps = 1 if command.number == self._last_id + 1 else self._steps_to(command, is_next)
         if steps > 1:  # Unless a reordered command fills the gap, its cycles are lost.
             between = (other for other in self._queue if self._last_id < other.number < command.number)
             command = min(between, key=lambda other: other.number, default=command)
             steps = self._steps_to(command, is_next)
-            if steps > 1:
-                return self._lose(Playback(command, steps, True))
-        return self._play(command, skipped)
+        return command, steps
 
     def _ids(self) -> Iterator[int]:
         return (command.number for command in self._queue)

@@ -76,6 +76,11 @@ class StreamedMotion:
         """Whether the reference still responds to commands that were missing."""
         return self.is_followed and self._generator is not None and self._generator.is_off_commands
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether the next cycle is lost although the command of a later one is queued."""
+        return self.is_followed and self._generator is not None and self.playout.is_behind(self._generator.is_next)
+
     def prepare(self, mode: MotionMode, on_loss: LossBehaviour) -> None:
         """Resets everything for a motion in this mode.
 

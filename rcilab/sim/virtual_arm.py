@@ -158,6 +158,11 @@ class VirtualArm:
         return self._motion.is_followed
 
     @property
+    def is_behind(self) -> bool:
+        """Whether the next cycle is lost although the command of a later one has arrived."""
+        return self._motion.is_behind
+
+    @property
     def is_standstill(self) -> bool:
         """Whether its reference is stationary and its joints have stopped."""
         return self.commanded.is_stationary and (self._cycles_at_rest > SETTLE_LIMIT or self._is_slow())

@@ -312,3 +312,19 @@ def test_commands_that_come_now_and_then_are_played_at_once_and_nothing_is_lost(
     playout.push(command(111))
     assert take_ids(playout, 2) == [111, "wait"]
     assert (playout.lost, playout.success_rate) == (0, 1.0)
+
+
+def test_a_buffer_is_behind_while_a_lost_cycle_comes_before_the_next_command() -> None:
+    playout = JitterBuffer(prefill=0)
+    playout.push(command(7))
+    assert not playout.is_behind(by_whole_gap)  # Not playing yet.
+    take_ids(playout, 1)
+    assert not playout.is_behind(by_whole_gap)  # Nothing is known of a later cycle.
+    playout.push(command(10))
+    assert not playout.is_behind(by_one_step)
+    assert playout.is_behind(by_whole_gap)
+    assert take_ids(playout, 1) == ["lost"]
+    assert playout.is_behind(by_whole_gap)
+    assert take_ids(playout, 1) == ["lost"]
+    assert not playout.is_behind(by_whole_gap)
+    assert take_ids(playout, 1) == [10]
