@@ -114,7 +114,7 @@ def _run(args: Namespace) -> int:
 
 
 def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None]) -> tuple[Report, Report]:
-    """Returns the report, and that on the motion to slow down, which must end at rest; shows the motion's notes."""
+    """Returns the report and that on the motion to slow down, which must end at standstill; shows its notes."""
     from rcilab.conformance.check import check
     from rcilab.recording.run import Run
     from rcilab.recording.sent_motion import check_sent, recorded_mode, start_of, with_stop

@@ -117,7 +117,7 @@ def check_commands(
 ) -> Report:
     """Checks the commands of a recorded motion, up to the last one.
 
-    `check` holds the arm at the last row; here the controller has stopped it, in its own way. A first command within
+    `check` holds the arm at the last row; here the controller has stopped it. A first command within
     one cycle's jerk of the arm is the first step of the motion. The report has no certificate.
 
     Args:

@@ -197,9 +197,9 @@ class Run:
     def duration(self) -> float:
         """Time from the first command to the last recorded cycle, [s].
 
-        Where a virtual controller recorded which commands it played, to the last one of these, from the first.
+        With a recorded play-out, to the last played command, from the first.
         """
-        if "played" in (self.cycles.dtype.names or ()):
+        if self.has_playout:
             return played_duration(self.cycles)
         return float(self.t[-1]) if len(self.t) else 0.0
 

@@ -162,7 +162,7 @@ def _in_progress(motion: Motion) -> tuple[Motion, StartState | None]:
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
-    """Returns a motion whose last row still moves, continued by a stop, so that it can be run; one at rest as it is.
+    """Returns a motion whose last row still moves, continued by a stop; one at standstill as it is.
 
     Joints stop as fast as their limits allow; where poses are commanded, smoothly, on a course that the limits of the
     tool allow, too. A motion that ends in a jump, from which no stop leads, is returned as it is.
@@ -225,14 +225,14 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
 def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     """Returns the numbers of commands without the gaps after which a client goes on from where it paused.
 
-    Only the values can tell: its velocities before and after a gap lead over one cycle or over all.
+    Only the values show it: its velocities before and after a gap lead over one cycle or over all.
     """
     steps = np.diff(index)
     for gap in np.flatnonzero(steps[1:-1] > 1) + 1:
         if steps[gap - 1] > 1 or steps[gap + 1] > 1:
             continue
-        way, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
-        if np.abs(way - velocity).sum() < np.abs(way - steps[gap] * velocity).sum():
+        step, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
+        if np.abs(step - velocity).sum() < np.abs(step - steps[gap] * velocity).sum():
             steps[gap] = 1
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
 
@@ -281,7 +281,7 @@ def _fade_time(dq: Array, ddq: Array, model: RobotModel) -> float:
 
 
 def _fade_out(dq: Array, ddq: Array, duration: float) -> JointPath:
-    """Returns the way of every cycle until standstill; velocity and acceleration continue and vanish smoothly."""
+    """Returns the displacement in every cycle until standstill; velocity and acceleration vanish smoothly."""
     s = CYCLE_TIME * np.arange(1, round(duration / CYCLE_TIME) + 1)[:, np.newaxis]
     u = s / duration
     velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3

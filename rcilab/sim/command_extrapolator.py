@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 _DISTANCE_RATIO = 4.0  # Between the nearer and the farther prediction, so that a jerk is not decisive; a tuning value.
-_LONGEST = 50  # [cycles] The longest gap in which a cubic follows a motion; the way over a longer one is straight.
+_LONGEST = 50  # [cycles] The longest gap in which a cubic follows a motion; the path over a longer one is straight.
 
 
 class CommandExtrapolator:

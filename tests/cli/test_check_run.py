@@ -203,14 +203,14 @@ def test_a_slowed_run_ends_at_rest(tmp_path, capsys):
     assert np.abs(np.diff(written.q[-2:], axis=0)).max() < 1e-6
 
 
-def test_a_run_checked_as_one_of_another_arm_says_so(tmp_path, capsys):
+def test_a_run_checked_as_one_of_another_arm_has_a_note(tmp_path, capsys):
     run_of(some_cycles()).save(tmp_path / "a.rcirun")
     main(["check", str(tmp_path / "a.rcirun"), "--model", "xMatePro3", "--load", "1@0,0,0"])
     assert "note: the run is of the xMatePro7, checked as one of the xMatePro3" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    ("rows", "words"),
+    ("rows", "expected"),
     [
         ([[k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
         ([[1e5 * k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
@@ -218,8 +218,8 @@ def test_a_run_checked_as_one_of_another_arm_says_so(tmp_path, capsys):
         (-PLAN.q, "the first column is the time: is it missing?"),
     ],
 )
-def test_a_table_with_wrong_times_names_the_cause(tmp_path, capsys, rows, words):
+def test_a_table_with_wrong_times_names_the_cause(tmp_path, capsys, rows, expected):
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",")
     main(["check", str(tmp_path / "a.csv"), "--model", "xMatePro7"])
     said = capsys.readouterr()
-    assert words in said.out + said.err
+    assert expected in said.out + said.err

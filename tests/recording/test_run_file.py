@@ -301,7 +301,7 @@ def test_times_that_no_motion_has_are_refused(tmp_path, last):
     "settings",
     [{"safety_box": 5}, {"safety_box": {"size": [1], "pose": "x", "active": 3}}, {"safety_box": {}}, 5, None],
 )
-def test_settings_that_are_none_are_refused(tmp_path, settings):
+def test_settings_that_are_not_valid_are_refused(tmp_path, settings):
     run = some_run()
     replace(run, setup=replace(run.setup, settings=settings)).save(tmp_path / "a.rcirun")
     with pytest.raises(InvalidValueError, match="is damaged"):

@@ -190,7 +190,7 @@ def test_a_line_of_the_tool_is_held_in_its_joints(make_hand) -> None:
 def test_a_pause_in_which_the_arm_begins_to_brake_breaks_nothing_with_a_filter_on(
     make_hand, cut_off: float, pose: bool
 ) -> None:
-    """The filter continues on the way that the commands took meanwhile, not on that of the last commands before."""
+    """The filter continues on the path that the commands took meanwhile, not on that of the last commands before."""
     hand = make_hand()
     assert hand.ask(rci.SetFilters(cut_off, cut_off, 1000.0)) == 0
     hand.start(int(pose), 2 if pose else 1)
