@@ -70,6 +70,14 @@ def test_a_client_that_vanishes_while_the_arm_moves_is_reported(how: str) -> Non
         wait_for_kind(found, "motion_ended")
 
 
+def test_the_advice_after_missing_commands_tells_which_pauses_a_prefill_absorbs() -> None:
+    """At the fault it is not known how long the client will pause."""
+    with running(lockstep=True, patience=0.05) as found, Peer(found) as peer:
+        peer.run(MOTION.q[:150])
+        advice = wait_for_kind(found, "advice")
+        assert advice.text.startswith("--prefill N absorbs pauses of the client of N ms, 100 at most; ")
+
+
 def test_a_program_can_be_followed_by_its_log() -> None:
     with running(lockstep=True) as found, Peer(found) as peer:
         peer.run(MOTION.q)
