@@ -117,14 +117,15 @@ def check_commands(
 ) -> Report:
     """Checks the commands of a recorded motion, up to the last one.
 
-    `check` holds the arm at the last row; here the controller has stopped it. A first command within
-    one cycle's jerk of the arm is the first step of the motion. The report has no certificate.
+    `check` holds the arm at the last row; here the controller has stopped it. A first command within one cycle's jerk
+    of the arm is the first step of the motion. An end that is not the client's need not be a standstill. The report has
+    no certificate.
 
     Args:
         motion: The commands.
         model: The arm.
-        record: What else is known of them; where the motion was stopped, its end need not be a standstill.
-        start: As for `check`, also for the others.
+        record: What else is known of them.
+        start: As for `check`; a StartState where the beginning of the motion is not known.
         box: The safety box.
         distance: Required distances of the links.
         mode: Mode of the motion.
@@ -159,8 +160,9 @@ def _check(
     rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
-    if record is not None and record.was_stopped:
-        rows = tuple(row for row in rows if row.stage != "end")
+    if record is not None:
+        is_missing = {"start": state.moving, "throughout": False, "end": record.was_stopped}
+        rows = tuple(row for row in rows if not is_missing[row.stage])
     return _report(
         motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
     )

@@ -165,6 +165,14 @@ def test_a_jump_at_the_end_is_a_violation(sine: Run) -> None:
     assert with_stop(report.motion, MODEL, "joint_position") is report.motion
 
 
+def test_a_run_without_its_beginning_is_checked_from_there_on(sine: Run) -> None:
+    rest = replace(sine, cycles=sine.cycles[300:], truncated=True)
+    report = check_sent(rest, distance=None)
+    assert report.ok
+    assert not any(row.condition.stage == "start" for row in report.rows)
+    assert abs(next(row.value for row in report.rows if row.id == "joint.jerk")) < 50.0
+
+
 def test_a_first_step_that_no_limit_forbids_needs_no_advice(sine: Run) -> None:
     cycles = sine.cycles.copy()
     cycles["q_c"][0] -= 5e-8
