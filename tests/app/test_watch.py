@@ -8,6 +8,7 @@ import os
 import socket
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -199,6 +200,14 @@ def test_what_is_not_a_controller_or_contradicts_itself_is_refused_in_one_senten
     assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 400
+
+
+def test_a_descriptor_of_another_file_is_refused(tmp_path: Path) -> None:
+    with open(tmp_path / "other", "wb+") as other:
+        other.write(bytes(100_000))
+        other.flush()
+        with pytest.raises(UsageError, match="not the record of a controller"):
+            WatchedController(lie(status(record=other.fileno())))
 
 
 @pytest.mark.parametrize("host", ["a..b", "x" * 100])

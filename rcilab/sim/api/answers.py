@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, cast
 
 from rcilab.i18n.translator import Remark
@@ -98,11 +98,15 @@ _MOST_INPUTS = 32
 
 def status_as_dict(status: WorldStatus) -> dict[str, Any]:
     """Returns a status as a JSON object."""
-    content = {item.name: getattr(status, item.name) for item in fields(status)}
-    content |= {name: asdict(content[name]) for name in _SETUP if content[name] is not None}
+    content = _values(status)
+    content |= {name: _values(content[name]) for name in _SETUP if content[name] is not None}
     if isinstance(status.reason, Remark) and status.reason.code:
         content["remark"] = status.reason.as_dict()
     return content | {"commands": status.commands.as_dict(), "states": status.states.as_dict()}
+
+
+def _values(item: WorldStatus | SetTool | SetLoad | SetBox | SetSoftLimits) -> dict[str, Any]:
+    return {each.name: getattr(item, each.name) for each in fields(item)}
 
 
 def status_from_dict(content: dict[str, Any]) -> WorldStatus:
