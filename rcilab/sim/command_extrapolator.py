@@ -55,7 +55,7 @@ class CommandExtrapolator:
             steps: Cycles from the last command to it.
         """
         if steps <= _LONGEST:
-            # As `predict` with this target, in terms of k, k (k + 1) and k (k + 1) (k + 2), because it is done in one cycle.
+            # As `predict` with this target, but with its differences computed once: all of it is done in one cycle.
             full = steps * (steps + 1) * (steps + 2)
             terms = [
                 (x, x - y, (x - 2.0 * y + z) / 2.0, (goal - far) / full)
