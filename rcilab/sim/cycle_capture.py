@@ -186,32 +186,36 @@ class CycleCapture:
         return joints, self._offsets["command"], attrgetter("q")
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
-        """Writes the events of a motion that begins or has ended."""
-        controller = self._controller
-        is_moving = is_following or (self._is_moving and controller.is_moving)
+        """Writes the event of a motion that begins or has ended."""
+        is_moving = is_following or (self._is_moving and self._controller.is_moving)
         if is_moving is self._is_moving:
             return
         self._is_moving = is_moving
-        arm = controller.arm
         if is_moving:
-            self._motion += 1
-            self._lost_client = ""
-            load = arm.model.load
-            self._ring.add_event(
-                {
-                    "event": "begin",
-                    "motion": self._motion,
-                    "row": self._count,
-                    "mode": state.controller_mode.name.lower(),
-                    "client": self._client,
-                    "wall_ns": time.time_ns(),
-                    "tool": arm.model.T_flange_tool.as_row_major(),
-                    "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
-                    "settings": {**describe_parameters(arm.parameters), **self._describe()},
-                }
-            )
-            return
-        playout = arm.playout
+            self._begin_motion(state)
+        else:
+            self._end_motion()
+
+    def _begin_motion(self, state: RobotState) -> None:
+        self._motion += 1
+        self._lost_client = ""
+        arm, load = self._arm, self._arm.model.load
+        self._ring.add_event(
+            {
+                "event": "begin",
+                "motion": self._motion,
+                "row": self._count,
+                "mode": state.controller_mode.name.lower(),
+                "client": self._client,
+                "wall_ns": time.time_ns(),
+                "tool": arm.model.T_flange_tool.as_row_major(),
+                "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
+                "settings": {**describe_parameters(arm.parameters), **self._describe()},
+            }
+        )
+
+    def _end_motion(self) -> None:
+        controller, playout = self._controller, self._playout
         reason = controller.reason if controller.faults else Remark(self._lost_client)
         self._ring.add_event(
             {
