@@ -195,7 +195,7 @@ def test_a_jump_at_the_end_of_a_run_is_a_violation_and_no_stop_is_written(tmp_pa
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 1
 
 
-def test_a_slowed_run_ends_at_rest(tmp_path, capsys):
+def test_a_slowed_run_ends_at_standstill(tmp_path, capsys):
     run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 0
     written = Motion.load(tmp_path / "b.npz")

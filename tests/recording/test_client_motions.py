@@ -229,7 +229,7 @@ def test_duplicates_do_not_displace_other_commands() -> None:
 
 
 def sine(step: int, count: int) -> tuple[float, ...]:
-    """A gentle motion that begins and ends at rest, [rad]; no two commands are equal."""
+    """A gentle motion that begins and ends at standstill, [rad]; no two commands are equal."""
     offset = 0.01 * (1.0 - np.cos(2.0 * np.pi * step / (count - 1))) + 1e-12 * step
     return tuple(angle + offset for angle in programs.START[7])
 

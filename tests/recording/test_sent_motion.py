@@ -141,7 +141,7 @@ def test_a_motion_lasts_from_its_first_played_command_to_the_last(sine: Run) -> 
 
 
 def test_the_hold_after_the_last_command_is_not_the_clients(sine: Run) -> None:
-    """A client that ends at speed is advised to end at rest; one that was stopped is not."""
+    """A client that ends at speed is advised to end at standstill; one that was stopped is not."""
     end = int(np.flatnonzero(sine.cycles["played"])[300])
     cut = replace(sine, cycles=sine.cycles[: end + 1])
     assert not check(sent_motion(cut), MODEL, distance=None).ok

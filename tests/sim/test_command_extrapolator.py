@@ -56,7 +56,7 @@ def test_the_commands_of_a_whole_gap_follow_a_constant_jerk_and_are_taken(gap: i
     assert stream.last == found[-1]
 
 
-def test_the_way_over_a_long_gap_is_straight() -> None:
+def test_the_path_over_a_long_gap_is_straight() -> None:
     found = np.array(fed(np.array([cubic(k) for k in (-3, -2, -1, 0)])).bridge([0.2] * 7, 1000))
     assert found.shape == (49, 7)
     assert np.allclose(np.diff(found, axis=0), (0.2 - cubic(0)) / 1000.0, rtol=0, atol=1e-12)

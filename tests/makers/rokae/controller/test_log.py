@@ -70,7 +70,7 @@ def test_a_client_that_vanishes_while_the_arm_moves_is_reported(how: str) -> Non
         wait_for_kind(found, "motion_ended")
 
 
-def test_the_advice_after_missing_commands_tells_which_pauses_a_prefill_absorbs() -> None:
+def test_the_advice_after_missing_commands_names_the_pauses_that_a_prefill_absorbs() -> None:
     """At the fault it is not known how long the client will pause."""
     with running(lockstep=True, patience=0.05) as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
