@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
-_LARGEST = 1e100  # [rad] Of commanded angles: their differences remain finite.
+_LARGEST = 1e100  # [rad] Of commanded angles, also of one that is not a number: their differences remain finite.
+_FARTHEST = 1e6  # [m] Of commanded positions; out of any arm's reach.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -66,16 +67,18 @@ def read_sent(run: Run) -> SentCommands:
     """Returns what a client commanded, see `sent_motion`, and whether its last command was a pose without angles."""
     cycles = run.cycles
     is_played = run.has_playout
-    of_poses = bool(np.isfinite(cycles["command_pose"]).any())
+    of_poses = run.setup.mode.startswith("cartesian") or not np.isnan(cycles["command_pose"]).all()
     numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
-    sent = np.asarray(np.isfinite(numbers).all(axis=1), dtype=np.bool_)
+    sent = np.asarray(~np.isnan(numbers).all(axis=1), dtype=np.bool_)
+    if is_played and run.setup.mode != "torque":
+        sent[played_commands(cycles)[1]] = True  # Also of those that are not numbers.
     period = 1 if is_played else state_cycles(cycles)
     index, rows = _played_order(cycles, sent) if is_played else _answered_order(cycles, sent, period)
     if not len(rows):
         has_torques = np.isfinite(cycles["command_tau"]).any()
         what = "torques were sent, which have no path" if has_torques else "nothing was sent"
         raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
-    q = _angles_of_poses(run, rows) if of_poses else np.clip(cycles["command"][rows], -_LARGEST, _LARGEST)
+    q = _angles_of_poses(run, rows) if of_poses else _finite(cycles["command"][rows])
     was_refused = len(q) < len(rows)
     if not len(q):
         return SentCommands(motion=Motion.from_cycles(cycles["q_c"][:1]), was_refused=True)
@@ -237,13 +240,17 @@ def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
 
 
+def _finite(q: Array) -> JointPath:
+    return np.clip(np.where(np.isnan(q), _LARGEST, q), -_LARGEST, _LARGEST)
+
+
 def _angles_of_poses(run: Run, rows: NDArray[np.intp]) -> JointPath:
     """Returns the joint angles of the poses in some rows, up to the first one that has none, shape (M, n), [rad]."""
     model, cycles = require_model(run.model), run.cycles
     start = as_vector(cycles["q_c"][0], model.n, "q_c of the run", "rad")
-    T = cycles["command_pose"][rows]
-    for row, pose in enumerate(T.reshape(-1, 16).tolist()):
-        if find_frame_error(pose) is not None:
+    T = np.clip(cycles["command_pose"][rows], -_FARTHEST, _FARTHEST)
+    for row, pose in enumerate(T.reshape(-1, 16)):
+        if find_frame_error(pose.tolist()) is not None:
             T = T[:row]
             break
     psi = _arm_angles(model, start, cycles["command_psi"][rows[: len(T)]].tolist()) if model.redundancy else None

@@ -19,9 +19,17 @@ from tests.recording.test_client_motions import MODEL, NEAR, SECONDS, as_run, co
 
 @pytest.fixture(scope="module")
 def sine() -> Run:
-    with watched() as (_place, motions), _place.connect() as robot:
+    with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         programs.joint_sine(robot, SECONDS, period=SECONDS)
+        return as_run(collect(motions, 2)[1])
+
+
+@pytest.fixture(scope="module")
+def line() -> Run:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
         return as_run(collect(motions, 2)[1])
 
 
@@ -80,6 +88,24 @@ def test_a_pose_without_joint_angles_is_the_violation(count: int) -> None:
     (violation,) = report.violations
     assert violation.time == pytest.approx(max(count, 1) * CYCLE_TIME)
     assert violation.count == 1
+
+
+@pytest.mark.parametrize("value", [np.inf, -1e300, np.nan])
+def test_commands_that_are_not_numbers_do_not_conform(sine: Run, value: float) -> None:
+    cycles = sine.cycles.copy()
+    played = np.flatnonzero(cycles["played"])[200]
+    cycles["command"][played - int(cycles["age"][played])] = value
+    report = check_sent(replace(sine, cycles=cycles), distance=None)
+    assert "joint.position" in {violation.condition.id for violation in report.violations}
+
+
+@pytest.mark.parametrize("value", [np.inf, -1e300, np.nan])
+def test_poses_that_are_not_numbers_do_not_conform(line: Run, value: float) -> None:
+    cycles = line.cycles.copy()
+    played = np.flatnonzero(cycles["played"])[100]
+    cycles["command_pose"][played - int(cycles["age"][played]), 0, 3] = value
+    report = check_sent(replace(line, cycles=cycles), distance=None)
+    assert "cartesian.frame" in {violation.condition.id for violation in report.violations}
 
 
 def test_poses_are_checked_by_their_own_angles() -> None:
