@@ -97,7 +97,7 @@ def _run(args: Namespace) -> int:
     arm = describe_arm(model, subject.box)
     for line in filter(None, (arm, subject.note)):
         show_note(f"note: {line}")
-    is_explained = args.explain is not None and not report.ok
+    is_explained = args.explain is not None and not report.ok and to_slow is not report
     slowed = to_slow.slow_down() if out is not None or is_explained else None
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)

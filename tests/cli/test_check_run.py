@@ -122,6 +122,8 @@ def test_a_run_of_torques_is_checked_by_the_torques_that_were_sent(tmp_path, cap
     assert report["violations"][0]["place"] == "joint 3"
     assert main(["check", str(tmp_path / "b.rcirun"), "--slow-down", str(tmp_path / "c.npz")]) == 2
     assert "torques cannot be slowed down" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "b.rcirun"), "--explain", "en"]) == 1
+    assert "Remedy: " in capsys.readouterr().out
 
 
 def test_why_a_run_ended_early_is_in_its_report(tmp_path, capsys):
