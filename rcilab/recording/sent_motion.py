@@ -71,7 +71,8 @@ def read_sent(run: Run) -> SentCommands:
     numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
     sent = np.asarray(~np.isnan(numbers).all(axis=1), dtype=np.bool_)
     if is_played and run.setup.mode != "torque":
-        sent[played_commands(cycles)[1]] = True  # Also of those that are not numbers.
+        _, sources = played_commands(cycles)
+        sent[sources[cycles["sent_ns"][sources] != 0]] = True  # Also of those that are not numbers.
     period = 1 if is_played else state_cycles(cycles)
     index, rows = _played_order(cycles, sent) if is_played else _answered_order(cycles, sent, period)
     if not len(rows):
