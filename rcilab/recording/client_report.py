@@ -10,7 +10,6 @@ import numpy as np
 
 from rcilab.conformance.advice import share
 from rcilab.conformance.report import Report
-from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
@@ -50,7 +49,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
     counts = f"{received} commands, {missed} cycles without one, {late} late"
-    line = f"{name}, {run.setup.mode}, {_followed_time(run):.3f} s, {stopped}{nearest}; {counts}"
+    line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
         lines += [str(report), ""]
@@ -82,12 +81,6 @@ def _check(run: Run) -> tuple[Report | None, str]:
         return check_client(run), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
-
-
-def _followed_time(run: Run) -> float:
-    """Returns the time from the first played command to the last cycle that had or lacked one, [s]."""
-    followed = np.flatnonzero(run.cycles["played"] | run.cycles["missed"])
-    return CYCLE_TIME * float(followed[-1] - followed[0] + 1) if followed.size else 0.0
 
 
 def _count_unknown(run: Run) -> int:

@@ -61,6 +61,7 @@ class JitterBuffer:
 
     Attributes:
         cycles: Cycles of this motion since its first command was played, the lost ones among them.
+        span: Cycles between its first and its last played command.
         lost: Lost cycles of this motion.
         consecutive_lost: Lost cycles since the last command.
         max_consecutive_lost: Largest number of consecutive lost cycles of this motion.
@@ -100,7 +101,7 @@ class JitterBuffer:
         self._played: deque[ArmCommand] = deque(maxlen=LONGEST_GAP)  # The last ones.
         self.is_playing = False
         self.is_finished = False
-        self.cycles = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
+        self.cycles = self.span = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
         self.late = self.dropped = self.duplicates = 0
 
     def clear(self) -> None:
@@ -245,6 +246,7 @@ class JitterBuffer:
         self.consecutive_lost = 0
         self.is_finished = command.finished
         self._count(True)
+        self.span = self.cycles - 1
         return Playback(command, 1, False, skipped)
 
     def _advance_to(self, played: int) -> None:
