@@ -138,7 +138,7 @@ class ClientMotions:
             if event["event"] == "begin":
                 self._begin(event)
             elif self._motion is not None and event["motion"] == self._motion.number:
-                parts.append(self._part(_end(event), event["row"]))
+                parts.append(self._part(_end(event), event["row"], is_whole=True))
                 self._motion = None
         if self._motion is not None:
             part = self._part()
@@ -158,24 +158,34 @@ class ClientMotions:
             self._waiting = np.concatenate([self._waiting, rows])
             return
         if self._motion is not None:
-            part = self._part()
+            part = self._part(is_whole=True)
             if len(part.cycles):
                 parts.append(part)
         self._waiting, self._first = rows, first
         self._gap, self._is_resumed = range(expected, first), True
 
-    def _part(self, end: MotionEnd | None = None, row: int | None = None) -> MotionPart:
-        """Returns the next part of the motion, of which `row` is the first one after its end."""
+    def _part(self, end: MotionEnd | None = None, row: int | None = None, *, is_whole: bool = False) -> MotionPart:
+        """Returns the next part of the motion, of which `row` is the first one after its end.
+
+        Args:
+            end: The end of the motion; None: it goes on.
+            row: Number of the first row after it; None: it goes on.
+            is_whole: Whether no more rows can be joined to the waiting ones.
+        """
         assert self._motion is not None
-        cycles = self._take()
+        cycles = self._take(is_whole=is_whole)
         skipped = 0
         if len(cycles) or end is not None:
             skipped = len(range(max(self._gap.start, self._row), min(self._gap.stop, row or self._gap.stop)))
             self._gap = range(0)
         return MotionPart(motion=self._motion, cycles=cycles, end=end, skipped=skipped)
 
-    def _take(self) -> NDArray[np.void]:
-        """Returns the waiting rows of the motion, with their times."""
+    def _take(self, *, is_whole: bool) -> NDArray[np.void]:
+        """Returns the waiting rows of the motion, with their times.
+
+        They begin with the oldest row whose command is played: of a burst of answers to earlier states, the first one
+        played need not answer the first state.
+        """
         assert self._motion is not None
         rows = self._waiting
         of_motion = np.flatnonzero(rows["motion"] == self._motion.number)
@@ -186,9 +196,9 @@ class ClientMotions:
             played = start + np.flatnonzero(rows["played"][start:end])
             sources = played - rows["age"][played].astype(np.intp)
             is_there = (sources >= 0) & (sources <= played)
-            if not is_there.any():
+            if not is_there.any() or (end - played[0] < self._lag and not is_whole):
                 return rows[:0]
-            start = int(sources[is_there][0])
+            start = int(sources[is_there].min())
             self._origin = self._first + start if self._origin is None else self._origin
             self._is_resumed = False
         taken = rows[start:end].copy()

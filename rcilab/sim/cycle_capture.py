@@ -87,7 +87,7 @@ class CycleCapture:
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
-        self._received = self._late = 0  # Commands of this motion, and those of them that came late.
+        self._received = 0  # Commands of this motion.
         controller.arm.on_command = self._take
 
     @property
@@ -143,7 +143,6 @@ class CycleCapture:
             self._answer = self._find_answer(self._mode)
         self._received += 1
         self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
-        late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), math.nan
         if row is not None:
             sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
@@ -151,8 +150,6 @@ class CycleCapture:
             if not (answered or self._waiting):
                 self._add(row, now, lateness, command)
                 return
-        if self._late > late:  # It is not played, and must not take the place of one that is.
-            return
         if not self._waiting:
             for free in range(max(self._count - 1, 0) if row is None else row, self._count):
                 if not _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
@@ -232,7 +229,7 @@ class CycleCapture:
             }
         )
         # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
-        self._received = self._late = 0
+        self._received = 0
         self._rows.clear()
         self._commands.clear()
         self._waiting.clear()

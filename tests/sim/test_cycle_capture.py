@@ -1,0 +1,100 @@
+"""Which row of the record a client's command gets, whatever numbers it has: without sockets, one cycle at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rcilab.core.cycle_ring import CycleRing
+from rcilab.core.state import ControllerMode
+from rcilab.makers.rokae import wire as rci
+from rcilab.makers.rokae.controller.rci_controller import RciController
+from rcilab.model.robot_model import load_model
+from rcilab.sim.cycle_capture import CycleCapture
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
+from tests.peers import wire
+
+MODEL = load_model("xMatePro7")
+
+
+class Bench:
+    """A controller whose motion has begun, with its record."""
+
+    def __init__(self) -> None:
+        self.controller = RciController(VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0), mode_delay=0)
+        self.ring = CycleRing.create(7, {})
+        self.capture = CycleCapture(self.ring, self.controller)
+        self.reader = self.ring.open_reader()
+        self.sent: list[float] = []
+        self.controller.handle(rci.SetMotorPower(1))
+        self.cycles(30)
+        self.controller.handle(rci.StartMove(0, 1))
+        while self.controller.state.controller_mode is ControllerMode.OTHER:
+            self.cycles(1)
+
+    @property
+    def number(self) -> int:
+        """The number of the last state."""
+        return self.controller.state.message_id
+
+    def cycles(self, count: int) -> None:
+        for _ in range(count):
+            self.controller.step()
+            self.capture.write()
+
+    def send(self, number: int) -> None:
+        """Sends the next command; joint 1 of each is larger by 1 nrad."""
+        angle = 1e-9 * (len(self.sent) + 1)
+        self.sent.append(angle)
+        q = (angle, *MODEL.home.tolist()[1:])
+        self.controller.receive(rci.decode_command(wire.pack_command(number, q), 7))
+
+    def rows(self) -> NDArray[np.void]:
+        return self.reader.drain()
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    found = Bench()
+    yield found
+    found.ring.close()
+
+
+def played(rows: NDArray[np.void]) -> list[float]:
+    """Joint 1 of the played commands."""
+    at = np.flatnonzero(rows["played"])
+    return rows["command"][at - rows["age"][at].astype(int), 0].tolist()
+
+
+def test_a_burst_that_answers_the_newest_state_first_is_recorded_as_played(bench: Bench) -> None:
+    newest = bench.number
+    for number in (newest, *range(newest - 20, newest)):
+        bench.send(number)
+    bench.cycles(25)
+    assert played(bench.rows()) == bench.sent
+
+
+def test_repeated_answers_that_come_late_have_the_rows_without_a_command(bench: Bench) -> None:
+    """A client that was stopped for 30 ms answers the last state again, then the states that it finds."""
+    for _ in range(50):
+        bench.send(bench.number)
+        bench.cycles(1)
+    stopped = bench.number
+    bench.cycles(30)
+    for _ in range(4):
+        bench.send(stopped)
+    for number in range(stopped + 1, bench.number + 1):
+        bench.send(number)
+    for _ in range(50):
+        bench.cycles(1)
+        bench.send(bench.number)
+    bench.cycles(60)
+    rows = bench.rows()
+    recorded = rows["command"][np.isfinite(rows["command"]).all(axis=1), 0]
+    assert sorted(recorded.tolist()) == bench.sent
+    assert bench.controller.playout.late > 0
+    assert played(rows) == [angle for angle in bench.sent if angle in set(played(rows))]
