@@ -69,11 +69,7 @@ class ClientRecorder:
                 self._begin(motion)
             if part.skipped:
                 self._finish(stopped=_CUT)
-                place = f"before {part.cycles['t'][0]:.3f} s" if len(part.cycles) else "at its end"
-                self._show(
-                    "not_recorded",
-                    f"motion {motion.number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}",
-                )
+                self._show("not_recorded", self._describe_gap(part))
             if len(part.cycles) and motion.number != self._failed:
                 if self._file is None:
                     self._file = self._open(motion, is_continued=self._part > 0 or part.skipped > 0)
@@ -89,6 +85,13 @@ class ClientRecorder:
         except RcilabError as error:
             self._file, self._failed = None, motion.number
             self._show("not_recorded", f"motion {motion.number} is not recorded from here on: {error}")
+
+    def _describe_gap(self, part: MotionPart) -> str:
+        place = "at its end" if self._part else "which were all of it,"
+        if len(part.cycles):
+            place = f"before {part.cycles['t'][0]:.3f} s"
+        number = part.motion.number
+        return f"motion {number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}"
 
     def _begin(self, motion: ClientMotion) -> None:
         between = range(self._last + 1, motion.number)

@@ -38,7 +38,9 @@ _ARRAYS = STATE_FIELDS + OTHER_STATE_FIELDS[:-4]
 _POSE, _POSE_C = _ARRAYS.index("T_base_tool"), _ARRAYS.index("T_base_tool_c")
 _ROWS = int(RingCounter.ROWS)
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
-_FARTHEST = 256  # [rows] Whose commands may be added; then readers take the row. No queue of commands is longer.
+_FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
+_LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
+_MOST_PARTS = 12  # Of the reason for a stop, so that its event fits; a jump violates limits of every joint.
 
 
 class _Arrival(NamedTuple):
@@ -77,7 +79,7 @@ class CycleCapture:
         self._lost_client = ""
         self._rows: dict[int, int] = {}  # Row of each recent message id since the end of the last motion.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
-        self._waiting: deque[_Arrival] = deque(maxlen=_FARTHEST)  # For rows to come; the queue drops the oldest, too.
+        self._waiting: deque[_Arrival] = deque(maxlen=_LONGEST_QUEUE)  # For rows to come; drops the oldest.
         self._arrays_of = attrgetter(*_ARRAYS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
@@ -87,7 +89,10 @@ class CycleCapture:
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
-        self._received = 0  # Commands of this motion.
+        self._guests: set[int] = set()  # Rows with a late command that is not the answer to their state.
+        self._taken = 0, -1  # First and last of some rows that all have a command.
+        self._offset: int | None = None  # From a number of the client's own counting to its row.
+        self._received = self._unrecorded = self._late = self._lost = 0  # Of this motion.
         controller.arm.on_command = self._take
 
     @property
@@ -114,8 +119,9 @@ class CycleCapture:
         played = age = missed = 0
         arrival: _Arrival | None = None
         if playback is not None:
-            missed = int(playback.is_lost)
-            if not missed and playback.command is not None:
+            lost, self._lost = self._lost, playout.lost
+            missed = int(self._lost != lost)
+            if not playback.is_lost and playback.command is not None:
                 played = 1
                 row = self._commands.pop(id(playback.command), -1)
                 if row < 0:
@@ -143,6 +149,7 @@ class CycleCapture:
             self._answer = self._find_answer(self._mode)
         self._received += 1
         self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
+        late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), math.nan
         if row is not None:
             sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
@@ -150,12 +157,42 @@ class CycleCapture:
             if not (answered or self._waiting):
                 self._add(row, now, lateness, command)
                 return
-        if not self._waiting:
-            for free in range(max(self._count - 1, 0) if row is None else row, self._count):
-                if not _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
-                    self._add(free, now, lateness, command)
-                    return
-        self._waiting.append(_Arrival(now, lateness, command))
+        is_late = self._late > late
+        if row in self._guests and not is_late:  # It is played, the other one not.
+            self._guests.remove(row)
+            self._unrecorded += 1
+            self._add(row, now, lateness, command)
+            return
+        if is_late or not self._waiting:
+            free = self._find_free(self._find_place(command.number) if row is None else row)
+            if free < self._count:
+                self._add(free, now, lateness, command)
+                if is_late and free != row:
+                    self._guests.add(free)
+                return
+        if is_late:
+            self._unrecorded += 1
+        else:
+            self._waiting.append(_Arrival(now, lateness, command))
+
+    def _find_free(self, row: int) -> int:
+        """Returns the first row from here on that has no command; the next one to come if there is none."""
+        first, last = self._taken
+        is_known = first <= row <= last
+        free = last + 1 if is_known else row
+        while free < self._count and _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
+            free += 1
+        self._taken = (first if is_known else row), free - 1
+        return free
+
+    def _find_place(self, number: int) -> int:
+        """Returns the row of a client's own number: it counts on from its first command; at first the newest row."""
+        newest = max(self._count - 1, 0)
+        row = newest if self._offset is None else number + self._offset
+        if not newest - _FARTHEST < row <= newest + _LONGEST_QUEUE:
+            row = newest  # It has begun to count again.
+        self._offset = row - number
+        return max(row, 0)
 
     def _add(self, row: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
         """Adds a command to a row without one."""
@@ -219,8 +256,9 @@ class CycleCapture:
                 "event": "end",
                 "motion": self._motion,
                 "row": self._count,
-                "stopped": reason.as_dict() if reason else None,
+                "stopped": _shortened(reason).as_dict() if reason else None,
                 "received": self._received,
+                "unrecorded": self._unrecorded,
                 "lost": playout.lost,
                 "most_lost": playout.max_consecutive_lost,
                 "late": playout.late,
@@ -229,7 +267,9 @@ class CycleCapture:
             }
         )
         # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
-        self._received = 0
+        self._received = self._unrecorded = self._late = self._lost = 0
+        self._offset = None
+        self._guests.clear()
         self._rows.clear()
         self._commands.clear()
         self._waiting.clear()
@@ -257,6 +297,15 @@ class CycleCapture:
             _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
         )
         return b"".join(parts)
+
+
+def _shortened(reason: Remark) -> Remark:
+    """Returns the first parts of a reason, and the number of the others."""
+    parts = reason.parts
+    if len(parts) <= _MOST_PARTS:
+        return reason
+    more = f"and {len(parts) - _MOST_PARTS} more violations"
+    return Remark.all((*parts[:_MOST_PARTS], Remark(more)))
 
 
 def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:

@@ -98,7 +98,8 @@ class JitterBuffer:
         self._surplus = 0  # Commands with a repeated id, right before the next one in the queue.
         self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still arrive.
         self._cycles_waited = 0
-        self._played: deque[ArmCommand] = deque(maxlen=LONGEST_GAP)  # The last ones.
+        self._past: deque[ArmCommand] = deque(maxlen=CAPACITY)  # The last ones that were played or came too late.
+        self._lost_since_played = 0
         self.is_playing = False
         self.is_finished = False
         self.cycles = self.span = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
@@ -128,14 +129,15 @@ class JitterBuffer:
             self.duplicates += 1
             self._is_repeating = True
             return False
-        is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
-        if not is_reordered:
-            self._newest = command
-        elif command in self._played or command in queue:
+        is_next = newest is None or command.number == newest.number + 1
+        if not is_next and (command in self._past or command in queue):
             self.duplicates += 1
             return False
+        if newest is None or not 0 < newest.number - command.number <= LONGEST_GAP:
+            self._newest = command
         if self._is_late(command):
             self.late += 1
+            self._past.append(command)
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
@@ -208,7 +210,7 @@ class JitterBuffer:
         if command.number in self._passed_over:
             return False
         return (
-            0 <= behind <= max(LONGEST_GAP, self.consecutive_lost)
+            0 <= behind <= max(LONGEST_GAP, self._lost_since_played)
             and (behind > 0 or self._is_last_lost)
             and self.is_playing
         )
@@ -242,8 +244,8 @@ class JitterBuffer:
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
         self._queue.remove(command)  # The first one, except for a reordered command.
         self._advance_to(command.number)
-        self._played.append(command)
-        self.consecutive_lost = 0
+        self._past.append(command)
+        self.consecutive_lost = self._lost_since_played = 0
         self.is_finished = command.finished
         self._count(True)
         self.span = self.cycles - 1
@@ -267,6 +269,7 @@ class JitterBuffer:
         self._last_id, self._is_last_lost = self._last_id + 1, True
         self.lost += 1
         self.consecutive_lost += 1
+        self._lost_since_played += 1
         self.max_consecutive_lost = max(self.max_consecutive_lost, self.consecutive_lost)
         self._count(False)
         return playback

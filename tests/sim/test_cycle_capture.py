@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,13 +27,14 @@ class Bench:
     """A controller whose motion has begun, with its record."""
 
     def __init__(self) -> None:
-        self.controller = RciController(VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0), mode_delay=0)
+        arm = VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0, lost_limit=None)
+        self.controller = RciController(arm, mode_delay=0)
         self.ring = CycleRing.create(7, {})
         self.capture = CycleCapture(self.ring, self.controller)
         self.reader = self.ring.open_reader()
         self.sent: list[float] = []
         self.controller.handle(rci.SetMotorPower(1))
-        self.cycles(30)
+        self.cycles(1500)
         self.controller.handle(rci.StartMove(0, 1))
         while self.controller.state.controller_mode is ControllerMode.OTHER:
             self.cycles(1)
@@ -53,6 +56,12 @@ class Bench:
         q = (angle, *MODEL.home.tolist()[1:])
         self.controller.receive(rci.decode_command(wire.pack_command(number, q), 7))
 
+    def end(self) -> dict[str, Any]:
+        """Ends the motion and returns its event."""
+        self.controller.handle(rci.StopMove())
+        self.cycles(1000)
+        return self.ring.events(0)[0][-1]
+
     def rows(self) -> NDArray[np.void]:
         return self.reader.drain()
 
@@ -62,6 +71,17 @@ def bench() -> Iterator[Bench]:
     found = Bench()
     yield found
     found.ring.close()
+
+
+def in_time(bench: Bench, count: int) -> None:
+    for _ in range(count):
+        bench.send(bench.number)
+        bench.cycles(1)
+
+
+def recorded(rows: NDArray[np.void]) -> list[float]:
+    """Joint 1 of the commands, by row."""
+    return rows["command"][np.isfinite(rows["command"]).all(axis=1), 0].tolist()
 
 
 def played(rows: NDArray[np.void]) -> list[float]:
@@ -80,9 +100,7 @@ def test_a_burst_that_answers_the_newest_state_first_is_recorded_as_played(bench
 
 def test_repeated_answers_that_come_late_have_the_rows_without_a_command(bench: Bench) -> None:
     """A client that was stopped for 30 ms answers the last state again, then the states that it finds."""
-    for _ in range(50):
-        bench.send(bench.number)
-        bench.cycles(1)
+    in_time(bench, 50)
     stopped = bench.number
     bench.cycles(30)
     for _ in range(4):
@@ -94,7 +112,55 @@ def test_repeated_answers_that_come_late_have_the_rows_without_a_command(bench: 
         bench.send(bench.number)
     bench.cycles(60)
     rows = bench.rows()
-    recorded = rows["command"][np.isfinite(rows["command"]).all(axis=1), 0]
-    assert sorted(recorded.tolist()) == bench.sent
-    assert bench.controller.playout.late > 0
-    assert played(rows) == [angle for angle in bench.sent if angle in set(played(rows))]
+    end = bench.end()
+    assert bench.controller.playout.late > 30
+    assert recorded(rows) == [angle for angle in bench.sent if angle in set(recorded(rows))]
+    assert len(bench.sent) - len(recorded(rows)) == end["unrecorded"]
+    assert set(played(rows)) <= set(recorded(rows))
+    at = np.flatnonzero(rows["played"])
+    assert (rows["age"][at[-50:]] == 1).all(), "after the pause each command is in the row of its state"
+
+
+@pytest.mark.parametrize("pause", [30, 400])
+@pytest.mark.parametrize("counts_on_its_own", [False, True])
+def test_a_pause_costs_no_command_of_a_client(bench: Bench, pause: int, counts_on_its_own: bool) -> None:
+    """It answers every state that it finds afterwards, with the number of the state or by its own count."""
+    first = bench.number
+
+    def number_of(state: int) -> int:
+        return state - first + 1 if counts_on_its_own else state
+
+    for _ in range(100):
+        bench.send(number_of(bench.number))
+        bench.cycles(1)
+    stopped = bench.number
+    bench.cycles(pause)
+    for state in range(stopped, bench.number):
+        bench.send(number_of(state))
+    for _ in range(100):
+        bench.send(number_of(bench.number))
+        bench.cycles(1)
+    rows = bench.rows()
+    assert recorded(rows) == bench.sent
+    at = np.flatnonzero(rows["played"])
+    assert (rows["age"][at[-50:]] == 1).all()
+
+
+def test_a_stop_with_very_many_violations_has_an_event(bench: Bench) -> None:
+    in_time(bench, 20)
+    bench.controller.receive(rci.decode_command(wire.pack_command(bench.number, (-1.7e300,) * 7), 7))
+    bench.cycles(2)
+    end = bench.end()
+    assert end["event"] == "end"
+    assert end["stopped"]["said"].endswith("more violations")
+    assert len(json.dumps(end)) < 8000
+
+
+def test_a_repeated_answer_in_a_pause_is_not_a_missed_cycle(bench: Bench) -> None:
+    in_time(bench, 50)
+    q = (bench.sent[-1], *MODEL.home.tolist()[1:])
+    for _ in range(5):
+        bench.controller.receive(rci.decode_command(wire.pack_command(bench.number - 1, q), 7))
+        bench.cycles(1)
+    bench.cycles(3)
+    assert bench.rows()["missed"].sum() == bench.controller.playout.lost
