@@ -127,11 +127,12 @@ class CycleRing:
         return facts
 
     def add_event(self, event: dict[str, Any]) -> None:
-        """Appends an event of at most 16 kB, a longer one without its content; only the writer calls it."""
+        """Appends an event of at most 16 kB, a longer one without its longest value; only the writer calls it."""
         count = self.counters[RingCounter.EVENTS]
         text = json.dumps(event).encode()
         if len(text) > _EVENT_SIZE - _LENGTH.size:
-            text = json.dumps({"event": "too_long"}).encode()
+            longest = max(event, key=lambda name: len(json.dumps(event[name])))
+            text = json.dumps({**event, longest: None}).encode()
         start = count % _EVENT_SLOTS * _EVENT_SIZE
         self._events[start : start + _LENGTH.size + len(text)] = _LENGTH.pack(len(text)) + text
         self.counters[RingCounter.EVENTS] = count + 1

@@ -40,7 +40,6 @@ _ROWS = int(RingCounter.ROWS)
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
 _LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
-_MOST_PARTS = 12  # Of the reason for a stop, so that its event fits; a jump violates limits of every joint.
 
 
 class _Arrival(NamedTuple):
@@ -256,7 +255,7 @@ class CycleCapture:
                 "event": "end",
                 "motion": self._motion,
                 "row": self._count,
-                "stopped": _shortened(reason).as_dict() if reason else None,
+                "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
                 "unrecorded": self._unrecorded,
                 "lost": playout.lost,
@@ -297,15 +296,6 @@ class CycleCapture:
             _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
         )
         return b"".join(parts)
-
-
-def _shortened(reason: Remark) -> Remark:
-    """Returns the first parts of a reason, and the number of the others."""
-    parts = reason.parts
-    if len(parts) <= _MOST_PARTS:
-        return reason
-    more = f"and {len(parts) - _MOST_PARTS} more violations"
-    return Remark.all((*parts[:_MOST_PARTS], Remark(more)))
 
 
 def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:

@@ -395,6 +395,14 @@ def test_a_file_that_is_no_record_is_refused(content: bytes, tmp_path: Path) -> 
         CycleRing.attach(os.getpid(), file.fileno())
 
 
+def test_an_event_that_is_too_long_loses_its_longest_value_and_no_other_event(ring: CycleRing) -> None:
+    ring.add_event(begin_event(1, 0))
+    ring.add_event({**end_event(1, 1), "stopped": "x" * 20_000})
+    ring.add_event(begin_event(2, 1))
+    first, second, third = ring.events(0)[0]
+    assert (first["event"], second["event"], second["stopped"], third["motion"]) == ("begin", "end", None, 2)
+
+
 def test_damaged_facts_are_refused_and_damaged_events_skipped(ring: CycleRing) -> None:
     motions = ClientMotions(ring)
     ring.counters[RingCounter.EVENTS] = 2**40
@@ -439,7 +447,7 @@ def test_a_folder_that_cannot_be_written_to_costs_the_run_and_not_the_motion(tmp
     folder = tmp_path / "gone"
     folder.write_text("a file")
     lines = record_two_motions(folder, programs.joint_sine)
-    assert all("is not recorded from here on" in line for line in lines)
+    assert all("is not recorded: run file: " in line for line in lines)
 
 
 def test_the_record_of_a_process_that_has_none_is_refused() -> None:
