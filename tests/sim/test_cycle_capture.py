@@ -148,7 +148,7 @@ def test_a_pause_costs_no_command_of_a_client(bench: Bench, pause: int, counts_o
 
 def test_a_stop_with_very_many_violations_has_an_event(bench: Bench) -> None:
     in_time(bench, 20)
-    bench.controller.receive(rci.decode_command(wire.pack_command(bench.number, (-1.7e300,) * 7), 7))
+    bench.controller.receive(rci.decode_command(wire.pack_command(bench.number, (-12345678.912,) * 7), 7))
     bench.cycles(2)
     end = bench.end()
     assert end["event"] == "end"
