@@ -34,8 +34,7 @@ _FAULTS = struct.Struct("<QIBBBB")
 _STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
 _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
-_ARRAYS = STATE_FIELDS + OTHER_STATE_FIELDS[:-4]
-_POSE, _POSE_C = _ARRAYS.index("T_base_tool"), _ARRAYS.index("T_base_tool_c")
+_ARRAYS = ("q", "q_c", "dq", "tau", *STATE_FIELDS, *OTHER_STATE_FIELDS[:-4])
 _ROWS = int(RingCounter.ROWS)
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
@@ -278,24 +277,16 @@ class CycleCapture:
         if modes != self._modes:
             self._modes = modes
             self._status = _FAULTS.pack(sum(1 << fault for fault in state.faults), 0, *modes[1:], 0)
-        arrays = self._arrays_of(state)
-        parts: tuple[Any, ...] = (
-            _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
-            state.q,
-            state.q_c,
-            state.dq,
-            self._no_joints,
-            self._status,
-            state.tau,
-            self._no_answer,
-            *arrays[:_POSE],
-            arrays[_POSE].tobytes(),
-            *arrays[_POSE + 1 : _POSE_C],
-            arrays[_POSE_C].tobytes(),
-            *arrays[_POSE_C + 1 :],
-            _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
-        )
-        return b"".join(parts)
+        # Unpacked by name: slices of the tuple cost a tenth of the row.
+        q, q_c, dq, tau, ext, ext_stiff, T, theta, dq_c, ddq_c, T_c, v_c, a_c, *torques = self._arrays_of(state)
+        return b"".join(
+            (
+                _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
+                q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
+                ext, ext_stiff, T.tobytes(), theta, dq_c, ddq_c, T_c.tobytes(), v_c, a_c, *torques,
+                _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
+            )
+        )  # fmt: skip
 
 
 def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
