@@ -17,11 +17,12 @@ from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals, Record
+from rcilab.conformance.standstill import resolution
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.condition import Condition
+from rcilab.core.condition import Bounds, Condition
 from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox, active_box
@@ -226,12 +227,13 @@ class _MotionChecker:
     ) -> None:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
+        self._is_record = record is not None
         self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
     def evaluate(self, condition: Condition) -> tuple[ConditionResult, list[Violation]]:
         values, first_time = self._signals.table(condition)
-        lower, upper = condition.bounds(self._limits)
+        lower, upper = self._bounds(condition)
         smallest, largest = values.min(axis=0), values.max(axis=0)
         reach = np.maximum(self._ratio(smallest, lower, upper), self._ratio(largest, lower, upper))
         column = int(reach.argmax())
@@ -259,6 +261,14 @@ class _MotionChecker:
         ratio = self._ratio(values, lower, upper)
         return result, [self._violation(condition, values, ratio, first_time, run) for run in runs]
 
+    def _bounds(self, condition: Condition) -> Bounds:
+        """Returns the bounds; a recorded first command may be the first step of the motion."""
+        lower, upper = condition.bounds(self._limits)
+        if not self._is_record or condition.stage != "start" or condition.order or condition.necessity == "necessary":
+            return lower, upper
+        step = resolution(condition.signal, 0, self._limits)
+        return lower - step, upper + step
+
     def _with_source(self, condition: Condition, column: int, bound: float) -> Condition:
         """Returns the condition, with the source of its bound if that is not the arm's own."""
         if condition.signal != "joint" or condition.order or self._limits.joint.is_own(column + 1, bound):
@@ -272,7 +282,7 @@ class _MotionChecker:
 
     def _used(self, condition: Condition) -> Array:
         values, _ = self._signals.table(condition)
-        ratio = self._ratio(values, *condition.bounds(self._limits)).max(axis=1)[: len(self._motion.times)]
+        ratio = self._ratio(values, *self._bounds(condition)).max(axis=1)[: len(self._motion.times)]
         return near_bound(ratio) if condition.order == 0 and condition.signal in ("joint", "position") else ratio
 
     def _ratio(self, values: Array, lower: Array, upper: Array) -> Array:
@@ -312,7 +322,7 @@ class _MotionChecker:
             count=end - begin,
             value=value,
             worst_time=first_time + row * CYCLE_TIME,
-            bound=_nearest_bound(value, *condition.bounds(self._limits), column),
+            bound=_nearest_bound(value, *self._bounds(condition), column),
             ratio=worst,
             advice=advice,
             links=self._signals.links(condition, row),

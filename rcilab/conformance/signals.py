@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.standstill import above_resolution
 from rcilab.conformance.start import StartState
 from rcilab.conformance.tool_signals import ToolSignals
 from rcilab.core.arrays import Array
@@ -93,10 +92,7 @@ class MotionSignals:
             return self._end_values(condition), self._motion.duration
         if condition.order:
             return self._end_values(condition), 0.0
-        values = self._at_start(condition)[np.newaxis]
-        if self._record is None or condition.necessity == "necessary":
-            return values, 0.0
-        return above_resolution(values, condition, self._model.limits), 0.0  # It may be the first step of the motion.
+        return self._at_start(condition)[np.newaxis], 0.0
 
     def links(self, condition: Condition, row: int) -> LinkPair | None:
         """Returns the two links of the distance in a row of a table; None for other conditions."""
@@ -200,10 +196,10 @@ class MotionSignals:
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
     def _end_values(self, condition: Condition) -> Array:
-        """Returns velocity or acceleration at an end of the motion, above the resolution, shape (1, n) or (1, 1)."""
+        """Returns velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
         values = self._throughout(condition)
         row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
-        return above_resolution(values[row : row + 1], condition, self._model.limits)
+        return values[row : row + 1]
 
 
 def _rows_to_compute(is_rough: NDArray[np.bool_]) -> NDArray[np.bool_]:
