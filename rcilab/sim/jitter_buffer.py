@@ -33,7 +33,7 @@ from rcilab.sim.arm_command import ArmCommand
 
 CAPACITY = 256  # Commands in the queue; then the oldest is dropped. 2.5 of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate covers, 1 s.
-QUEUE_WINDOW = 100  # Cycles over which the lowest queue length is measured; longer than any jitter.
+QUEUE_WINDOW = 100  # Cycles over which the lowest backlog is measured; longer than any jitter.
 SLACK = 5  # Cycles of additional delay that are tolerated: a client may be late with its first answer.
 FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges (manual 4.6: 10 to 20).
@@ -116,6 +116,11 @@ class JitterBuffer:
     def is_starved(self) -> bool:
         """Whether the next cycle is lost unless a command arrives."""
         return self.is_playing and not (self.is_finished or self._queue or self._is_repeating)
+
+    @property
+    def backlog(self) -> int:
+        """Queued commands beyond the prefill, next to that of the coming cycle; 0 where older ones are skipped."""
+        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self._prefill, 0)
 
     @property
     def success_rate(self) -> float:
@@ -216,13 +221,11 @@ class JitterBuffer:
         )
 
     def _find_excess(self) -> None:
-        queued = len(self._queue) - 1
-        if queued < self._lowest:
-            self._lowest = queued
+        if self.backlog < self._lowest:
+            self._lowest = self.backlog
         self._observed += 1
         if self._observed >= QUEUE_WINDOW:
-            excess = self._lowest - self._prefill
-            self._excess = excess if excess > SLACK else 0
+            self._excess = self._lowest if self._lowest > SLACK else 0
             self._observed, self._lowest = 0, CAPACITY
 
     def _skip_old(self) -> int:

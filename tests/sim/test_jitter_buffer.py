@@ -287,6 +287,29 @@ def test_commands_that_close_a_loop_are_fresh() -> None:
     assert playout.lost == 0
 
 
+def test_a_torque_that_is_skipped_has_no_extra_cycle() -> None:
+    """The vendor's client repeated the id of the last state: with a cycle for each, the next answer would be late."""
+    playout = JitterBuffer(prefill=0)
+    playout.begin(max_queued=0)
+    for k in (5, 5):
+        playout.push(command(k))
+    assert playout.backlog == 0
+    assert take_ids(playout, 1) == [5]
+    playout.push(command(6))
+    assert take_ids(playout, 1) == [6]
+    assert (playout.late, playout.lost) == (0, 0)
+
+
+def test_a_delay_of_torques_that_was_asked_for_is_no_backlog() -> None:
+    playout = JitterBuffer(prefill=0)
+    playout.begin(max_queued=2 * SLACK)
+    for k in range(400):
+        playout.push(command(k))
+        playout.take(by_whole_gap)
+        assert not playout.pop_extra_cycle()
+    assert len(playout) == 2 * SLACK
+
+
 def test_ids_that_begin_again_are_another_numbering() -> None:
     playout = JitterBuffer(prefill=0)
     for k in (5000, 5001, 3, 4):

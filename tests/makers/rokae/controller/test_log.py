@@ -78,6 +78,15 @@ def test_the_advice_after_missing_commands_names_the_pauses_that_a_prefill_absor
         assert advice.text.startswith("--prefill N absorbs pauses of the client of N ms, 100 at most; ")
 
 
+def test_a_long_wait_of_lock_step_names_the_state_whose_answer_is_missing() -> None:
+    with running(lockstep=True) as found, Peer(found) as peer:
+        state = peer.run(MOTION.q[:50])
+        waiting = wait_for_kind(found, "waiting")
+        number = state.message_id
+        assert waiting.text == f"lock-step has waited 1 s for the command that answers state {number}; none came"
+        assert waiting.facts == {"state": number, "late": 0}
+
+
 def test_a_program_can_be_followed_by_its_log() -> None:
     with running(lockstep=True) as found, Peer(found) as peer:
         peer.run(MOTION.q)
