@@ -168,7 +168,8 @@ class MotionSignals:
         """Torques without gravity and their backward differences over one cycle, each of shape (N + 3, n)."""
         if self._commanded_torques is not None:
             tau = np.concatenate((self._commanded_torques, np.tile(self._commanded_torques[-1], (HOLD_SAMPLES, 1))))
-            return tau, np.diff(tau, axis=0, prepend=0.0) / CYCLE_TIME
+            before = tau[:1] if self._start.moving else np.zeros_like(tau[:1])
+            return tau, np.diff(tau, axis=0, prepend=before) / CYCLE_TIME
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
         places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.

@@ -115,7 +115,9 @@ def check_sent(
     box = run.setup.safety_box if box is None else box
     recorded = recorded_mode(run)
     if recorded == "torque":
-        return check_torques(*sent_torques(run), model, start=start_of(run), box=box, distance=distance)
+        motion, torques = sent_torques(run)
+        motion, start = _in_progress(motion) if run.truncated else (motion, start_of(run))
+        return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
     sent = read_sent(run)
     motion, start = _in_progress(sent.motion) if run.truncated else (sent.motion, start_of(run))
     record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
