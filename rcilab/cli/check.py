@@ -132,7 +132,7 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     if (args.slow_down is None and args.explain is None) or is_refused or recorded_mode(found) == "torque":
         return report, report
     motion = with_stop(report.motion, model, mode)
-    return report, check(motion, model, start=start_of(found), box=box, mode=mode)
+    return report, check(motion, model, start=start_of(found, motion, model), box=box, mode=mode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.start import StartState
+from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import ToolSignals
-from rcilab.core.arrays import Array
+from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clearance import ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -37,7 +37,7 @@ _INTERPOLATED_PART = 0.8
 """Part of a torque bound up to which interpolation is sufficient; rows beyond it are computed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Record:
     """What is known of recorded commands beyond their joint angles."""
 
@@ -45,6 +45,9 @@ class Record:
     """Whether something other than the client ended the motion."""
     refused_pose: bool = False
     """Whether a pose followed the last row that has no joint angles on this branch."""
+    reference: JointVector | None = None
+    """Commanded joint angles before the first row, shape (n,), [rad], where the controller absorbed its distance from
+    them: it is compared with them but not differentiated. None: the start of the check."""
 
 
 class MotionSignals:
@@ -134,13 +137,14 @@ class MotionSignals:
 
     def _at_start(self, condition: Condition) -> Array:
         """Returns the difference of the first command from the state of the arm, shape (n,) or (1,)."""
-        if condition.signal == "translation":
-            return np.array([self._tool.start_distance])
-        if condition.signal == "arm_angle":
-            return np.array([self._tool.start_turn])
+        reference = None if self._record is None else self._record.reference
+        start = self._start if reference is None else as_start(reference, self._motion.n)
+        if condition.signal in ("translation", "arm_angle"):
+            tool = self._tool if start is self._start else ToolSignals(self._model, start, self._motion.q[:1])
+            return np.array([tool.start_distance if condition.signal == "translation" else tool.start_turn])
         if condition.signal == "torque":
             return self._torques[0][0]
-        return self._motion.start - self._start.q
+        return self._motion.start - start.q
 
     @cached_property
     def _tool(self) -> ToolSignals:

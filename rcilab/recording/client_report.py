@@ -52,7 +52,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
-        lines += [str(report), ""]
+        lines += [*(f"Note: {note}" for note in report.motion.notes), str(report), ""]
     lines += _describe_commands(run, end, counts)
     lines += ["", "Settings in force (SI units):"]
     lines += [f"  {name}: {_format(value)}" for name, value in run.setup.settings.items()]

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.check import check_commands, check_torques
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.conformance.signals import Record
+from rcilab.conformance.standstill import resolution
 from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath, JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
@@ -116,11 +119,22 @@ def check_sent(
     recorded = recorded_mode(run)
     if recorded == "torque":
         motion, torques = sent_torques(run)
-        motion, start = _in_progress(motion) if run.truncated else (motion, start_of(run))
+        motion, start = _in_progress(motion) if run.truncated else (motion, None)
         return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
     sent = read_sent(run)
-    motion, start = _in_progress(sent.motion) if run.truncated else (sent.motion, start_of(run))
-    record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
+    motion, reference = sent.motion, None
+    if run.truncated:
+        motion, start = _in_progress(motion)
+    else:
+        start = start_of(run, motion, model)
+        if start is None and run.has_playout:
+            motion = _with_offset(motion, run, model)
+            reference = None if recorded in COMPLIANT_MODES else run.q_c[0]
+    record = Record(
+        was_stopped=bool(run.stopped or run.faults or not run.is_complete),
+        refused_pose=sent.was_refused,
+        reference=reference,
+    )
     return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
 
 
@@ -150,12 +164,44 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     )
 
 
-def start_of(run: Run) -> JointVector | None:
+def start_of(run: Run, motion: Motion, model: RobotModel) -> JointVector | None:
     """Returns the commanded joint angles before the first command, shape (n,), [rad]; None where they do not bind it.
 
-    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one.
+    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one, as the
+    virtual one does for any arm within its tolerance. They bind a first command that it refused.
+
+    Args:
+        run: The run.
+        motion: Its commands.
+        model: The arm.
     """
-    return None if run.truncated or run.setup.mode in COMPLIANT_MODES else run.q_c[0]
+    if run.truncated or run.setup.mode == "torque":
+        return None
+    is_compliant = run.setup.mode in COMPLIANT_MODES
+    if not run.has_playout:
+        return None if is_compliant else run.q_c[0]
+    first = np.flatnonzero(run.cycles["played"])[:1]
+    is_refused = bool(run.cycles["faults"][first].any())
+    return run.q_c[0] if is_refused or (not is_compliant and _is_step(run, motion, model)) else None
+
+
+def _is_step(run: Run, motion: Motion, model: RobotModel) -> bool:
+    """Returns whether the first command is within one cycle's jerk of the arm."""
+    step = resolution("joint", 0, model.limits) + START_POSITION_TOLERANCE
+    return bool((np.abs(motion.start - run.q_c[0]) <= step).all())
+
+
+def _with_offset(motion: Motion, run: Run, model: RobotModel) -> Motion:
+    """Returns a motion with a note on the distance of its start from the arm, if it is more than a first step."""
+    if _is_step(run, motion, model):
+        return motion
+    off = np.abs(motion.start - run.q_c[0])
+    joint = int(off.argmax())
+    note = (
+        f"the first command is {with_degrees(float(off[joint]), f'{off[joint]:.3g}')} of joint {joint + 1} from the "
+        "arm's commanded position; the virtual controller accepted and absorbed this, so it is not differentiated"
+    )
+    return replace(motion, notes=(*motion.notes, note))
 
 
 def _in_progress(motion: Motion) -> tuple[Motion, StartState | None]:

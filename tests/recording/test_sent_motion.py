@@ -33,10 +33,10 @@ def line() -> Run:
         return as_run(collect(motions, 2)[1])
 
 
-def send_poses(robot: Robot, offsets: list[tuple[float, float, float]]) -> None:
+def send_poses(robot: Robot, offsets: list[tuple[float, float, float]], law: int) -> None:
     """Commands the pose of the tool, moved by an offset a cycle, [m]."""
     poses = iter(offsets)
-    robot.start_move(wire.CARTESIAN_POSITION, wire.CARTESIAN)
+    robot.start_move(law, wire.CARTESIAN)
     begin: list[np.ndarray] = []
 
     def callback(state: wire.State) -> Output:
@@ -49,11 +49,11 @@ def send_poses(robot: Robot, offsets: list[tuple[float, float, float]]) -> None:
     robot.control(callback)
 
 
-def recorded_poses(offsets: list[tuple[float, float, float]]) -> Run:
+def recorded_poses(offsets: list[tuple[float, float, float]], law: int = wire.CARTESIAN_POSITION) -> Run:
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         with pytest.raises(ControlException):
-            send_poses(robot, offsets)
+            send_poses(robot, offsets, law)
         parts = collect(motions, 2)[1]
     assert parts[-1].end is not None
     return replace(as_run(parts), stopped=parts[-1].end.stopped)
@@ -207,6 +207,30 @@ def test_a_first_step_that_no_limit_forbids_needs_no_advice(sine: Run) -> None:
     cycles["q_c"][0] -= 5e-5
     report = check_sent(replace(sine, cycles=cycles))
     assert not next(row for row in report.rows if row.id == "start.position").ok
+
+
+@pytest.mark.parametrize("off", [1e-4, 9e-4])
+def test_a_start_that_the_controller_absorbed_is_not_a_jerk(sine: Run, off: float) -> None:
+    cycles = sine.cycles.copy()
+    cycles["q_c"][0, 0] -= off
+    report = check_sent(replace(sine, cycles=cycles), distance=None)
+    assert report.ok
+    (start,) = (row for row in report.rows if row.id == "start.position")
+    assert (start.verdict, start.value) == ("advice", pytest.approx(off, rel=1e-3))
+    assert any("of joint 1 from the arm's commanded position" in note for note in report.motion.notes)
+    first = np.flatnonzero(cycles["played"])[0]
+    cycles["faults"][first:] = 1
+    refused = check_sent(replace(sine, cycles=cycles[: first + 1]), distance=None)
+    assert "joint.jerk" in {violation.condition.id for violation in refused.violations}
+
+
+def test_a_compliant_start_that_the_controller_refused_does_not_conform() -> None:
+    run = recorded_poses([(0.0, 0.1, 0.0)] * 100, wire.CARTESIAN_IMPEDANCE)
+    assert run.setup.mode == "cartesian_impedance"
+    report = check_sent(run)
+    assert "cartesian.velocity.translation" in {violation.condition.id for violation in report.violations}
+    (start,) = (row for row in report.rows if row.id == "start.cartesian.position")
+    assert start.value == pytest.approx(0.1)
 
 
 def test_a_stop_of_poses_takes_as_long_as_its_speed_needs() -> None:
