@@ -48,7 +48,7 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     answered = int((run.cycles["sent_ns"] != 0).sum())
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
-    counts = f"{received} commands, {missed} cycles without one, {late} late"
+    counts = f"{received} commands, {late} late; {missed} cycles without one"
     line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:

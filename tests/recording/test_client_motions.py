@@ -267,7 +267,7 @@ def test_commands_with_other_numbers_than_those_of_the_states_are_recorded_as_pl
     assert (end.lost, end.late) == (0, 0)
     found = report_on_client(run, end)
     assert "conforms" in found.text
-    assert f"{count} commands, 0 cycles without one, 0 late" in found.line
+    assert f"{count} commands, 0 late; 0 cycles without one" in found.line
 
 
 def synthetic_rows(ring: CycleRing, first: int, count: int, motion: int = 1) -> None:

@@ -80,7 +80,7 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
     said = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
     assert f"{name} (reported as kInstabilityDetection)" in said
-    assert "Recorded: 0.010 s, 3 cycles, 0 commands lost. 8 cycles have no record." in said
+    assert "Recorded: 0.010 s, 3 cycles, 0 without a command. 8 cycles have no record." in said
     assert run.stopped is not None
     chinese = describe_stop(run.stopped, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese

@@ -50,9 +50,9 @@ class WorldStatus:
     q: tuple[float, ...] = ()
     """Measured joint angles, [rad]."""
     lost: int = 0
-    """Cycles of the last motion whose command did not arrive in time."""
+    """Cycles of the last motion without a command; it may have come late, or never."""
     lost_in_row: int = 0
-    """Largest number of consecutive lost cycles; 10 to 20 end a motion."""
+    """Most of them in a row. A motion ends after `lost_limit`, and 30 more where commands are held (not torques)."""
     success_rate: float = 1.0
     """As in the state, 0 to 1."""
     missed: int = 0

@@ -50,13 +50,13 @@ class PhaseLog:
     def _log_end(self, before: Situation, after: Situation) -> None:
         playout, duration = self._playout, CYCLE_TIME * self._playout.span
         is_fault = after.faults != before.faults or after.phase is not Phase.IDLE
-        figures = f"{playout.cycles} cycles, {playout.lost} commands lost, {playout.late} late"
+        figures = f"{playout.cycles} cycles, {playout.lost} without a command; {playout.late} commands late"
         self._log(
             "motion_ended",
             f"motion {'stopped' if is_fault else 'ended'} after {duration:.3f} s: {figures}",
             duration=round(duration, 3),
             cycles=playout.cycles,
-            lost=playout.lost,
+            without_command=playout.lost,
             late=playout.late,
             is_fault=is_fault,
         )

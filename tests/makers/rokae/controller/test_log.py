@@ -114,7 +114,7 @@ def test_a_program_can_be_followed_by_its_log() -> None:
     started, ended = found.entries[2:4]
     assert started.text == "motion started: joint position"
     cycles = len(MOTION.q)
-    assert ended.facts["lost"] == ended.facts["late"] == 0
+    assert ended.facts["without_command"] == ended.facts["late"] == 0
     assert ended.facts["cycles"] == cycles
     assert ended.facts["duration"] == pytest.approx((cycles - 1) * CYCLE_TIME)
     assert ended.cycle - started.cycle >= ended.facts["cycles"], "the state before the first command, and the end"

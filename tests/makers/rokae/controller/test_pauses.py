@@ -133,7 +133,16 @@ def test_a_client_that_vanishes_at_speed_has_lost_commands(make_hand) -> None:
     hand.start()
     hand.play(hand.swing(1, 2.0, 0.5))
     assert hand.rest().faults == (F.INSTABILITY_DETECTION,)
-    assert hand.cycle.reason == "20 commands in a row were lost"
+    said = "50 cycles in a row had no command: 30 by which one may be late, then 20 lost"
+    assert hand.cycle.reason == said
+
+
+def test_where_the_motion_is_bridged_no_command_may_be_late(make_hand) -> None:
+    hand = make_hand(on_loss="bridge")
+    hand.start()
+    hand.play(hand.swing(1, 0.5, 0.5))
+    assert hand.rest().faults == (F.INSTABILITY_DETECTION,)
+    assert hand.cycle.reason == "20 cycles in a row had no command"
 
 
 @pytest.mark.parametrize(("offset", "is_broken"), [(0.0, False), (0.02, True)])
