@@ -152,6 +152,8 @@ class ControllerConfig:
             raise InvalidValueError("mode_delay", self.mode_delay, "needs 0 to 5 s")
         if self.patience is not None and not 0.01 <= self.patience <= 3600.0:
             raise InvalidValueError("patience", self.patience, "needs 0.01 to 3600 s")
+        if self.patience is not None and not self.lockstep:
+            raise InvalidValueError("patience", self.patience, "needs --lockstep, without which it has no effect")
         if self.prefill is not None and not 0 <= self.prefill <= 100:
             raise InvalidValueError("prefill", self.prefill, "needs 0 to 100 cycles")
         if self.lost_limit is not None and not FEWEST_LOST <= self.lost_limit <= MOST_LOST:

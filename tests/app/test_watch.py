@@ -25,6 +25,7 @@ from rcilab.app.text import Text
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ProtocolError, UsageError
 from rcilab.core.state import RobotMode
 from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
+from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.plots import Plots
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
@@ -169,6 +170,22 @@ def test_a_page_that_watches_sends_nothing(watching) -> None:
     reason = obstacle(store.state, controller.status())
     assert reason is not None
     assert reason.code == "ready.watched"
+
+
+def test_what_a_page_that_watches_cannot_do_is_off_on_its_run_tab(place: Arena) -> None:
+    address, text = place.server.world_address, Text("en")
+    with (
+        place.connect() as robot,
+        Workbench(WorkbenchConfig(port=0, quality="light", watch=address)) as bench,
+    ):
+        programs.prepare(robot, NEAR, factor=1.0)
+        wait_for(lambda: bench.session.status().powered is True)
+        handles = bench.server.gui._gui_input_handle_from_uuid.values()
+        names = ("connect", "recover", "power_on", "power_off", "plan")
+        labels = {text("destination.leave"), *(text(f"run.{name}") for name in names)}
+        buttons = [handle for handle in handles if getattr(handle, "label", "") in labels]
+        assert len(buttons) == len(labels)
+        wait_for(lambda: all(button.disabled for button in buttons))
 
 
 @pytest.mark.parametrize(("address", "error"), [("x", InvalidValueError), ("127.0.0.2:1", ConnectionLostError)])

@@ -86,6 +86,8 @@ class WorldStatus:
     soft_limits: SetSoftLimits | None = None
     inputs: tuple[int, ...] | None = None
     """Numbers of the digital inputs that are high."""
+    on_loss: str = ""
+    """What the arm does while commands are missing, from the next motion on; "": an older controller."""
 
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
@@ -128,7 +130,7 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
     if "record" in checked:
         checked["record"] = as_integer(checked["record"], "record", -1, _LARGEST_COUNT)
     checked["reason"] = _reason(checked.get("reason", ""), checked.pop("remark", None))
-    for name in ("model", "plant", "phase", "button"):
+    for name in ("model", "plant", "phase", "button", "on_loss"):
         if name in checked:
             checked[name] = _text(checked[name])
     if "faults" in checked:
