@@ -194,7 +194,7 @@ def _read_run(args: Namespace) -> _Subject:
     if ended:
         notes.append(f"the run ended early: {ended}")
     if not run.is_complete:
-        notes.append("the end of its file is missing")
+        notes.append(f"the recording ends at {run.t[-1]:.3f} s: {run.missing_end}" if len(run.t) else run.missing_end)
     if run.truncated:
         notes.append("the beginning of the run is missing: the check begins in mid-motion")
     return _Subject(

@@ -105,7 +105,7 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
         faults = name_faults(run.faults)
         return "bad", text("record.faulted", faults=faults, moment=moment), facts
     if not run.is_complete:
-        return "warn", text("record.cut"), facts
+        return "warn", text("record.damaged" if run.is_damaged else "record.cut"), facts
     if run.stopped:
         return "warn", text("record.operator_absent" if recording.is_operator_absent else "record.stopped"), facts
     if run.missed_goal is not None:
