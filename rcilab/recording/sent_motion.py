@@ -267,8 +267,10 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     rows = np.concatenate((sources, late))
     order = np.lexsort((np.concatenate((np.full(len(played), -1), late)), turn))
     rows, turn = rows[order], turn[order]
-    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - np.bincount(place, minlength=len(played))[:-1]
+    count = np.bincount(place, minlength=len(played))[:-1]
+    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - count
     unknown = np.diff(np.cumsum(cycles["played"] != 0)[played]) - 1
+    unknown += np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
     unanswered = np.maximum(np.diff(np.cumsum(~sent)[rows]), 0)
     steps = 1 + np.clip(missed[turn[:-1]], 0, unanswered) + np.where(np.diff(turn) > 0, unknown[turn[:-1]], 0)
     return np.concatenate(([0], np.cumsum(steps))).astype(np.intp), rows

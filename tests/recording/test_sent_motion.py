@@ -133,6 +133,17 @@ def test_commands_that_never_arrived_are_interpolated(sine: Run) -> None:
     np.testing.assert_allclose(motion.q, sent_motion(sine).q, rtol=0, atol=1e-6)
 
 
+def test_a_late_command_that_has_no_row_is_interpolated(sine: Run) -> None:
+    """After a pause the client answers its last state again: it sends one more command than there are states."""
+    cycles = without(sine, slice(300, 320), arrived=True).cycles.copy()
+    sent = np.flatnonzero(np.isfinite(sine.command).all(axis=1))
+    cycles["command"][sent[320:-1]] = sine.command[sent[321:]]
+    cycles["late"][np.flatnonzero(sine.cycles["played"])[320] :] = 21
+    motion = sent_motion(replace(sine, cycles=cycles))
+    assert motion.notes == ("1 commands did not arrive and are interpolated",)
+    np.testing.assert_allclose(motion.q[:1000], sent_motion(sine).q[:1000], rtol=0, atol=1e-6)
+
+
 def test_a_client_that_goes_on_where_it_paused_has_no_gap(sine: Run) -> None:
     cycles = without(sine, slice(300, 320), arrived=False).cycles.copy()
     sent = np.flatnonzero(np.isfinite(sine.command).all(axis=1))
