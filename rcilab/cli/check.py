@@ -132,6 +132,9 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     if (args.slow_down is None and args.explain is None) or is_refused or recorded_mode(found) == "torque":
         return report, report
     motion = with_stop(report.motion, model, mode)
+    if len(motion) > len(report.motion) and not (report.ok and args.slow_down is None):
+        before = report.motion.duration
+        show_note(f"note: to slow it down, a stop of {motion.duration - before:.3f} s is added to the {before:.3f} s")
     return report, check(motion, model, start=start_of(found, motion, model), box=box, mode=mode)
 
 

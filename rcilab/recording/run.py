@@ -211,6 +211,12 @@ class Run:
         return float(self.t[-1]) if len(self.t) else 0.0
 
     @property
+    def begin(self) -> float:
+        """Value of `t` from which `duration` counts, [s]: of the first played command; 0 without a play-out."""
+        played = np.flatnonzero(self.cycles["played"]) if self.has_playout else np.zeros(0, np.intp)
+        return float(self.t[played[0]]) if played.size else 0.0
+
+    @property
     def has_playout(self) -> bool:
         """Whether a virtual controller recorded which command it played in which cycle: `PLAYOUT_FIELDS`."""
         return "played" in (self.cycles.dtype.names or ())

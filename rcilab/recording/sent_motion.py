@@ -119,13 +119,14 @@ def check_sent(
     recorded = recorded_mode(run)
     if recorded == "torque":
         motion, torques = sent_torques(run)
-        motion, start = _in_progress(motion) if run.truncated else (motion, None)
+        motion, start = _in_progress(motion) if run.truncated else (_with_duration(motion, run), None)
         return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
     sent = read_sent(run)
     motion, reference = sent.motion, None
     if run.truncated:
         motion, start = _in_progress(motion)
     else:
+        motion = _with_duration(motion, run)
         start = start_of(run, motion, model)
         if start is None and run.has_playout:
             motion = _with_offset(motion, run, model)
@@ -201,6 +202,14 @@ def _with_offset(motion: Motion, run: Run, model: RobotModel) -> Motion:
         f"the first command is {with_degrees(float(off[joint]), f'{off[joint]:.3g}')} of joint {joint + 1} from the "
         "arm's commanded position; the virtual controller accepted and absorbed this, so it is not differentiated"
     )
+    return replace(motion, notes=(*motion.notes, note))
+
+
+def _with_duration(motion: Motion, run: Run) -> Motion:
+    """Returns a motion with a note where the controller took another time to play its commands."""
+    if not run.has_playout or abs(motion.duration - run.duration) < CYCLE_TIME / 2.0:
+        return motion
+    note = f"the commands last {motion.duration:.3f} s, one a cycle; the controller played them in {run.duration:.3f} s"
     return replace(motion, notes=(*motion.notes, note))
 
 

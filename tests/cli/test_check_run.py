@@ -202,6 +202,7 @@ def test_a_slowed_run_ends_at_standstill(tmp_path, capsys):
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 0
     written = Motion.load(tmp_path / "b.npz")
     assert written.duration > 0.3
+    assert f"a stop of {written.duration - 0.299:.3f} s is added to the 0.299 s" in capsys.readouterr().out
     assert np.abs(np.diff(written.q[-2:], axis=0)).max() < 1e-6
 
 

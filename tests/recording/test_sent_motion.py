@@ -177,6 +177,17 @@ def test_a_motion_lasts_from_its_first_played_command_to_the_last(sine: Run) -> 
     assert sine.t[-1] > sine.duration
 
 
+def test_a_command_without_a_cycle_of_its_own_is_in_a_note_on_the_duration(sine: Run) -> None:
+    cycles = np.delete(sine.cycles, np.flatnonzero(sine.cycles["played"])[-1])
+    played = replace(sine, cycles=cycles)
+    last = np.flatnonzero(cycles["played"])[-1]
+    cycles["age"][last] = max(int(cycles["age"][last]) - 1, 0)  # It overtakes the one before it.
+    report = check_sent(played, distance=None)
+    assert report.motion.duration == pytest.approx(played.duration + CYCLE_TIME)
+    said = f"last {report.motion.duration:.3f} s, one a cycle; the controller played them in {played.duration:.3f} s"
+    assert any(said in note for note in report.motion.notes)
+
+
 def test_the_hold_after_the_last_command_is_not_the_clients(sine: Run) -> None:
     """A client that ends at speed is advised to end at standstill; one that was stopped is not."""
     end = int(np.flatnonzero(sine.cycles["played"])[300])
