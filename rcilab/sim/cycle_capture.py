@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -87,6 +88,8 @@ class CycleCapture:
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
+        self._lowest = sys.maxsize  # First row with a command of this motion.
+        self._has_played = False
         self._guests: set[int] = set()  # Rows with a late command that is not the answer to their state.
         self._taken = 0, -1  # First and last of some rows that all have a command.
         self._offset: int | None = None  # From a number of the client's own counting to its row.
@@ -121,6 +124,7 @@ class CycleCapture:
             missed = int(self._lost != lost)
             if not playback.is_lost and playback.command is not None:
                 played = 1
+                self._has_played = True
                 row = self._commands.pop(id(playback.command), -1)
                 if row < 0:
                     arrival = self._pop_waiting(playback.command)
@@ -149,6 +153,8 @@ class CycleCapture:
         self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
         late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), math.nan
+        if row is not None and row < self._lowest and self._has_played:
+            row = None  # It has begun to count again: the number is that of a state before the motion.
         if row is not None:
             sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
             lateness = 1e-9 * (now - sent)
@@ -199,6 +205,8 @@ class CycleCapture:
         pack, offset, numbers_of = self._answer
         pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
+        if row < self._lowest:
+            self._lowest = row
 
     def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
         """Removes a command from those that wait for a row, and returns it; None if it is not among them."""
@@ -267,6 +275,7 @@ class CycleCapture:
         # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
         self._received = self._unrecorded = self._late = self._lost = 0
         self._offset = None
+        self._lowest, self._has_played = sys.maxsize, False
         self._guests.clear()
         self._rows.clear()
         self._commands.clear()

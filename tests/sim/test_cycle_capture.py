@@ -164,3 +164,15 @@ def test_a_repeated_answer_in_a_pause_is_not_a_missed_cycle(bench: Bench) -> Non
         bench.cycles(1)
     bench.cycles(3)
     assert bench.rows()["missed"].sum() == bench.controller.playout.lost
+
+
+def test_a_count_that_begins_again_at_the_number_of_an_early_state_is_recorded(bench: Bench) -> None:
+    in_time(bench, 100)
+    for number in range(bench.number - 700, bench.number - 600):
+        bench.send(number)
+        bench.cycles(1)
+    bench.cycles(30)
+    rows = bench.rows()
+    at = np.flatnonzero(rows["played"])
+    assert (rows["age"][at] < 20).all()
+    assert recorded(rows) == bench.sent
