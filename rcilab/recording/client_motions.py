@@ -57,7 +57,7 @@ class MotionEnd:
     duplicates: int
     """Datagrams that arrived twice."""
     unrecorded: int = 0
-    """Commands that came late and are not in the record."""
+    """Commands that came late or were skipped, and are not in the record."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

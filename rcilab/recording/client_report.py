@@ -119,7 +119,7 @@ def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str
             f"found the queue full: {end.dropped}"
         )
         if end.unrecorded:
-            lines.append(f"  late and not in the record: {end.unrecorded}")
+            lines.append(f"  late or skipped, and not in the record: {end.unrecorded}")
     gaps = _find_gaps(run)
     if gaps:
         lines.append("  without commands: " + ", ".join(f"{count} ms at {start:.3f} s" for start, count in gaps[:10]))

@@ -209,10 +209,16 @@ class CycleCapture:
             self._lowest = row
 
     def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
-        """Removes a command from those that wait for a row, and returns it; None if it is not among them."""
-        for arrival in self._waiting:
+        """Removes a command from those that wait for a row, and returns it; None if it is not among them.
+
+        Older ones are removed, too: they were skipped or dropped, and are not played any more.
+        """
+        waiting = list(self._waiting)
+        for k, arrival in enumerate(waiting):
             if arrival.command is command:
-                self._waiting.remove(arrival)
+                kept = [other for other in waiting[:k] if other.command.number > command.number]
+                self._unrecorded += k - len(kept)
+                self._waiting = deque([*kept, *waiting[k + 1 :]], maxlen=_LONGEST_QUEUE)
                 return arrival
         return None
 

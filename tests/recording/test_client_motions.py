@@ -250,6 +250,9 @@ def test_commands_with_other_numbers_than_those_of_the_states_are_recorded_as_pl
     count = 800
     with watched() as (place, motions), place.connect() as robot:
         robot.set_motor_power(1)
+        state = robot.receive_fresh_state()
+        while state.message_id < 500:  # No number of a client is negative.
+            state = robot.next_state(state.message_id)
         robot.start_move(wire.JOINT_POSITION, wire.JOINT)
         sent = [sine(step, count) for step in range(count)]
         state = robot.receive_fresh_state()

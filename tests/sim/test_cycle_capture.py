@@ -26,7 +26,7 @@ MODEL = load_model("xMatePro7")
 class Bench:
     """A controller whose motion has begun, with its record."""
 
-    def __init__(self) -> None:
+    def __init__(self, controller_mode: int = 0, motion_mode: int = 1) -> None:
         arm = VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0, lost_limit=None)
         self.controller = RciController(arm, mode_delay=0)
         self.ring = CycleRing.create(7, {})
@@ -35,7 +35,7 @@ class Bench:
         self.sent: list[float] = []
         self.controller.handle(rci.SetMotorPower(1))
         self.cycles(1500)
-        self.controller.handle(rci.StartMove(0, 1))
+        self.controller.handle(rci.StartMove(controller_mode, motion_mode))
         while self.controller.state.controller_mode is ControllerMode.OTHER:
             self.cycles(1)
 
@@ -144,6 +144,27 @@ def test_a_pause_costs_no_command_of_a_client(bench: Bench, pause: int, counts_o
     assert recorded(rows) == bench.sent
     at = np.flatnonzero(rows["played"])
     assert (rows["age"][at[-50:]] == 1).all()
+
+
+def test_torques_that_are_skipped_leave_the_others_in_their_order() -> None:
+    """A client that answers a state twice: the newer torque is played."""
+    bench = Bench(4, 0)
+    for k in range(200):
+        for _ in range(2 if k % 20 == 10 else 1):
+            bench.sent.append(1e-3 * len(bench.sent))
+            packet = rci.CommandPacket(bench.number, tau_c=(bench.sent[-1], *[0.0] * 6))
+            bench.controller.receive(packet)
+        bench.cycles(1)
+    end = bench.end()
+    rows = bench.rows()
+    tau = rows["command_tau"][:, 0]
+    at = np.flatnonzero(rows["played"])
+    assert len(at) == 200
+    assert np.isfinite(tau[at - rows["age"][at].astype(int)]).all(), "every played command is recorded"
+    found = tau[np.isfinite(tau)]
+    assert (np.diff(found) > 0.0).all()
+    assert len(bench.sent) - len(found) == end["unrecorded"]
+    bench.ring.close()
 
 
 def test_a_stop_with_very_many_violations_has_an_event(bench: Bench) -> None:
