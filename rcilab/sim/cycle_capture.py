@@ -35,7 +35,9 @@ _FAULTS = struct.Struct("<QIBBBB")
 _STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
 _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
-_ARRAYS = ("q", "q_c", "dq", "tau", *STATE_FIELDS, *OTHER_STATE_FIELDS[:-4])
+_POSES = ("T_base_tool", "T_base_tool_c")
+_OTHERS = (name for name in (*STATE_FIELDS, *OTHER_STATE_FIELDS[:-4]) if name not in _POSES)
+_ARRAYS = ("q", "q_c", "dq", "tau", *_OTHERS)
 _ROWS = int(RingCounter.ROWS)
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
@@ -82,8 +84,7 @@ class CycleCapture:
         self._arrays_of = attrgetter(*_ARRAYS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
-        self._mode = controller.arm.mode
-        self._answer = self._find_answer(self._mode)
+        self._answer = self._find_answer(controller.arm.mode)
         self._modes: tuple[object, ...] = ()
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
@@ -117,6 +118,7 @@ class CycleCapture:
         is_following = playback is not None or self._arm.is_following
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
+        count, number = self._count, state.message_id
         played = age = missed = 0
         arrival: _Arrival | None = None
         if playback is not None:
@@ -128,29 +130,28 @@ class CycleCapture:
                 row = self._commands.pop(id(playback.command), -1)
                 if row < 0:
                     arrival = self._pop_waiting(playback.command)
-                age = self._count - row if row >= 0 else 0 if arrival else NOT_RECORDED
+                age = count - row if row >= 0 else 0 if arrival else NOT_RECORDED
         motion = self._motion if self._is_moving else 0
-        row = self._pack(state, (motion, played, age, len(playout), missed, playout.late))
-        start = self._count % CAPACITY * self._size
-        self._memory[start : start + self._size] = row
-        self._rows.setdefault(state.message_id, self._count)
-        self._rows.pop(state.message_id - _FARTHEST, None)
-        self._count += 1
+        start = count % CAPACITY * self._size
+        self._memory[start : start + self._size] = self._pack(
+            state, motion, played, age, len(playout), missed, playout.late
+        )
+        self._rows.setdefault(number, count)
+        self._rows.pop(number - _FARTHEST, None)
+        self._count = count + 1
         if arrival is not None:
-            self._add(self._count - 1, *arrival)
+            self._add(count, *arrival)
             self._commands.pop(id(arrival.command), None)
         elif self._waiting:
-            self._add(self._count - 1, *self._waiting.popleft())
-        self._counters[_ROWS] = self._count
+            self._add(count, *self._waiting.popleft())
+        self._counters[_ROWS] = count + 1
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = time.monotonic_ns()
-        if self._arm.mode is not self._mode:
-            self._mode = self._arm.mode
-            self._answer = self._find_answer(self._mode)
+        if not self._received:
+            self._answer = self._find_answer(self._arm.mode)
         self._received += 1
-        self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
         late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), math.nan
         if row is not None and row < self._lowest and self._has_played:
@@ -174,6 +175,7 @@ class CycleCapture:
                 if is_late and free != row:
                     self._guests.add(free)
                 return
+        self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
         if is_late:
             self._unrecorded += 1
         else:
@@ -287,21 +289,20 @@ class CycleCapture:
         self._commands.clear()
         self._waiting.clear()
 
-    def _pack(self, state: RobotState, playout: tuple[int, ...]) -> bytes:
+    def _pack(self, state: RobotState, *playout: int) -> bytes:
         modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode
         if modes != self._modes:
             self._modes = modes
             self._status = _FAULTS.pack(sum(1 << fault for fault in state.faults), 0, *modes[1:], 0)
-        # Unpacked by name: slices of the tuple cost a tenth of the row.
-        q, q_c, dq, tau, ext, ext_stiff, T, theta, dq_c, ddq_c, T_c, v_c, a_c, *torques = self._arrays_of(state)
-        return b"".join(
-            (
-                _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
-                q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
-                ext, ext_stiff, T.tobytes(), theta, dq_c, ddq_c, T_c.tobytes(), v_c, a_c, *torques,
-                _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
-            )
+        q, q_c, dq, tau, ext, ext_stiff, theta, dq_c, ddq_c, *others = self._arrays_of(state)
+        tool, tool_c = self._arm.measured_state.tool, self._arm.tool_c  # Of this state, without its wrapping.
+        parts: tuple[Any, ...] = (
+            _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
+            q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
+            ext, ext_stiff, tool.matrix, theta, dq_c, ddq_c, tool_c.matrix, *others,
+            _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
         )  # fmt: skip
+        return b"".join(parts)
 
 
 def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
