@@ -59,6 +59,8 @@ class Plan:
     """Further message about its end."""
     complete: bool = False
     """Whether collisions were checked, too. Not during a drag: the check would halve the rate."""
+    is_recorded: bool = False
+    """Whether it is what a client commanded: after its last row, the controller commands the arm."""
 
     @property
     def starts_at(self) -> JointVector:

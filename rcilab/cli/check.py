@@ -97,24 +97,25 @@ def _run(args: Namespace) -> int:
     arm = describe_arm(model, subject.box)
     for line in filter(None, (arm, subject.note)):
         show_note(f"note: {line}")
-    slowed = None if out is None else to_slow.slow_down()
+    is_explained = args.explain is not None and not report.ok and to_slow is not report
+    slowed = to_slow.slow_down() if out is not None or is_explained else None
     if out is not None and slowed is not None and slowed.motion is not None:
         slowed.motion.save(out)
     if args.json:
         facts = {"model": model.name, "arm": arm, "note": subject.note}
         show(as_json_text({**facts, **report_as_json(report), **_slow_down_as_json(slowed, out)}))
     else:
-        show(report if args.explain is None else report.explain(args.explain))
-        if slowed is not None:
+        show(report if args.explain is None else report.explain(args.explain, slowed=slowed))
+        if slowed is not None and out is not None:
             show(f"slow-down: {slowed}" if args.explain is None else slowed.explain(args.explain))
             if slowed.motion is not None:
                 show(f"written: {args.slow_down}")
-    conforms = report.ok if slowed is None else slowed.motion is not None
+    conforms = report.ok if slowed is None or out is None else slowed.motion is not None
     return 0 if conforms else 1
 
 
 def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None]) -> tuple[Report, Report]:
-    """Returns the report, and that on the motion to slow down, which must end at rest; shows the motion's notes."""
+    """Returns the report and that on the motion to slow down, which must end at standstill; shows its notes."""
     from rcilab.conformance.check import check
     from rcilab.recording.run import Run
     from rcilab.recording.sent_motion import check_sent, recorded_mode, start_of, with_stop
@@ -127,10 +128,14 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     report = check_sent(found, model, box=box, mode=mode)
     for note in report.motion.notes:
         show_note(f"note: {note}")
-    if args.slow_down is None or recorded_mode(found) == "torque":
+    is_refused = any(violation.condition.signal == "frame" for violation in report.violations)
+    if (args.slow_down is None and args.explain is None) or is_refused or recorded_mode(found) == "torque":
         return report, report
     motion = with_stop(report.motion, model, mode)
-    return report, check(motion, model, start=start_of(found), box=box, mode=mode)
+    if len(motion) > len(report.motion) and not (report.ok and args.slow_down is None):
+        before = report.motion.duration
+        show_note(f"note: to slow it down, a stop of {motion.duration - before:.3f} s is added to the {before:.3f} s")
+    return report, check(motion, model, start=start_of(found, motion, model), box=box, mode=mode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,7 +199,7 @@ def _read_run(args: Namespace) -> _Subject:
     if ended:
         notes.append(f"the run ended early: {ended}")
     if not run.is_complete:
-        notes.append("the end of its file is missing")
+        notes.append(f"the recording ends at {run.t[-1]:.3f} s: {run.missing_end}" if len(run.t) else run.missing_end)
     if run.truncated:
         notes.append("the beginning of the run is missing: the check begins in mid-motion")
     return _Subject(

@@ -63,7 +63,14 @@ def recorder_process(folder: Path, ring: CycleRing, form: LogFormat, cycle: Call
     """
     _require_writable(folder)
     command = [sys.executable, "-m", "rcilab.cli.motion_recorder", os.fspath(folder), str(ring.descriptor), form]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=(ring.descriptor,))
+    # In a session of its own: a signal to the terminal's processes ends the controller, which then ends this one.
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        pass_fds=(ring.descriptor,),
+        start_new_session=True,
+    )
     assert process.stdin is not None
     assert process.stdout is not None
     show, ending = show_entry(form, cycle), threading.Event()
@@ -106,7 +113,8 @@ def _await_end(process: subprocess.Popen[bytes], show: Callable[[str, str], None
 
 def main(arguments: Sequence[str]) -> int:
     """Records until standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal; the controller ends this process.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)  # The end of the controller ends it, once everything is written.
     os.nice(_NICENESS)
     folder, ring, form = Path(arguments[0]), CycleRing(int(arguments[1])), cast("LogFormat", arguments[2])
     reader = ring.open_reader()

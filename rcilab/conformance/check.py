@@ -17,6 +17,7 @@ from rcilab.conformance.limit_utilisation import Usage, near_bound, worst_of
 from rcilab.conformance.report import ConditionResult, Report, Violation
 from rcilab.conformance.signals import HOLD_SAMPLES as HOLD_SAMPLES
 from rcilab.conformance.signals import MotionSignals, Record
+from rcilab.conformance.standstill import resolution
 from rcilab.conformance.start import StartState, as_start
 from rcilab.core.arrays import Array, Unquoted, as_rows, described
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
@@ -117,14 +118,15 @@ def check_commands(
 ) -> Report:
     """Checks the commands of a recorded motion, up to the last one.
 
-    `check` holds the arm at the last row; here the controller has stopped it, in its own way. A first command within
-    one cycle's jerk of the arm is the first step of the motion. The report has no certificate.
+    `check` holds the arm at the last row; here the controller has stopped it. A first command within one cycle's jerk
+    of the arm is the first step of the motion. An end that is not the client's need not be a standstill. The report has
+    no certificate.
 
     Args:
         motion: The commands.
         model: The arm.
-        record: What else is known of them; where the motion was stopped, its end need not be a standstill.
-        start: As for `check`, also for the others.
+        record: What else is known of them.
+        start: As for `check`; a StartState where the beginning of the motion is not known.
         box: The safety box.
         distance: Required distances of the links.
         mode: Mode of the motion.
@@ -159,8 +161,9 @@ def _check(
     rows = condition_table(model.description).rows(mode, has_elbow=bool(model.redundancy), has_box=box is not None)
     if distance is not None:
         rows = (*rows, *clearance_conditions(distance))
-    if record is not None and record.was_stopped:
-        rows = tuple(row for row in rows if row.stage != "end")
+    if record is not None:
+        is_missing = {"start": state.moving, "throughout": False, "end": record.was_stopped}
+        rows = tuple(row for row in rows if not is_missing[row.stage])
     return _report(
         motion, rows, model=model, start=state, box=box, distance=distance, mode=mode, torques=torques, record=record
     )
@@ -224,6 +227,7 @@ class _MotionChecker:
     ) -> None:
         self._motion = motion
         self._limits = _limits_of(motion, model.limits, start)
+        self._is_record = record is not None
         self._signals = MotionSignals(motion, model, start, box, distance, mode, torques, record)
         self._depth = min(box.size) / 2.0 if box is not None else 1.0
 
@@ -263,10 +267,17 @@ class _MotionChecker:
         return result, [self._violation(condition, values, (lower, upper), ratio, first_time, run) for run in runs]
 
     def _bounds(self, condition: Condition) -> Bounds:
-        """Returns the bounds of a condition, shape (n,) or (1,); (rows, n) if they depend on the joint angles."""
-        if condition.bounds_at is None or not condition.depends_on_angles(self._limits.joint):
-            return condition.bounds(self._limits)
-        return condition.bounds_at(self._limits.joint, self._signals.angles_before())
+        """Returns the bounds of a condition, shape (n,) or (1,); (rows, n) if they depend on the joint angles.
+
+        A recorded first command may be the first step of the motion.
+        """
+        if condition.bounds_at is not None and condition.depends_on_angles(self._limits.joint):
+            return condition.bounds_at(self._limits.joint, self._signals.angles_before())
+        lower, upper = condition.bounds(self._limits)
+        if not self._is_record or condition.stage != "start" or condition.order or condition.necessity == "necessary":
+            return lower, upper
+        step = resolution(condition.signal, 0, self._limits)
+        return lower - step, upper + step
 
     def _with_source(self, condition: Condition, column: int, bound: float) -> Condition:
         """Returns the condition, with the source of its bound if that is not the arm's own."""

@@ -21,6 +21,7 @@ from typing import Literal
 
 import numpy as np
 
+from rcilab.conformance.standstill import standstill_bounds
 from rcilab.core.arrays import JointVector, readonly_copy
 from rcilab.core.condition import (
     AnyLimits,
@@ -39,9 +40,9 @@ START_POSITION_TOLERANCE = 1e-9  # [rad]
 """Largest distance of a motion's start from the arm, also in [m]. A step of 1 nrad is a jerk of 2 rad/s^3, within the
 planner's margin."""
 STANDSTILL_VELOCITY = 1e-4  # [rad/s] or [m/s]
-"""A smaller velocity counts as zero: more than rounding, and without effect on a joint."""
+"""A velocity counts as zero up to this, more than rounding, beyond what one cycle within the limits changes."""
 STANDSTILL_ACCELERATION = 1e-2  # [rad/s^2] or [m/s^2]
-"""A smaller acceleration counts as zero: a thousandth of the smallest acceleration limit."""
+"""The same for an acceleration: a thousandth of the smallest acceleration limit."""
 BOX_TOLERANCE = 1e-9  # [m]
 """A smaller distance outside the safety box counts as inside, so that a tool on its face does not stop the arm."""
 ARM_ANGLE_TOLERANCE = 1e-9  # [rad]
@@ -152,6 +153,7 @@ def _motion_torque(quantity: str, limit: str, order: int) -> Condition:
 
 def _joint_end(stage: Literal["start", "end"], order: int) -> Condition:
     name = _NAMES[order]
+    tolerance = STANDSTILL_VELOCITY if order == 1 else STANDSTILL_ACCELERATION
     return Condition(
         id=f"{stage}.{name}",
         quantity=f"{name} at the {stage}" if order else "distance of the start from the arm",
@@ -160,7 +162,7 @@ def _joint_end(stage: Literal["start", "end"], order: int) -> Condition:
         unit=("rad", "rad/s", "rad/s^2")[order],
         stage=stage,
         order=order,
-        bounds=joint_tolerance((START_POSITION_TOLERANCE, STANDSTILL_VELOCITY, STANDSTILL_ACCELERATION)[order]),
+        bounds=standstill_bounds(tolerance, "joint", order) if order else joint_tolerance(START_POSITION_TOLERANCE),
     )
 
 
@@ -202,7 +204,7 @@ def _arm_angle(order: int) -> Condition:
 
 def _tool_end(stage: Literal["start", "end"], signal: Literal["translation", "rotation"], order: int) -> Condition:
     kind = {"translation": "translational", "rotation": "rotational"}[signal]
-    limit = STANDSTILL_VELOCITY if order == 1 else STANDSTILL_ACCELERATION
+    tolerance = STANDSTILL_VELOCITY if order == 1 else STANDSTILL_ACCELERATION
     return Condition(
         id=f"{stage}.cartesian.{_NAMES[order]}.{signal}",
         quantity=f"{kind} {_NAMES[order]} at the {stage}",
@@ -212,7 +214,7 @@ def _tool_end(stage: Literal["start", "end"], signal: Literal["translation", "ro
         stage=stage,
         signal=signal,
         order=order,
-        bounds=lambda limits: symmetric_bounds(limit),
+        bounds=standstill_bounds(tolerance, signal, order),
     )
 
 

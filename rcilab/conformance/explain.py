@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import reduce
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.catalogue import Language, Phrase, load_catalogue, translate
 from rcilab.core.clearance import FLOOR, TOOL
 from rcilab.core.condition import Condition
+from rcilab.core.errors import UsageError
 from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.units import USUAL, Units
 
@@ -60,7 +62,8 @@ def explain_report(
     if len(found) > MAX_LISTED:
         lines.append(f"- {writer.translate('verdict.more', count=str(len(found) - MAX_LISTED))}")
     if not report.ok:
-        lines.append(explain_slow_down(slowed or report.slow_down(), language))
+        with suppress(UsageError):  # Commanded torques cannot be slowed down.
+            lines.append(explain_slow_down(slowed or report.slow_down(), language))
     return "\n".join(lines)
 
 

@@ -22,6 +22,9 @@ from rcilab.i18n.rounding import format_pair
 from rcilab.i18n.units import Units
 from rcilab.motion.motion import Motion
 
+_ROUNDING = 1e-2
+"""Part of the tolerance at an end of a motion below which a value is shown as 0."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ConditionResult:
@@ -84,10 +87,12 @@ class ConditionResult:
 
     @property
     def displayed(self) -> tuple[float, float]:
-        """Worst value and bound for display; a bound that is only a tolerance is 0, and so is a value within it."""
+        """Worst value and bound for display; a bound that is only rounding is 0, and so is a value within it."""
         condition = self.condition
         if condition.is_measured or (condition.signal != "position" and condition.stage == "throughout"):
             return self.value, self.bound
+        if condition.order:
+            return self._rest, self.bound
         if self.ok and self.start_excess:
             return self.start_excess, 0.0
         return 0.0 if self.ok and abs(self.value) <= abs(self.bound) else self.value, 0.0
@@ -102,13 +107,18 @@ class ConditionResult:
 
     @property
     def texts(self) -> tuple[str, str, str]:
-        """Worst value, bound and used part as text; a value at an end within its tolerance of 0 is 0."""
+        """Worst value, bound and used part as text; a value at an end that is small within its tolerance is 0."""
         used = share(self.ratio) if self.has_share else ""
         if self.condition.signal == "position":
             return f"{self.displayed[0]:.4g}", "0", used
         if self.condition.stage == "throughout":
             return *format_pair(self.value, self.bound), used
-        return "0" if self.ok else f"{self.value:.4g}", f"0 ± {abs(self.bound):g}", ""
+        return f"{self._rest:.4g}", f"0 ± {abs(self.bound):.4g}", ""
+
+    @property
+    def _rest(self) -> float:
+        """The value at an end, 0 where it is rounding compared to its tolerance."""
+        return 0.0 if abs(self.value) < _ROUNDING * abs(self.bound) else self.value
 
     @property
     def verdict(self) -> str:
@@ -189,7 +199,7 @@ class Violation:
         row = self.condition
         value, bound = format_pair(self.value, self.bound)
         if row.stage != "throughout":
-            return f"{row.quantity} is {value} {row.unit}, not 0"
+            return f"{row.quantity} is {value} {row.unit}, not 0 within {abs(self.bound):.4g} {row.unit}"
         if row.signal == "position":
             return f"{row.quantity} is {self.value:.4g} m outside the safety box"
         if row.signal == "frame":

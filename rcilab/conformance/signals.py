@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from rcilab.conformance.clearance_conditions import clearance_conditions
 from rcilab.conformance.clearance_path import ClearancePath, clearance_path
 from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
-from rcilab.conformance.standstill import above_resolution
-from rcilab.conformance.start import StartState
+from rcilab.conformance.start import StartState, as_start
 from rcilab.conformance.tool_signals import ToolSignals
-from rcilab.core.arrays import Array
+from rcilab.core.arrays import Array, JointVector
 from rcilab.core.clearance import ClearanceLimit, LinkPair
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import Condition
@@ -38,7 +37,7 @@ _INTERPOLATED_PART = 0.8
 """Part of a torque bound up to which interpolation is sufficient; rows beyond it are computed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Record:
     """What is known of recorded commands beyond their joint angles."""
 
@@ -46,6 +45,9 @@ class Record:
     """Whether something other than the client ended the motion."""
     refused_pose: bool = False
     """Whether a pose followed the last row that has no joint angles on this branch."""
+    reference: JointVector | None = None
+    """Commanded joint angles before the first row, shape (n,), [rad], where the controller absorbed its distance from
+    them: it is compared with them but not differentiated. None: the start of the check."""
 
 
 class MotionSignals:
@@ -93,10 +95,7 @@ class MotionSignals:
             return self._end_values(condition), self._motion.duration
         if condition.order:
             return self._end_values(condition), 0.0
-        values = self._at_start(condition)[np.newaxis]
-        if self._record is None or condition.necessity == "necessary":
-            return values, 0.0
-        return above_resolution(values, condition, self._model.limits), 0.0  # It may be the first step of the motion.
+        return self._at_start(condition)[np.newaxis], 0.0
 
     def angles_before(self) -> Array:
         """Returns the joint angles one cycle before each row that is checked throughout, shape (rows, n), [rad]."""
@@ -143,13 +142,14 @@ class MotionSignals:
 
     def _at_start(self, condition: Condition) -> Array:
         """Returns the difference of the first command from the state of the arm, shape (n,) or (1,)."""
-        if condition.signal == "translation":
-            return np.array([self._tool.start_distance])
-        if condition.signal == "arm_angle":
-            return np.array([self._tool.start_turn])
+        reference = None if self._record is None else self._record.reference
+        start = self._start if reference is None else as_start(reference, self._motion.n)
+        if condition.signal in ("translation", "arm_angle"):
+            tool = self._tool if start is self._start else ToolSignals(self._model, start, self._motion.q[:1])
+            return np.array([tool.start_distance if condition.signal == "translation" else tool.start_turn])
         if condition.signal == "torque":
             return self._torques[0][0]
-        return self._motion.start - self._start.q
+        return self._motion.start - start.q
 
     @cached_property
     def _tool(self) -> ToolSignals:
@@ -177,7 +177,8 @@ class MotionSignals:
         """Torques without gravity and their backward differences over one cycle, each of shape (N + 3, n)."""
         if self._commanded_torques is not None:
             tau = np.concatenate((self._commanded_torques, np.tile(self._commanded_torques[-1], (HOLD_SAMPLES, 1))))
-            return tau, np.diff(tau, axis=0, prepend=0.0) / CYCLE_TIME
+            before = tau[:1] if self._start.moving else np.zeros_like(tau[:1])
+            return tau, np.diff(tau, axis=0, prepend=before) / CYCLE_TIME
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
         places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.
@@ -205,10 +206,10 @@ class MotionSignals:
         return tau.T, (np.diff(np.concatenate((before, tau), axis=1)) / CYCLE_TIME).T
 
     def _end_values(self, condition: Condition) -> Array:
-        """Returns velocity or acceleration at an end of the motion, above the resolution, shape (1, n) or (1, 1)."""
+        """Returns velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
         values = self._throughout(condition)
         row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
-        return above_resolution(values[row : row + 1], condition, self._model.limits)
+        return values[row : row + 1]
 
 
 def _rows_to_compute(is_rough: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from rcilab.conformance.limit_violation import LimitViolation
-from rcilab.conformance.standstill import above_resolution
+from rcilab.conformance.standstill import resolution
 from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 
@@ -52,10 +50,12 @@ class StandstillMonitor:
         for row, lower, upper in self._rows:
             if not (is_last if row.stage == "end" else before < row.order <= self._passed):
                 continue
-            values = above_resolution(np.array(differences(row)), row, self._limits, cycles)
-            for axis, (value, low, high) in enumerate(
-                zip(values.tolist(), lower.tolist(), upper.tolist(), strict=True), 1
-            ):
+            more = 0.0  # By which differences over several cycles are coarser.
+            if cycles > 1:
+                one, several = (resolution(row.signal, row.order, self._limits, count) for count in (1, cycles))
+                more = several - one
+            bounds = zip(differences(row), (lower - more).tolist(), (upper + more).tolist(), strict=True)
+            for axis, (value, low, high) in enumerate(bounds, 1):
                 if not low < value < high:
                     found.append(
                         LimitViolation(row, axis if row.is_per_joint else 0, value, low if value <= low else high)

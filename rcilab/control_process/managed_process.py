@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import math
 import multiprocessing.forkserver
 import multiprocessing.resource_tracker
 import os
@@ -199,12 +200,12 @@ class ManagedProcess:
         if self._pid is None:
             self._read_status(timeout)
         if self._handle is not None:
-            return bool(select.select([self._handle], [], [], timeout)[0])
+            return _is_readable(self._handle, timeout)
         return self._pid is not None or self._is_reported
 
     def read_output(self) -> str:
         """Returns the stdout output since the last call; does not wait."""
-        if not select.select([self._stdout], [], [], 0.0)[0]:
+        if not _is_readable(self._stdout, 0.0):
             return ""
         return os.read(self._stdout, 4096).decode(errors="replace")
 
@@ -215,7 +216,7 @@ class ManagedProcess:
 
     def _read_status(self, timeout: float) -> None:
         """Reads the next report of the fork server: the process id, then the exit code."""
-        if self._is_reported or not select.select([self._status], [], [], timeout)[0]:
+        if self._is_reported or not _is_readable(self._status, timeout):
             return
         try:
             number = multiprocessing.forkserver.read_signed(self._status)
@@ -228,6 +229,13 @@ class ManagedProcess:
                 self._handle = os.pidfd_open(number)
         else:
             self._exit_code, self._is_reported = number, True
+
+
+def _is_readable(descriptor: int, timeout: float) -> bool:
+    """Returns whether a descriptor, of any number, can be read or is at its end within a time, [s]."""
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    return bool(poll.poll(math.ceil(1e3 * timeout)))
 
 
 def _working_folder() -> str | None:

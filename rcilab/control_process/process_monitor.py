@@ -78,8 +78,7 @@ class ProcessMonitor:
             ConnectionLostError: A process could not be started.
         """
         self.processes.launch()
-        self._thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
-        self._thread.start()
+        self._start_monitoring()
 
     def restart(self) -> None:
         """Ends the processes in any state and starts them again.
@@ -91,7 +90,13 @@ class ProcessMonitor:
         with self.lock:
             self.require_block()
             self._end_processes(ConnectionLostError("the control process was restarted"))
-            self.processes.launch()
+            try:
+                self.processes.launch()
+            except Exception as error:
+                self.processes.end()  # The other one may have started.
+                self._record_crash(f"{error}; restart() tries again")
+                raise
+            self._start_monitoring()
 
     def close(self) -> None:
         """Stops a running motion, ends the processes and frees the shared memory. May be called twice."""
@@ -194,19 +199,39 @@ class ProcessMonitor:
                 return "starting", "starting", MESSAGES["starting"]
             return "connecting", "connecting", MESSAGES["connecting"].format(address=self.processes.address)
 
+    def _start_monitoring(self) -> None:
+        if self._thread is None or not self._thread.is_alive():
+            self._thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
+            self._thread.start()
+
     def _monitor(self) -> None:
         """The monitoring thread: heartbeats, replies, processes that ended. It never blocks."""
         while not self._is_closing.wait(_PERIOD):
             with self.lock:
                 if self.block is None:
                     return
-                self.block.counters[Counter.SUPERVISOR_HEARTBEAT] = time.monotonic_ns()
-                self._collect_replies()
-                self._handle_exits()
-                self._check_for_loss()
-                if self._connecting is None and self.processes.is_ready:
-                    with suppress(UsageError):  # The process has just ended; the next period detects it.
-                        self._connecting = self.connect()
+                try:
+                    self._monitor_once(self.block)
+                except Exception as error:
+                    self._fail(f"{type(error).__name__}: {error}")
+
+    def _monitor_once(self, block: ControlBlock) -> None:
+        block.counters[Counter.SUPERVISOR_HEARTBEAT] = time.monotonic_ns()
+        self._collect_replies()
+        self._handle_exits()
+        self._check_for_loss()
+        if self._connecting is None and self.processes.is_ready:
+            with suppress(UsageError):  # The process has just ended; the next period detects it.
+                self._connecting = self.connect()
+
+    def _fail(self, reason: str) -> None:
+        """Ends the control process, which stops the arm, and all requests: no reply may arrive any more."""
+        message = f"The supervision of the control process has failed ({reason}); use restart."
+        if self._crash is None:
+            self._record_crash(message)
+            self._client.send_end()
+        self._connecting = None
+        self._client.fail_all(ConnectionLostError(message))
 
     def _collect_replies(self) -> None:
         errors = self._client.collect()
@@ -237,6 +262,10 @@ class ProcessMonitor:
         self._loss_periods = self._loss_periods + 1 if is_lost else 0
         if self._loss_periods == _LOSS_PERIODS:
             self._record_incident(shown.code, shown.message)
+
+    def _record_crash(self, message: str) -> None:
+        self._crash = "crashed.worker", message
+        self._record_incident(*self._crash)
 
     def _record_incident(self, code: str, message: str, *, is_restarted: bool = False) -> None:
         number = 1 if self.incident is None else self.incident.number + 1

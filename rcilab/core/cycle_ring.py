@@ -34,7 +34,7 @@ CAPACITY = 16384
 _MAGIC = b"RCILABCY"
 _VERSION = 1
 _HEADER = struct.Struct("<8sIIII")
-_EVENT_SLOTS, _EVENT_SIZE = 512, 2 * PAGE  # Of 256 motions: the shortest ones within the time of the rows.
+_EVENT_SLOTS, _EVENT_SIZE = 512, 4 * PAGE  # Of 256 motions: the shortest ones within the time of the rows.
 _MOST_JOINTS = 16
 _LENGTH = struct.Struct("<I")
 
@@ -121,18 +121,18 @@ class CycleRing:
         Raises:
             UsageError: They are not readable.
         """
-        try:
-            facts = json.loads(_read(self._facts))
-        except ValueError:
-            facts = None
-        if not isinstance(facts, dict):
+        facts = _decode(_read(self._facts))
+        if facts is None:
             raise UsageError("the record of the controller is damaged: its facts are unreadable")
-        return cast("dict[str, Any]", facts)
+        return facts
 
     def add_event(self, event: dict[str, Any]) -> None:
-        """Appends an event; only the writer calls it."""
+        """Appends an event of at most 16 kB, a longer one without its longest value; only the writer calls it."""
         count = self.counters[RingCounter.EVENTS]
         text = json.dumps(event).encode()
+        if len(text) > _EVENT_SIZE - _LENGTH.size:
+            longest = max(event, key=lambda name: len(json.dumps(event[name])))
+            text = json.dumps({**event, longest: None}).encode()
         start = count % _EVENT_SLOTS * _EVENT_SIZE
         self._events[start : start + _LENGTH.size + len(text)] = _LENGTH.pack(len(text)) + text
         self.counters[RingCounter.EVENTS] = count + 1
@@ -140,20 +140,15 @@ class CycleRing:
     def events(self, start: int) -> tuple[list[dict[str, Any]], int]:
         """Returns the events from a number on, oldest first, and the number of the next one.
 
-        Those that were overwritten are missing: of more than 512, the oldest.
-
-        Raises:
-            UsageError: One is not readable.
+        Those that were overwritten are missing: of more than 512, the oldest; so are those that are not readable.
         """
         count = self.counters[RingCounter.EVENTS]
         numbers = range(max(start, count - _EVENT_SLOTS), count)
         slots = [number % _EVENT_SLOTS * _EVENT_SIZE for number in numbers]
         texts = [_read(self._events[slot : slot + _EVENT_SIZE]) for slot in slots]
         first = self.counters[RingCounter.EVENTS] + 1 - _EVENT_SLOTS  # The one before may be half overwritten.
-        try:
-            return [json.loads(text) for number, text in zip(numbers, texts, strict=True) if number >= first], count
-        except ValueError as error:
-            raise UsageError("the record of the controller is damaged: an event of its client is unreadable") from error
+        found = (_decode(text) for number, text in zip(numbers, texts, strict=True) if number >= first)
+        return [event for event in found if event is not None], count
 
     def open_reader(self) -> RingReader:
         """Returns a reader of the rows."""
@@ -234,6 +229,15 @@ class RingReader:
 
     def _copy(self, first: int, end: int) -> NDArray[np.void]:
         return self._rows[np.arange(first, end) % len(self._rows)]
+
+
+def _decode(text: bytes) -> dict[str, Any] | None:
+    """Returns the object of a line of JSON; None if it is none."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return None
+    return cast("dict[str, Any]", found) if isinstance(found, dict) else None
 
 
 def _size(n: int) -> int:

@@ -81,3 +81,17 @@ def decode_chunks(content: bytes, name: str, max_chunks: int) -> tuple[Chunk, ..
         chunks.append(Chunk(kind.decode("ascii", errors="replace"), payload))
         offset += _BLOCK.size + length
     return tuple(chunks)
+
+
+def is_damaged(content: bytes, chunks: tuple[Chunk, ...]) -> bool:
+    """Returns whether what follows the chunks of a file is damaged; False where the file ends within a chunk.
+
+    Args:
+        content: Content of the file.
+        chunks: Its chunks up to the last complete one, of `decode_chunks`.
+    """
+    rest = content[_HEADER.size + sum(_BLOCK.size + len(chunk.payload) for chunk in chunks) :]
+    if len(rest) < _BLOCK.size:
+        return False
+    kind, length, _ = _BLOCK.unpack_from(rest)
+    return not kind.isalpha() or length <= len(rest) - _BLOCK.size

@@ -18,9 +18,10 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.recording.run_setup import Setup
 
-LAG = 300
+LAG = 1100
 """[cycles] Rows this young are left for the next poll: their commands may still arrive."""
-_BEFORE = 512  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
+_SETTLED = 300  # [cycles] After the first played command: all that came in one burst with it have been played.
+_BEFORE = LAG  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,6 +56,8 @@ class MotionEnd:
     """Commands that found the queue full."""
     duplicates: int
     """Datagrams that arrived twice."""
+    unrecorded: int = 0
+    """Commands that came late or were skipped, and are not in the record."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -113,7 +116,7 @@ class ClientMotions:
         self._row = 0  # Number of the first row of the motion.
         self._origin: int | None = None  # Number of its row with t = 0.
         self._is_resumed = False  # Its rows before the waiting ones were overwritten.
-        self._gap = range(0)  # Numbers of the rows that were overwritten and are not yet reported.
+        self._gaps: list[range] = []  # Numbers of the rows that were overwritten and are not yet reported.
 
     @property
     def position(self) -> int:
@@ -138,7 +141,7 @@ class ClientMotions:
             if event["event"] == "begin":
                 self._begin(event)
             elif self._motion is not None and event["motion"] == self._motion.number:
-                parts.append(self._part(_end(event), event["row"]))
+                parts.append(self._part(_end(event), event["row"], is_whole=True))
                 self._motion = None
         if self._motion is not None:
             part = self._part()
@@ -158,24 +161,35 @@ class ClientMotions:
             self._waiting = np.concatenate([self._waiting, rows])
             return
         if self._motion is not None:
-            part = self._part()
+            part = self._part(is_whole=True)
             if len(part.cycles):
                 parts.append(part)
         self._waiting, self._first = rows, first
-        self._gap, self._is_resumed = range(expected, first), True
+        self._gaps.append(range(expected, first))
+        self._is_resumed = True
 
-    def _part(self, end: MotionEnd | None = None, row: int | None = None) -> MotionPart:
-        """Returns the next part of the motion, of which `row` is the first one after its end."""
+    def _part(self, end: MotionEnd | None = None, row: int | None = None, *, is_whole: bool = False) -> MotionPart:
+        """Returns the next part of the motion, of which `row` is the first one after its end.
+
+        Args:
+            end: The end of the motion; None: it goes on.
+            row: Number of the first row after it; None: it goes on.
+            is_whole: Whether no more rows can be joined to the waiting ones.
+        """
         assert self._motion is not None
-        cycles = self._take()
+        cycles = self._take(is_whole=is_whole)
         skipped = 0
         if len(cycles) or end is not None:
-            skipped = len(range(max(self._gap.start, self._row), min(self._gap.stop, row or self._gap.stop)))
-            self._gap = range(0)
+            skipped = sum(len(range(max(gap.start, self._row), min(gap.stop, row or gap.stop))) for gap in self._gaps)
+            self._gaps = []
         return MotionPart(motion=self._motion, cycles=cycles, end=end, skipped=skipped)
 
-    def _take(self) -> NDArray[np.void]:
-        """Returns the waiting rows of the motion, with their times."""
+    def _take(self, *, is_whole: bool) -> NDArray[np.void]:
+        """Returns the waiting rows of the motion, with their times.
+
+        They begin with the oldest row whose command is played: of a burst of answers to earlier states, the first one
+        played need not answer the first state.
+        """
         assert self._motion is not None
         rows = self._waiting
         of_motion = np.flatnonzero(rows["motion"] == self._motion.number)
@@ -186,9 +200,12 @@ class ClientMotions:
             played = start + np.flatnonzero(rows["played"][start:end])
             sources = played - rows["age"][played].astype(np.intp)
             is_there = (sources >= 0) & (sources <= played)
-            if not is_there.any():
+            if not is_whole and (not is_there.any() or end - played[0] < min(self._lag, _SETTLED)):
                 return rows[:0]
-            start = int(sources[is_there][0])
+            if is_there.any():
+                start = int(sources[is_there].min())
+            elif self._origin is None:
+                return rows[:0]
             self._origin = self._first + start if self._origin is None else self._origin
             self._is_resumed = False
         taken = rows[start:end].copy()
@@ -221,5 +238,6 @@ class ClientMotions:
 
 
 def _end(event: dict[str, Any]) -> MotionEnd:
-    counts = {name: event[name] for name in ("received", "lost", "most_lost", "late", "dropped", "duplicates")}
+    names = ("received", "lost", "most_lost", "late", "dropped", "duplicates", "unrecorded")
+    counts = {name: event.get(name, 0) for name in names}
     return MotionEnd(stopped=Remark.from_dict(event["stopped"]) if event["stopped"] else None, **counts)

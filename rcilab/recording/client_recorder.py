@@ -69,11 +69,7 @@ class ClientRecorder:
                 self._begin(motion)
             if part.skipped:
                 self._finish(stopped=_CUT)
-                place = f"before {part.cycles['t'][0]:.3f} s" if len(part.cycles) else "at its end"
-                self._show(
-                    "not_recorded",
-                    f"motion {motion.number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}",
-                )
+                self._show("not_recorded", self._describe_gap(part))
             if len(part.cycles) and motion.number != self._failed:
                 if self._file is None:
                     self._file = self._open(motion, is_continued=self._part > 0 or part.skipped > 0)
@@ -87,8 +83,16 @@ class ClientRecorder:
                     self._show("not_recorded", f"motion {motion.number}, {motion.setup.mode}, is not recorded: {why}")
                 self._finish(part.end, stopped=part.end.stopped)
         except RcilabError as error:
-            self._file, self._failed = None, motion.number
-            self._show("not_recorded", f"motion {motion.number} is not recorded from here on: {error}")
+            file, self._file, self._failed = self._file, None, motion.number
+            rest = "is not recorded" if file is None else f"is recorded up to {_last_time(file.path):.3f} s only"
+            self._show("not_recorded", f"motion {motion.number} {rest}: {error}")
+
+    def _describe_gap(self, part: MotionPart) -> str:
+        place = "at its end" if self._part else "which were all of it,"
+        if len(part.cycles):
+            place = f"before {part.cycles['t'][0]:.3f} s"
+        number = part.motion.number
+        return f"motion {number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}"
 
     def _begin(self, motion: ClientMotion) -> None:
         between = range(self._last + 1, motion.number)
@@ -141,3 +145,12 @@ class ClientRecorder:
             self._show("not_recorded", f"there is no report on {name}: {error}")
         else:
             self._show("recorded", f"{found.line}; {path}")
+
+
+def _last_time(path: Path) -> float:
+    """Returns the time of the last cycle in a file whose end could not be written, [s]; 0 if there is none."""
+    try:
+        t = load_run(path, max_rows=2 * _LONGEST).t
+    except RcilabError:
+        return 0.0
+    return float(t[-1]) if len(t) else 0.0

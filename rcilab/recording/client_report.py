@@ -10,7 +10,6 @@ import numpy as np
 
 from rcilab.conformance.advice import share
 from rcilab.conformance.report import Report
-from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
@@ -49,11 +48,11 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
     answered = int((run.cycles["sent_ns"] != 0).sum())
     received = answered if end is None else end.received
     late = int(run.cycles["late"].max(initial=0)) if end is None else end.late
-    counts = f"{received} commands, {missed} cycles without one, {late} late"
-    line = f"{name}, {run.setup.mode}, {_followed_time(run):.3f} s, {stopped}{nearest}; {counts}"
+    counts = f"{received} commands, {late} late; {missed} cycles without one"
+    line = f"{name}, {run.setup.mode}, {run.duration:.3f} s, {stopped}{nearest}; {counts}"
     lines = [line, "", *(f"Stopped: {part}" for part in _parts(reason)), ""]
     if report is not None:
-        lines += [str(report), ""]
+        lines += [*(f"Note: {note}" for note in report.motion.notes), str(report), ""]
     lines += _describe_commands(run, end, counts)
     lines += ["", "Settings in force (SI units):"]
     lines += [f"  {name}: {_format(value)}" for name, value in run.setup.settings.items()]
@@ -82,12 +81,6 @@ def _check(run: Run) -> tuple[Report | None, str]:
         return check_client(run), ""
     except RcilabError as error:
         return None, f"; not checked: {error}"
-
-
-def _followed_time(run: Run) -> float:
-    """Returns the time from the first played command to the last cycle that had or lacked one, [s]."""
-    followed = np.flatnonzero(run.cycles["played"] | run.cycles["missed"])
-    return CYCLE_TIME * float(followed[-1] - followed[0] + 1) if followed.size else 0.0
 
 
 def _count_unknown(run: Run) -> int:
@@ -125,6 +118,8 @@ def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str
             f"  most cycles in a row without one: {end.most_lost}; arrived twice: {end.duplicates}; "
             f"found the queue full: {end.dropped}"
         )
+        if end.unrecorded:
+            lines.append(f"  late or skipped, and not in the record: {end.unrecorded}")
     gaps = _find_gaps(run)
     if gaps:
         lines.append("  without commands: " + ", ".join(f"{count} ms at {start:.3f} s" for start, count in gaps[:10]))

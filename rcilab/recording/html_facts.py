@@ -61,7 +61,7 @@ def _ended(run: Run, text: Text) -> str:
     if run.faults:
         return text("facts.faulted", faults=name_faults(run.faults))
     if not run.is_complete:
-        return text("facts.cut")
+        return text("facts.damaged" if run.is_damaged else "facts.cut")
     if not run.stopped:
         return describe_goal(run, text)
     return text("facts.stopped", why=describe_stop(run.stopped or "", run.faults, text))

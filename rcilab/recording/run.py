@@ -106,12 +106,19 @@ class Run:
     has_speed_override: bool = False
     """Whether the speed override was changed during the motion: then `plan` is the motion as executed."""
     is_complete: bool = True
-    """False if it was read from a file whose end is missing."""
+    """False if it was read from a file whose end is missing or damaged."""
+    is_damaged: bool = False
+    """Whether the file goes on after the last of these cycles, with damaged content."""
 
     @property
     def is_safety_stop(self) -> bool:
         """Whether an emergency stop or the safety gate ended it, independent of the error bits."""
         return isinstance(self.stopped, Remark) and self.stopped.code in _SAFETY_STOPS
+
+    @property
+    def missing_end(self) -> str:
+        """Why `is_complete` is False, as text."""
+        return "the rest of its file is damaged" if self.is_damaged else "the end of its file is missing"
 
     @property
     def t(self) -> Array:
@@ -197,11 +204,17 @@ class Run:
     def duration(self) -> float:
         """Time from the first command to the last recorded cycle, [s].
 
-        Where a virtual controller recorded which commands it played, to the last one of these, from the first.
+        With a recorded play-out, to the last played command, from the first.
         """
-        if "played" in (self.cycles.dtype.names or ()):
+        if self.has_playout:
             return played_duration(self.cycles)
         return float(self.t[-1]) if len(self.t) else 0.0
+
+    @property
+    def begin(self) -> float:
+        """Value of `t` from which `duration` counts, [s]: of the first played command; 0 without a play-out."""
+        played = np.flatnonzero(self.cycles["played"]) if self.has_playout else np.zeros(0, np.intp)
+        return float(self.t[played[0]]) if played.size else 0.0
 
     @property
     def has_playout(self) -> bool:
@@ -413,7 +426,7 @@ class Run:
         if self.stopped:
             facts.append(f"stopped: {plain_text(self.stopped)}")
         if not self.is_complete:
-            facts.append("cut off: the end of its file is missing")
+            facts.append(f"cut off: {self.missing_end}")
         if self.faults:
             facts.append("faults: " + name_faults(self.faults))
         return f"<Run {', '.join(facts)}>"
@@ -470,14 +483,14 @@ def build_run(
 
 
 def load_run(file: str | PathLike[str], *, max_rows: int = DEFAULT_MAX_ROWS) -> Run:
-    """Returns the run in a `.rcirun` file; of a truncated file, everything up to its last complete chunk.
+    """Returns the run in a `.rcirun` file; of a truncated or damaged one, everything up to its last complete chunk.
 
     Args:
         file: Path of the file.
         max_rows: Largest allowed number of cycles; the default is 17 minutes.
 
     Returns:
-        The run. `is_complete` is False if the file was truncated.
+        The run. `is_complete` is False if the file was truncated, or is damaged after its beginning.
 
     Raises:
         InvalidValueError: The file does not exist, is not a run, is too long, or is damaged at its beginning.

@@ -29,6 +29,7 @@ import struct
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from io import BytesIO
 from os import PathLike, fspath
 from pathlib import Path
@@ -49,7 +50,7 @@ from rcilab.model.arm_file import arm_facts, build_arm
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel, load_model
 from rcilab.motion.motion import Motion
-from rcilab.recording.chunks import Chunk, decode_chunks, encode_chunk, encode_header
+from rcilab.recording.chunks import Chunk, decode_chunks, encode_chunk, encode_header, is_damaged
 from rcilab.recording.run_setup import Setup
 
 if TYPE_CHECKING:
@@ -286,7 +287,7 @@ def decode_content(content: bytes, name: str, max_rows: int, build: Callable[...
         )
     require_rows(sum(_count_cycles(chunk) for chunk in chunks), max_rows, "run file", name)
     try:
-        return _build(chunks, max_rows, build)
+        return _build(chunks, max_rows, partial(build, is_damaged=is_damaged(content, chunks)))
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
         raise InvalidValueError("run file", name, f"is damaged: {error}").coded("run_damaged", file=name) from error
     except (RcilabError, zlib.error, struct.error) as error:

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.conformance.advice import with_degrees
 from rcilab.conformance.check import check_commands, check_torques
+from rcilab.conformance.common_conditions import START_POSITION_TOLERANCE
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.conformance.signals import Record
+from rcilab.conformance.standstill import resolution
 from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath, JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
@@ -35,7 +38,8 @@ if TYPE_CHECKING:
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
-_LARGEST = 1e100  # [rad] Of commanded angles: their differences remain finite.
+_LARGEST = 1e100  # [rad] Of commanded angles, also of one that is not a number: their differences remain finite.
+_FARTHEST = 1e6  # [m] Of commanded positions; out of any arm's reach.
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -66,16 +70,19 @@ def read_sent(run: Run) -> SentCommands:
     """Returns what a client commanded, see `sent_motion`, and whether its last command was a pose without angles."""
     cycles = run.cycles
     is_played = run.has_playout
-    of_poses = bool(np.isfinite(cycles["command_pose"]).any())
+    of_poses = run.setup.mode.startswith("cartesian") or not np.isnan(cycles["command_pose"]).all()
     numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
-    sent = np.asarray(np.isfinite(numbers).all(axis=1), dtype=np.bool_)
+    sent = np.asarray(~np.isnan(numbers).all(axis=1), dtype=np.bool_)
+    if is_played and run.setup.mode != "torque":
+        _, sources = played_commands(cycles)
+        sent[sources[cycles["sent_ns"][sources] != 0]] = True  # Also of those that are not numbers.
     period = 1 if is_played else state_cycles(cycles)
     index, rows = _played_order(cycles, sent) if is_played else _answered_order(cycles, sent, period)
     if not len(rows):
         has_torques = np.isfinite(cycles["command_tau"]).any()
         what = "torques were sent, which have no path" if has_torques else "nothing was sent"
         raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
-    q = _angles_of_poses(run, rows) if of_poses else np.clip(cycles["command"][rows], -_LARGEST, _LARGEST)
+    q = _angles_of_poses(run, rows) if of_poses else _finite(cycles["command"][rows])
     was_refused = len(q) < len(rows)
     if not len(q):
         return SentCommands(motion=Motion.from_cycles(cycles["q_c"][:1]), was_refused=True)
@@ -111,10 +118,24 @@ def check_sent(
     box = run.setup.safety_box if box is None else box
     recorded = recorded_mode(run)
     if recorded == "torque":
-        return check_torques(*sent_torques(run), model, start=start_of(run), box=box, distance=distance)
+        motion, torques = sent_torques(run)
+        motion, start = _in_progress(motion) if run.truncated else (_with_duration(motion, run), None)
+        return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
     sent = read_sent(run)
-    motion, start = _in_progress(sent.motion) if run.truncated else (sent.motion, start_of(run))
-    record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
+    motion, reference = sent.motion, None
+    if run.truncated:
+        motion, start = _in_progress(motion)
+    else:
+        motion = _with_duration(motion, run)
+        start = start_of(run, motion, model)
+        if start is None and run.has_playout:
+            motion = _with_offset(motion, run, model)
+            reference = None if recorded in COMPLIANT_MODES else run.q_c[0]
+    record = Record(
+        was_stopped=bool(run.stopped or run.faults or not run.is_complete),
+        refused_pose=sent.was_refused,
+        reference=reference,
+    )
     return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
 
 
@@ -144,12 +165,52 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     )
 
 
-def start_of(run: Run) -> JointVector | None:
+def start_of(run: Run, motion: Motion, model: RobotModel) -> JointVector | None:
     """Returns the commanded joint angles before the first command, shape (n,), [rad]; None where they do not bind it.
 
-    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one.
+    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one, as the
+    virtual one does for any arm within its tolerance. They bind a first command that it refused.
+
+    Args:
+        run: The run.
+        motion: Its commands.
+        model: The arm.
     """
-    return None if run.truncated or run.setup.mode in COMPLIANT_MODES else run.q_c[0]
+    if run.truncated or run.setup.mode == "torque":
+        return None
+    is_compliant = run.setup.mode in COMPLIANT_MODES
+    if not run.has_playout:
+        return None if is_compliant else run.q_c[0]
+    first = np.flatnonzero(run.cycles["played"])[:1]
+    is_refused = bool(run.cycles["faults"][first].any())
+    return run.q_c[0] if is_refused or (not is_compliant and _is_step(run, motion, model)) else None
+
+
+def _is_step(run: Run, motion: Motion, model: RobotModel) -> bool:
+    """Returns whether the first command is within one cycle's jerk of the arm."""
+    step = resolution("joint", 0, model.limits) + START_POSITION_TOLERANCE
+    return bool((np.abs(motion.start - run.q_c[0]) <= step).all())
+
+
+def _with_offset(motion: Motion, run: Run, model: RobotModel) -> Motion:
+    """Returns a motion with a note on the distance of its start from the arm, if it is more than a first step."""
+    if _is_step(run, motion, model):
+        return motion
+    off = np.abs(motion.start - run.q_c[0])
+    joint = int(off.argmax())
+    note = (
+        f"the first command is {with_degrees(float(off[joint]), f'{off[joint]:.3g}')} of joint {joint + 1} from the "
+        "arm's commanded position; the virtual controller accepted and absorbed this, so it is not differentiated"
+    )
+    return replace(motion, notes=(*motion.notes, note))
+
+
+def _with_duration(motion: Motion, run: Run) -> Motion:
+    """Returns a motion with a note where the controller took another time to play its commands."""
+    if not run.has_playout or abs(motion.duration - run.duration) < CYCLE_TIME / 2.0:
+        return motion
+    note = f"the commands last {motion.duration:.3f} s, one a cycle; the controller played them in {run.duration:.3f} s"
+    return replace(motion, notes=(*motion.notes, note))
 
 
 def _in_progress(motion: Motion) -> tuple[Motion, StartState | None]:
@@ -162,7 +223,7 @@ def _in_progress(motion: Motion) -> tuple[Motion, StartState | None]:
 
 
 def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
-    """Returns a motion whose last row still moves, continued by a stop, so that it can be run; one at rest as it is.
+    """Returns a motion whose last row still moves, continued by a stop; one at standstill as it is.
 
     Joints stop as fast as their limits allow; where poses are commanded, smoothly, on a course that the limits of the
     tool allow, too. A motion that ends in a jump, from which no stop leads, is returned as it is.
@@ -215,8 +276,10 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     rows = np.concatenate((sources, late))
     order = np.lexsort((np.concatenate((np.full(len(played), -1), late)), turn))
     rows, turn = rows[order], turn[order]
-    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - np.bincount(place, minlength=len(played))[:-1]
+    count = np.bincount(place, minlength=len(played))[:-1]
+    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - count
     unknown = np.diff(np.cumsum(cycles["played"] != 0)[played]) - 1
+    unknown += np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
     unanswered = np.maximum(np.diff(np.cumsum(~sent)[rows]), 0)
     steps = 1 + np.clip(missed[turn[:-1]], 0, unanswered) + np.where(np.diff(turn) > 0, unknown[turn[:-1]], 0)
     return np.concatenate(([0], np.cumsum(steps))).astype(np.intp), rows
@@ -225,25 +288,29 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
 def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     """Returns the numbers of commands without the gaps after which a client goes on from where it paused.
 
-    Only the values can tell: its velocities before and after a gap lead over one cycle or over all.
+    Only the values show it: its velocities before and after a gap lead over one cycle or over all.
     """
     steps = np.diff(index)
     for gap in np.flatnonzero(steps[1:-1] > 1) + 1:
         if steps[gap - 1] > 1 or steps[gap + 1] > 1:
             continue
-        way, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
-        if np.abs(way - velocity).sum() < np.abs(way - steps[gap] * velocity).sum():
+        step, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
+        if np.abs(step - velocity).sum() < np.abs(step - steps[gap] * velocity).sum():
             steps[gap] = 1
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
+
+
+def _finite(q: Array) -> JointPath:
+    return np.clip(np.where(np.isnan(q), _LARGEST, q), -_LARGEST, _LARGEST)
 
 
 def _angles_of_poses(run: Run, rows: NDArray[np.intp]) -> JointPath:
     """Returns the joint angles of the poses in some rows, up to the first one that has none, shape (M, n), [rad]."""
     model, cycles = require_model(run.model), run.cycles
     start = as_vector(cycles["q_c"][0], model.n, "q_c of the run", "rad")
-    T = cycles["command_pose"][rows]
-    for row, pose in enumerate(T.reshape(-1, 16).tolist()):
-        if find_frame_error(pose) is not None:
+    T = np.clip(cycles["command_pose"][rows], -_FARTHEST, _FARTHEST)
+    for row, pose in enumerate(T.reshape(-1, 16)):
+        if find_frame_error(pose.tolist()) is not None:
             T = T[:row]
             break
     psi = _arm_angles(model, start, cycles["command_psi"][rows[: len(T)]].tolist()) if model.redundancy else None
@@ -281,7 +348,7 @@ def _fade_time(dq: Array, ddq: Array, model: RobotModel) -> float:
 
 
 def _fade_out(dq: Array, ddq: Array, duration: float) -> JointPath:
-    """Returns the way of every cycle until standstill; velocity and acceleration continue and vanish smoothly."""
+    """Returns the displacement in every cycle until standstill; velocity and acceleration vanish smoothly."""
     s = CYCLE_TIME * np.arange(1, round(duration / CYCLE_TIME) + 1)[:, np.newaxis]
     u = s / duration
     velocity = dq * (1.0 - 3.0 * u**2 + 2.0 * u**3) + ddq * s * (1.0 - u) ** 3

@@ -11,13 +11,14 @@ on, a cycle waits that long for its command before it counts as lost, and the gr
 
 In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
 commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
-client answers the state after the last one.
+client answers the state after the last one. Torques that are skipped have no cycle.
 """
 
 from __future__ import annotations
 
 import ipaddress
 import logging
+import math
 import os
 from collections.abc import Callable
 
@@ -58,6 +59,8 @@ RESEND_TIME = 0.02  # [s] In lock-step a state is repeated after this time until
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
+_NOTICE_TIME = 1.0  # [s] In lock-step; a command that takes longer is logged,
+_FIRST_NOTICE_TIME = 3.0  # [s] or this for the first one: a vendor client begins 1 s after StartMove.
 _RECORDER_TIMEOUT = 5.0  # [s] In lock-step; then its motions have gaps.
 CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
 SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
@@ -282,6 +285,8 @@ class ArmServer:
         late = controller.arm.playout.late
         deadline = self._clock.now() + self._command_timeout
         resend = self._clock.now() + RESEND_TIME
+        notice_time = _FIRST_NOTICE_TIME if is_first else _NOTICE_TIME
+        notice = self._clock.now() + notice_time
         while True:
             remaining = min(deadline - self._clock.now(), _CHECK_PERIOD)
             remaining = resend - self._clock.now() if is_first else remaining
@@ -292,6 +297,9 @@ class ArmServer:
                 return
             if self._network.has_lost:
                 return
+            if self._clock.now() >= notice:
+                notice = math.inf
+                self._log_wait(notice_time, controller.arm.playout.late - late)
             if self._has_timed_out and controller.arm.playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
@@ -316,6 +324,13 @@ class ArmServer:
             self._poll(min(remaining, _CHECK_PERIOD))
             self._check_periodically()
         self._timer.delay(self._clock.now())
+
+    def _log_wait(self, seconds: float, late: int) -> None:
+        """Logs what lock-step has waited for since `seconds`; `late` commands came meanwhile."""
+        state = self.controller.cycle_number
+        text = f"lock-step has waited {seconds:g} s for the command that answers state {state}"
+        text += f"; {late} that came meanwhile were too late" if late else "; none came"
+        self._log.write("waiting", text, state=state, late=late)
 
     def _await_recorder(self) -> None:
         """Waits, in lock-step, until the recorder has read the oldest rows; not for one that was stopped or killed."""
@@ -395,7 +410,7 @@ class ArmServer:
                 self._advance_unsent()
             return
         while self.controller.wants_commands and (
-            len(playout) - 1 > playout.prefill or (playout.prefill == 0 and arm.is_behind)
+            playout.backlog > 0 or (playout.prefill == 0 and arm.is_behind)
         ):
             self._advance_unsent()
 

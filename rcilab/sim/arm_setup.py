@@ -76,5 +76,5 @@ def require_stand(model: RobotModel, q: Sequence[float], parameters: ArmParamete
         tool = box.T_base_box.inverse() @ Pose(model.forward(angles).position)
         depth = -float(tool.position[2]) - 0.5 * box.size[2]
         if depth > 0.0:
-            problem = f"deg: the tool is {1e3 * depth:.3g} mm below the floor of the safety box; it must be above"
+            problem = f"deg: the tool is {1e3 * depth:.0f} mm below the floor of the safety box; it must be above"
             raise InvalidValueError(JOINT_ANGLES, shown, problem)

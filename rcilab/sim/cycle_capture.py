@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 import struct
+import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -34,11 +35,13 @@ _FAULTS = struct.Struct("<QIBBBB")
 _STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
 _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
-_ARRAYS = STATE_FIELDS + OTHER_STATE_FIELDS[:-4]
-_POSE, _POSE_C = _ARRAYS.index("T_base_tool"), _ARRAYS.index("T_base_tool_c")
+_POSES = ("T_base_tool", "T_base_tool_c")
+_OTHERS = (name for name in (*STATE_FIELDS, *OTHER_STATE_FIELDS[:-4]) if name not in _POSES)
+_ARRAYS = ("q", "q_c", "dq", "tau", *_OTHERS)
 _ROWS = int(RingCounter.ROWS)
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
-_FARTHEST = 256  # [rows] Whose commands may be added; then readers take the row. No queue of commands is longer.
+_FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
+_LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
 
 
 class _Arrival(NamedTuple):
@@ -77,17 +80,21 @@ class CycleCapture:
         self._lost_client = ""
         self._rows: dict[int, int] = {}  # Row of each recent message id since the end of the last motion.
         self._commands: dict[int, int] = {}  # Row of each queued command, by its identity.
-        self._waiting: deque[_Arrival] = deque(maxlen=_FARTHEST)  # For rows to come; the queue drops the oldest, too.
+        self._waiting: deque[_Arrival] = deque(maxlen=_LONGEST_QUEUE)  # For rows to come; drops the oldest.
         self._arrays_of = attrgetter(*_ARRAYS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
-        self._mode = controller.arm.mode
-        self._answer = self._find_answer(self._mode)
+        self._answer = self._find_answer(controller.arm.mode)
         self._modes: tuple[object, ...] = ()
         self._status = b""  # Faults and modes, packed: they rarely change.
         self._counters = ring.counters
         self._arm, self._playout = controller.arm, controller.arm.playout
-        self._received = self._late = 0  # Commands of this motion, and those of them that came late.
+        self._lowest = sys.maxsize  # First row with a command of this motion.
+        self._has_played = False
+        self._guests: set[int] = set()  # Rows with a late command that is not the answer to their state.
+        self._taken = 0, -1  # First and last of some rows that all have a command.
+        self._offset: int | None = None  # From a number of the client's own counting to its row.
+        self._received = self._unrecorded = self._late = self._lost = 0  # Of this motion.
         controller.arm.on_command = self._take
 
     @property
@@ -111,54 +118,87 @@ class CycleCapture:
         is_following = playback is not None or self._arm.is_following
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
+        count, number = self._count, state.message_id
         played = age = missed = 0
         arrival: _Arrival | None = None
         if playback is not None:
-            missed = int(playback.is_lost)
-            if not missed and playback.command is not None:
+            lost, self._lost = self._lost, playout.lost
+            missed = int(self._lost != lost)
+            if not playback.is_lost and playback.command is not None:
                 played = 1
+                self._has_played = True
                 row = self._commands.pop(id(playback.command), -1)
                 if row < 0:
                     arrival = self._pop_waiting(playback.command)
-                age = self._count - row if row >= 0 else 0 if arrival else NOT_RECORDED
+                age = count - row if row >= 0 else 0 if arrival else NOT_RECORDED
         motion = self._motion if self._is_moving else 0
-        row = self._pack(state, (motion, played, age, len(playout), missed, playout.late))
-        start = self._count % CAPACITY * self._size
-        self._memory[start : start + self._size] = row
-        self._rows.setdefault(state.message_id, self._count)
-        self._rows.pop(state.message_id - _FARTHEST, None)
-        self._count += 1
+        start = count % CAPACITY * self._size
+        self._memory[start : start + self._size] = self._pack(
+            state, motion, played, age, len(playout), missed, playout.late
+        )
+        self._rows.setdefault(number, count)
+        self._rows.pop(number - _FARTHEST, None)
+        self._count = count + 1
         if arrival is not None:
-            self._add(self._count - 1, *arrival)
+            self._add(count, *arrival)
             self._commands.pop(id(arrival.command), None)
         elif self._waiting:
-            self._add(self._count - 1, *self._waiting.popleft())
-        self._counters[_ROWS] = self._count
+            self._add(count, *self._waiting.popleft())
+        self._counters[_ROWS] = count + 1
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
         now = time.monotonic_ns()
-        if self._arm.mode is not self._mode:
-            self._mode = self._arm.mode
-            self._answer = self._find_answer(self._mode)
+        if not self._received:
+            self._answer = self._find_answer(self._arm.mode)
         self._received += 1
-        self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
         late, self._late = self._late, self._playout.late
         row, lateness = self._rows.get(command.number), math.nan
+        if row is not None and row < self._lowest and self._has_played:
+            row = None  # It has begun to count again: the number is that of a state before the motion.
         if row is not None:
             sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
             lateness = 1e-9 * (now - sent)
             if not (answered or self._waiting):
                 self._add(row, now, lateness, command)
                 return
-        if self._late > late:  # It is not played, and must not take the place of one that is.
+        is_late = self._late > late
+        if row in self._guests and not is_late:  # It is played, the other one not.
+            self._guests.remove(row)
+            self._unrecorded += 1
+            self._add(row, now, lateness, command)
             return
-        if not self._waiting:
-            for free in range(max(self._count - 1, 0) if row is None else row, self._count):
-                if not _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
-                    self._add(free, now, lateness, command)
-                    return
-        self._waiting.append(_Arrival(now, lateness, command))
+        if is_late or not self._waiting:
+            free = self._find_free(self._find_place(command.number) if row is None else row)
+            if free < self._count:
+                self._add(free, now, lateness, command)
+                if is_late and free != row:
+                    self._guests.add(free)
+                return
+        self._commands.pop(id(command), None)  # Of an earlier command that was dropped.
+        if is_late:
+            self._unrecorded += 1
+        else:
+            self._waiting.append(_Arrival(now, lateness, command))
+
+    def _find_free(self, row: int) -> int:
+        """Returns the first row from here on that has no command; the next one to come if there is none."""
+        first, last = self._taken
+        is_known = first <= row <= last
+        free = last + 1 if is_known else row
+        while free < self._count and _STAMPS.unpack_from(self._memory, free % CAPACITY * self._size + self._stamps)[1]:
+            free += 1
+        self._taken = (first if is_known else row), free - 1
+        return free
+
+    def _find_place(self, number: int) -> int:
+        """Returns the row of a client's own number: it counts on from its first command; at first the newest row."""
+        newest = max(self._count - 1, 0)
+        row = newest if self._offset is None else number + self._offset
+        if not newest - _FARTHEST < row <= newest + _LONGEST_QUEUE:
+            row = newest  # It has begun to count again.
+        self._offset = row - number
+        return max(row, 0)
 
     def _add(self, row: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
         """Adds a command to a row without one."""
@@ -167,12 +207,20 @@ class CycleCapture:
         pack, offset, numbers_of = self._answer
         pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
+        if row < self._lowest:
+            self._lowest = row
 
     def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
-        """Removes a command from those that wait for a row, and returns it; None if it is not among them."""
-        for arrival in self._waiting:
+        """Removes a command from those that wait for a row, and returns it; None if it is not among them.
+
+        Older ones are removed, too: they were skipped or dropped, and are not played any more.
+        """
+        waiting = list(self._waiting)
+        for k, arrival in enumerate(waiting):
             if arrival.command is command:
-                self._waiting.remove(arrival)
+                kept = [other for other in waiting[:k] if other.command.number > command.number]
+                self._unrecorded += k - len(kept)
+                self._waiting = deque([*kept, *waiting[k + 1 :]], maxlen=_LONGEST_QUEUE)
                 return arrival
         return None
 
@@ -189,32 +237,36 @@ class CycleCapture:
         return joints, self._offsets["command"], lambda command: nothing
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
-        """Writes the events of a motion that begins or has ended."""
-        controller = self._controller
-        is_moving = is_following or (self._is_moving and controller.is_moving)
+        """Writes the event of a motion that begins or has ended."""
+        is_moving = is_following or (self._is_moving and self._controller.is_moving)
         if is_moving is self._is_moving:
             return
         self._is_moving = is_moving
-        arm = controller.arm
         if is_moving:
-            self._motion += 1
-            self._lost_client = ""
-            load = arm.model.load
-            self._ring.add_event(
-                {
-                    "event": "begin",
-                    "motion": self._motion,
-                    "row": self._count,
-                    "mode": state.controller_mode.name.lower(),
-                    "client": self._client,
-                    "wall_ns": time.time_ns(),
-                    "tool": arm.model.T_flange_tool.as_row_major(),
-                    "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
-                    "settings": {**describe_parameters(arm.parameters), **self._describe()},
-                }
-            )
-            return
-        playout = arm.playout
+            self._begin_motion(state)
+        else:
+            self._end_motion()
+
+    def _begin_motion(self, state: RobotState) -> None:
+        self._motion += 1
+        self._lost_client = ""
+        arm, load = self._arm, self._arm.model.load
+        self._ring.add_event(
+            {
+                "event": "begin",
+                "motion": self._motion,
+                "row": self._count,
+                "mode": state.controller_mode.name.lower(),
+                "client": self._client,
+                "wall_ns": time.time_ns(),
+                "tool": arm.model.T_flange_tool.as_row_major(),
+                "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
+                "settings": {**describe_parameters(arm.parameters), **self._describe()},
+            }
+        )
+
+    def _end_motion(self) -> None:
+        controller, playout = self._controller, self._playout
         reason = controller.reason if controller.faults else Remark(self._lost_client)
         self._ring.add_event(
             {
@@ -223,6 +275,7 @@ class CycleCapture:
                 "row": self._count,
                 "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
+                "unrecorded": self._unrecorded,
                 "lost": playout.lost,
                 "most_lost": playout.max_consecutive_lost,
                 "late": playout.late,
@@ -231,33 +284,27 @@ class CycleCapture:
             }
         )
         # For the next motion, whose first commands may arrive before its first row, and answer states of this one.
-        self._received = self._late = 0
+        self._received = self._unrecorded = self._late = self._lost = 0
+        self._offset = None
+        self._lowest, self._has_played = sys.maxsize, False
+        self._guests.clear()
         self._rows.clear()
         self._commands.clear()
         self._waiting.clear()
 
-    def _pack(self, state: RobotState, playout: tuple[int, ...]) -> bytes:
+    def _pack(self, state: RobotState, *playout: int) -> bytes:
         modes = state.faults, state.robot_mode, state.controller_mode, state.motion_generator_mode
         if modes != self._modes:
             self._modes = modes
             self._status = _FAULTS.pack(sum(1 << fault for fault in state.faults), 0, *modes[1:], 0)
-        arrays = self._arrays_of(state)
+        q, q_c, dq, tau, ext, ext_stiff, theta, dq_c, ddq_c, *others = self._arrays_of(state)
+        tool, tool_c = self._arm.measured_state.tool, self._arm.tool_c  # Of this state, without its wrapping.
         parts: tuple[Any, ...] = (
             _HEAD.pack(state.message_id, math.nan, time.monotonic_ns(), 0, math.nan, state.success_rate),
-            state.q,
-            state.q_c,
-            state.dq,
-            self._no_joints,
-            self._status,
-            state.tau,
-            self._no_answer,
-            *arrays[:_POSE],
-            arrays[_POSE].tobytes(),
-            *arrays[_POSE + 1 : _POSE_C],
-            arrays[_POSE_C].tobytes(),
-            *arrays[_POSE_C + 1 :],
+            q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
+            ext, ext_stiff, tool.matrix, theta, dq_c, ddq_c, tool_c.matrix, *others,
             _TAIL.pack(state.psi, state.psi_c, state.dpsi_c, state.ddpsi_c, *playout),
-        )
+        )  # fmt: skip
         return b"".join(parts)
 
 

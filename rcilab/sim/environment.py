@@ -46,7 +46,7 @@ from rcilab.sim.clock_stalls import StallSchedule
 from rcilab.sim.faulty_network import FaultyNetwork
 from rcilab.sim.force_profile import ForceProfile
 from rcilab.sim.maker_server import SimulatedController
-from rcilab.sim.setup_requests import SetupInForce, as_setup, describe_setup
+from rcilab.sim.setup_requests import SetupInForce, SetupRequest, as_setup, describe_setup
 from rcilab.sim.streamed_motion import require_loss_behaviour
 
 
@@ -140,6 +140,8 @@ class Environment:
                 self._controller.limit_table = table
             case OnLoss(behaviour):
                 self._controller.arm.on_loss = require_loss_behaviour(behaviour)
+                what = f"on_loss set to {behaviour} from the next motion on, by the simulation port"
+                self._log_change(request, what)
             case Network(faults, direction):
                 self._network.replace(faults, direction)
             case StallClock():
@@ -159,11 +161,14 @@ class Environment:
                 load = SetLoad(request.mass or 0.0, request.center_of_mass, request.inertia)
                 self._plant.mount(None if request.mass is None else as_setup(load).load)
             case PlaceArm() | SetTool() | SetLoad() | SetBox() | SetSoftLimits():
-                self._controller.set_up(as_setup(request))
-                if self._log is not None:
-                    self._log("set_up", describe_setup(request), request=request.name, **asdict(request))
+                self._controller.set_up(as_setup(request, self._controller.safety_box))
+                self._log_change(request, describe_setup(request))
             case GetStatus():
                 pass  # Answered before; it changes nothing.
+
+    def _log_change(self, request: SetupRequest | OnLoss, text: str) -> None:
+        if self._log is not None:
+            self._log("set_up", text, request=request.name, **asdict(request))
 
     def _apply_push(self) -> None:
         self._plant.push(self._push.wrench, self._push.push.link, self._push.push.point)
@@ -202,4 +207,5 @@ class Environment:
             box=setup.box,
             soft_limits=setup.soft_limits,
             inputs=controller.inputs,
+            on_loss=controller.arm.on_loss,
         )

@@ -34,7 +34,7 @@ from rcilab.sim.arm_command import ArmCommand
 
 CAPACITY = 256  # Commands in the queue; then the oldest is dropped. 2.5 of the vendor client's worst bursts (about 92).
 WINDOW = 1000  # Cycles that the success rate covers, 1 s.
-QUEUE_WINDOW = 100  # Cycles over which the lowest queue length is measured; longer than any jitter.
+QUEUE_WINDOW = 100  # Cycles over which the lowest backlog is measured; longer than any jitter.
 SLACK = 5  # Cycles of additional delay that are tolerated: a client may be late with its first answer.
 FIRST_COMMAND_TIMEOUT = 5000  # Cycles. A vendor client begins 1 s after StartMove; a first callback loads libraries.
 LONGEST_GAP = 20  # Ids. The largest loss that the controller bridges (manual 4.6: 10 to 20).
@@ -62,6 +62,7 @@ class JitterBuffer:
 
     Attributes:
         cycles: Cycles of this motion since its first command was played, the lost ones among them.
+        span: Cycles between its first and its last played command.
         lost: Lost cycles of this motion.
         consecutive_lost: Lost cycles since the last command.
         max_consecutive_lost: Largest number of consecutive lost cycles of this motion.
@@ -104,10 +105,11 @@ class JitterBuffer:
         self._surplus = 0  # Commands with a repeated id, right before the next one in the queue.
         self._passed_over: set[int] = set()  # Ids of a gap without lost cycles: their commands may still arrive.
         self._cycles_waited = 0
-        self._played: deque[ArmCommand] = deque(maxlen=LONGEST_GAP)  # The last ones.
+        self._past: deque[ArmCommand] = deque(maxlen=CAPACITY)  # The last ones that were played or came too late.
+        self._lost_since_played = 0
         self.is_playing = False
         self.is_finished = False
-        self.cycles = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
+        self.cycles = self.span = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
         self.late = self.dropped = self.duplicates = 0
 
     def clear(self) -> None:
@@ -123,6 +125,11 @@ class JitterBuffer:
         return self._is_streamed and self.is_playing and not (self.is_finished or self._queue or self._is_repeating)
 
     @property
+    def backlog(self) -> int:
+        """Queued commands beyond the prefill, next to that of the coming cycle; 0 where older ones are skipped."""
+        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self.prefill, 0)
+
+    @property
     def success_rate(self) -> float:
         """Share of the last cycles that had their command, 0 to 1; 1 before the first one."""
         return self._played_in_window / len(self._outcomes) if self._outcomes else 1.0
@@ -134,14 +141,15 @@ class JitterBuffer:
             self.duplicates += 1
             self._is_repeating = True
             return False
-        is_reordered = newest is not None and 0 < newest.number - command.number <= LONGEST_GAP
-        if not is_reordered:
-            self._newest = command
-        elif command in self._played or command in queue:
+        is_next = newest is None or command.number == newest.number + 1
+        if not is_next and (command in self._past or command in queue):
             self.duplicates += 1
             return False
+        if newest is None or not 0 < newest.number - command.number <= LONGEST_GAP:
+            self._newest = command
         if self._is_late(command):
             self.late += 1
+            self._past.append(command)
         else:
             if len(queue) >= CAPACITY:
                 queue.popleft()
@@ -221,19 +229,17 @@ class JitterBuffer:
         if command.number in self._passed_over:
             return False
         return (
-            0 <= behind <= max(LONGEST_GAP, self.consecutive_lost)
+            0 <= behind <= max(LONGEST_GAP, self._lost_since_played)
             and (behind > 0 or self._is_last_lost)
             and self.is_playing
         )
 
     def _find_excess(self) -> None:
-        queued = len(self._queue) - 1
-        if queued < self._lowest:
-            self._lowest = queued
+        if self.backlog < self._lowest:
+            self._lowest = self.backlog
         self._observed += 1
         if self._observed >= QUEUE_WINDOW:
-            excess = self._lowest - self.prefill
-            self._excess = excess if excess > SLACK else 0
+            self._excess = self._lowest if self._lowest > SLACK else 0
             self._observed, self._lowest = 0, CAPACITY
 
     def _skip_old(self) -> int:
@@ -255,10 +261,11 @@ class JitterBuffer:
     def _play(self, command: ArmCommand, skipped: int) -> Playback:
         self._queue.remove(command)  # The first one, except for a reordered command.
         self._advance_to(command.number)
-        self._played.append(command)
-        self.consecutive_lost = 0
+        self._past.append(command)
+        self.consecutive_lost = self._lost_since_played = 0
         self.is_finished = command.finished
         self._count(True)
+        self.span = self.cycles - 1
         return Playback(command, 1, False, skipped)
 
     def _advance_to(self, played: int) -> None:
@@ -279,6 +286,7 @@ class JitterBuffer:
         self._last_id, self._is_last_lost = self._last_id + 1, True
         self.lost += 1
         self.consecutive_lost += 1
+        self._lost_since_played += 1
         self.max_consecutive_lost = max(self.max_consecutive_lost, self.consecutive_lost)
         self._count(False)
         return playback

@@ -48,6 +48,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "refused": Kind("requests were refused"),
         "fault": Kind("faults stopped the arm"),
         "advice": Kind("motions lacked commands", 1),
+        "waiting": Kind("times lock-step waited for a command", 1),
         "slip": Kind("motions took longer"),
         "safety_stop": Kind("safety stops"),
         "safety_release": Kind("safety stops ended"),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import degrees
 from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
+from rcilab.core.errors import UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.dynamics.payload import Payload
@@ -37,11 +40,16 @@ class SetupInForce(NamedTuple):
         )
 
 
-def as_setup(request: SetupRequest) -> ArmSetup:
+def as_setup(request: SetupRequest, box: SafetyBox | None = None) -> ArmSetup:
     """Returns what a request sets.
+
+    Args:
+        request: The request.
+        box: The safety box in force.
 
     Raises:
         InvalidValueError: A value is not valid.
+        UsageError: It switches a box on or off, and there is none.
     """
     match request:
         case PlaceArm(q):
@@ -52,6 +60,10 @@ def as_setup(request: SetupRequest) -> ArmSetup:
             moments = np.array(inertia).reshape(3, 3)
             return ArmSetup(load=Payload(mass=mass, center_of_mass=np.array(center_of_mass), inertia=moments))
         case SetBox(size, position, wxyz, active):
+            if size is None or position is None:
+                if box is None:
+                    raise UsageError("there is no safety box; set_box with size and position sets one")
+                return ArmSetup(safety_box=replace(box, active=active))
             return ArmSetup(safety_box=SafetyBox(size=size, T_base_box=Pose(position, wxyz), active=active))
         case SetSoftLimits(lower, upper):
             return ArmSetup(soft_limits=(lower, upper))
@@ -61,15 +73,16 @@ def describe_setup(request: SetupRequest) -> str:
     """Returns what a request has set, as a sentence for the log."""
     match request:
         case PlaceArm(q):
-            what = f"arm placed at {_listed([degrees(angle) for angle in q])} deg"
-        case SetTool(position):
-            what = f"tool set at {_listed([1e3 * x for x in position])} mm from the flange"
-        case SetLoad(mass):
-            what = f"load set to {mass:g} kg"
-        case SetBox(active=active):
-            what = f"safety box set{'' if active else ', not active'}"
-        case SetSoftLimits():
-            what = "soft limits of the joints set"
+            what = f"arm placed at {_angles(q)}"
+        case SetTool(position, wxyz):
+            what = f"tool set at {_lengths(position)} from the flange{_turned(wxyz)}"
+        case SetLoad(mass, center_of_mass):
+            what = f"load set to {mass:g} kg with its centre of mass at {_lengths(center_of_mass)} from the flange"
+        case SetBox(size, position, wxyz, active):
+            place = "" if size is None or position is None else f" to {_lengths(size)} at {_lengths(position)}"
+            what = f"safety box set{place}{_turned(wxyz)}, {'active' if active else 'not active'}"
+        case SetSoftLimits(lower, upper):
+            what = f"soft limits of the joints set from {_angles(lower)} to {_angles(upper)}"
     return f"{what}, by the simulation port"
 
 
@@ -87,6 +100,18 @@ def box_request(box: SafetyBox) -> SetBox:
     """Returns the request that sets a safety box."""
     pose = box.T_base_box
     return SetBox(box.size, tuple(pose.position.tolist()), tuple(pose.wxyz.tolist()), box.active)
+
+
+def _angles(angles: Sequence[float]) -> str:
+    return f"{_listed([degrees(angle) for angle in angles])} deg"
+
+
+def _lengths(lengths: Sequence[float]) -> str:
+    return f"{_listed([1e3 * length for length in lengths])} mm"
+
+
+def _turned(wxyz: Sequence[float]) -> str:
+    return "" if tuple(wxyz[1:]) == (0.0, 0.0, 0.0) else f", wxyz {_listed([*wxyz])}"
 
 
 def _listed(numbers: list[float]) -> str:

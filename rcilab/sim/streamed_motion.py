@@ -149,5 +149,8 @@ class StreamedMotion:
         if not self.playout.is_playing:
             seconds = f"{FIRST_COMMAND_TIMEOUT * CYCLE_TIME:g}"
             return Remark(f"no command came within {seconds} s of the start", "no_command", seconds=seconds)
-        lost = self.playout.consecutive_lost - self._tolerance
-        return Remark(f"{lost} commands in a row were lost", "lost_in_row", count=lost)
+        count, late = self.playout.consecutive_lost, self._tolerance
+        if not late:
+            return Remark(f"{count} cycles in a row had no command", "lost_in_row", count=count)
+        text = f"{count} cycles in a row had no command: {late} by which one may be late, then {count - late} lost"
+        return Remark(text, "lost_in_row_late", count=count, late=late, lost=count - late)

@@ -16,6 +16,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.motion.bounds import RECOVERY_RANGE, range_from
 
 if TYPE_CHECKING:
+    from rcilab.conformance.start import StartState
     from rcilab.core.limits import JointLimits
     from rcilab.model.robot_model import RobotModel
     from rcilab.motion import Motion
@@ -114,32 +115,56 @@ def _first(values: Array, targets: Array, offsets: NDArray[np.intp], counts: NDA
     return np.minimum.reduceat(np.where(is_target, rows, len(values)), offsets)
 
 
-def plan_curves(motion: Motion, quantity: Quantity, model: RobotModel | None = None) -> Curves:
+def plan_curves(
+    motion: Motion,
+    quantity: Quantity,
+    model: RobotModel | None = None,
+    *,
+    start: StartState | None = None,
+    is_recorded: bool = False,
+) -> Curves:
     """Returns a planned signal, one column per joint; for the torque, `model` with its load is needed.
 
     Velocity, acceleration and jerk are the backward differences that the controller computes and `check` compares,
     including those in the cycles after the end, which are drawn at the end.
+
+    Args:
+        motion: The motion.
+        quantity: The signal.
+        model: The arm with its load, for the torque.
+        start: How the arm moves in the first row; None: it stands still.
+        is_recorded: Whether it is what a client commanded: nothing is known of the cycles after the last row.
     """
     if quantity == "q":
         return Curves(t=motion.times, values=motion.q)
-    t = np.append(motion.times, np.repeat(motion.times[-1:], HOLD_SAMPLES))
+    hold = 0 if is_recorded else HOLD_SAMPLES
+    t = np.append(motion.times, np.repeat(motion.times[-1:], hold))
     if quantity == "tau":
         assert model is not None
-        return Curves(t=t, values=model.torque(*(planned_differences(motion.q, order) for order in range(3))).full)
-    return Curves(t=t, values=planned_differences(motion.q, ORDERS[quantity]))
+        rates = (planned_differences(motion.q, order, start, hold) for order in range(3))
+        return Curves(t=t, values=model.torque(*rates).full)
+    return Curves(t=t, values=planned_differences(motion.q, ORDERS[quantity], start, hold))
 
 
-def planned_differences(q: JointPath, order: int) -> JointPath:
+def planned_differences(
+    q: JointPath, order: int, start: StartState | None = None, hold: int = HOLD_SAMPLES
+) -> JointPath:
     """Returns backward differences at 1 ms of commanded angles, with the cycles in which the controller holds the goal.
 
     Args:
-        q: Joint angles, one row per cycle, shape (N, n), [rad]; the arm stands still in the first row.
+        q: Joint angles, one row per cycle, shape (N, n), [rad].
         order: 0 returns the angles themselves, 1 velocity [rad/s], 2 acceleration, 3 jerk.
+        start: How the arm moves in the first row; None: it stands still.
+        hold: Number of cycles of the hold.
 
     Returns:
-        Shape (N + HOLD_SAMPLES, n).
+        Shape (N + hold, n).
     """
-    path = np.concatenate((np.repeat(q[:1], order, axis=0), q, np.repeat(q[-1:], HOLD_SAMPLES, axis=0)))
+    before = np.repeat(q[:1], order, axis=0)
+    if start is not None and start.moving:
+        steps = start.dq - CYCLE_TIME * np.arange(order)[:, np.newaxis] * start.ddq
+        before = q[0] - CYCLE_TIME * np.cumsum(steps, axis=0)[::-1]
+    path = np.concatenate((before, q, np.repeat(q[-1:], hold, axis=0)))
     return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
 
 

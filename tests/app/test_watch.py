@@ -8,6 +8,7 @@ import os
 import socket
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,18 @@ import pytest
 
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.run.readiness import obstacle
+from rcilab.app.run.replay import replayed
+from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watch_actions import WatchActions, draw_plan
 from rcilab.app.run.watched_controller import WatchedController
 from rcilab.app.store import Store, UiState
+from rcilab.app.text import Text
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ProtocolError, UsageError
 from rcilab.core.state import RobotMode
 from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
-from tests.peers import programs
+from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.plots import Plots
+from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import ControlException
 from tests.waiting import wait_for
@@ -103,6 +109,46 @@ def test_a_motion_in_progress_is_drawn_without_a_violation_at_its_end(place: Are
         assert len(plan.report.usage().ratio) == len(plan.motion.q)  # The scene colours the path by it.
 
 
+def shown_violations(state: UiState) -> set[str]:
+    """The curves in which the page marks a violation."""
+    plots = Plots(Text("en"))
+    return {
+        name
+        for name in ("dq", "ddq", "jerk", "tau")
+        if plots._joint_frame(state, name, 1.0).violated.any()  # As `show` draws them, without a browser.
+    }
+
+
+@pytest.mark.parametrize("first", [0, 400], ids=["whole", "its newest part"])
+@pytest.mark.parametrize("mode", [wire.JOINT_POSITION, wire.JOINT_IMPEDANCE, wire.TORQUE])
+def test_no_curve_of_a_motion_has_a_violation_at_an_end_that_moves(
+    place: Arena, watching, mode: int, first: int
+) -> None:
+    """In progress, and ended while it moves; also of a long motion, of which a page draws the newest part."""
+    store, actions, _ = watching
+    with place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        wait_for(lambda: (actions.tick(), any(n.text.code == "watch.ended" for n in store.state.notices))[1])
+        if mode == wire.TORQUE:
+            programs.torque(robot, 1.0, period=2.0)
+        else:
+            programs.joint_sine(robot, 0.75, mode=mode, amplitude=0.02, period=1.0)  # It ends in full motion.
+        wait_for(lambda: (actions.tick(), sum(n.text.code == "watch.ended" for n in store.state.notices) > 1)[1])
+    recording = store.state.recording
+    assert recording is not None
+    run, model = recording.run, store.state.model
+    assert run is not None
+    for count in (500, 700, len(run.cycles)):
+        rows = run.cycles[first:count].copy()
+        rows["t"] -= rows["t"][0]
+        cut = dataclasses.replace(run, cycles=rows, truncated=bool(first))
+        plan = draw_plan(cut, model)
+        shown = dataclasses.replace(store.state, plan=plan, recording=whole_recording(cut))
+        assert shown_violations(shown) == set(), count
+        assert plan.report.ok or count == len(run.cycles), str(plan.report)
+    assert shown_violations(replayed(store.state, run)) == set()
+
+
 def test_a_refused_command_is_drawn_and_reported(place: Arena, watching) -> None:
     store, actions, controller = watching
     with place.connect() as robot:
@@ -124,6 +170,22 @@ def test_a_page_that_watches_sends_nothing(watching) -> None:
     reason = obstacle(store.state, controller.status())
     assert reason is not None
     assert reason.code == "ready.watched"
+
+
+def test_what_a_page_that_watches_cannot_do_is_off_on_its_run_tab(place: Arena) -> None:
+    address, text = place.server.world_address, Text("en")
+    with (
+        place.connect() as robot,
+        Workbench(WorkbenchConfig(port=0, quality="light", watch=address)) as bench,
+    ):
+        programs.prepare(robot, NEAR, factor=1.0)
+        wait_for(lambda: bench.session.status().powered is True)
+        handles = bench.server.gui._gui_input_handle_from_uuid.values()
+        names = ("connect", "recover", "power_on", "power_off", "plan")
+        labels = {text("destination.leave"), *(text(f"run.{name}") for name in names)}
+        buttons = [handle for handle in handles if getattr(handle, "label", "") in labels]
+        assert len(buttons) == len(labels)
+        wait_for(lambda: all(button.disabled for button in buttons))
 
 
 @pytest.mark.parametrize(("address", "error"), [("x", InvalidValueError), ("127.0.0.2:1", ConnectionLostError)])
@@ -199,6 +261,14 @@ def test_what_is_not_a_controller_or_contradicts_itself_is_refused_in_one_senten
     assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 400
+
+
+def test_a_descriptor_of_another_file_is_refused(tmp_path: Path) -> None:
+    with open(tmp_path / "other", "wb+") as other:
+        other.write(bytes(100_000))
+        other.flush()
+        with pytest.raises(UsageError, match="not the record of a controller"):
+            WatchedController(lie(status(record=other.fileno())))
 
 
 @pytest.mark.parametrize("host", ["a..b", "x" * 100])

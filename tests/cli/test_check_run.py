@@ -122,6 +122,8 @@ def test_a_run_of_torques_is_checked_by_the_torques_that_were_sent(tmp_path, cap
     assert report["violations"][0]["place"] == "joint 3"
     assert main(["check", str(tmp_path / "b.rcirun"), "--slow-down", str(tmp_path / "c.npz")]) == 2
     assert "torques cannot be slowed down" in capsys.readouterr().err
+    assert main(["check", str(tmp_path / "b.rcirun"), "--explain", "en"]) == 1
+    assert "Remedy: " in capsys.readouterr().out
 
 
 def test_why_a_run_ended_early_is_in_its_report(tmp_path, capsys):
@@ -195,22 +197,23 @@ def test_a_jump_at_the_end_of_a_run_is_a_violation_and_no_stop_is_written(tmp_pa
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 1
 
 
-def test_a_slowed_run_ends_at_rest(tmp_path, capsys):
+def test_a_slowed_run_ends_at_standstill(tmp_path, capsys):
     run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 0
     written = Motion.load(tmp_path / "b.npz")
     assert written.duration > 0.3
+    assert f"a stop of {written.duration - 0.299:.3f} s is added to the 0.299 s" in capsys.readouterr().out
     assert np.abs(np.diff(written.q[-2:], axis=0)).max() < 1e-6
 
 
-def test_a_run_checked_as_one_of_another_arm_says_so(tmp_path, capsys):
+def test_a_run_checked_as_one_of_another_arm_has_a_note(tmp_path, capsys):
     run_of(some_cycles()).save(tmp_path / "a.rcirun")
     main(["check", str(tmp_path / "a.rcirun"), "--model", "xMatePro3", "--load", "1@0,0,0"])
     assert "note: the run is of the xMatePro7, checked as one of the xMatePro3" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    ("rows", "words"),
+    ("rows", "expected"),
     [
         ([[k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
         ([[1e5 * k, *angles] for k, angles in enumerate(PLAN.q)], "name their column t [ms]"),
@@ -218,8 +221,8 @@ def test_a_run_checked_as_one_of_another_arm_says_so(tmp_path, capsys):
         (-PLAN.q, "the first column is the time: is it missing?"),
     ],
 )
-def test_a_table_with_wrong_times_names_the_cause(tmp_path, capsys, rows, words):
+def test_a_table_with_wrong_times_names_the_cause(tmp_path, capsys, rows, expected):
     np.savetxt(tmp_path / "a.csv", rows, delimiter=",")
     main(["check", str(tmp_path / "a.csv"), "--model", "xMatePro7"])
     said = capsys.readouterr()
-    assert words in said.out + said.err
+    assert expected in said.out + said.err

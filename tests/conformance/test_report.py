@@ -48,6 +48,21 @@ def test_the_worst_violation_comes_first_and_the_worst_row_agrees():
     assert report.worst.joint == 4
 
 
+def test_an_end_shows_the_commanded_value_and_the_applied_tolerance():
+    q = np.repeat(MODEL.home[np.newaxis], 10, axis=0)
+    q[-1, 0] += 1.29e-6  # Within what a cycle of the largest jerk changes.
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
+    row = next(row for row in report.rows if row.id == "end.velocity")
+    assert row.ok
+    assert row.value == pytest.approx(1.29e-3)
+    assert row.bound == pytest.approx(1e-4 + MODEL.limits.joint.jerk[0] * 1e-6)
+    assert row.texts == ("0.00129", "0 ± 0.0051", "")
+    q[1:, 0] += 7.964e-6
+    report = check(Motion.from_cycles(q), MODEL, distance=None)
+    sentence = next(str(found) for found in report.warnings if found.condition.id == "start.acceleration")
+    assert "acceleration at the start is -7.964 rad/s^2, not 0 within 5.01 rad/s^2" in sentence
+
+
 def test_rows_name_joint_time_value_bound_and_source():
     motion = plan_joint(MODEL, MODEL.home, -MODEL.home, speed=1.0)
     row = next(row for row in check(motion, MODEL).rows if row.id == "joint.velocity")

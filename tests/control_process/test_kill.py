@@ -17,6 +17,8 @@ import pytest
 
 from rcilab.control_process import Supervisor
 from rcilab.control_process.launch import start_controller
+from rcilab.control_process.process_monitor import ProcessMonitor
+from rcilab.control_process.process_supervisor import ProcessSupervisor
 from rcilab.core.errors import ConnectionLostError
 from rcilab.execution.session import connect
 from rcilab.makers.virtual_controller import build_virtual_controller
@@ -36,6 +38,13 @@ from tests.control_process.test_supervisor import (
 
 NOTICE = 0.5  # [s] The promise. Measured and printed; asserted with room for a busy machine.
 ROOM = 4.0
+
+
+def fail_with(error):
+    def fail(*_):
+        raise error
+
+    return fail
 
 
 @contextmanager
@@ -211,6 +220,35 @@ def test_what_dies_again_and_again_is_left_alone_until_somebody_restarts_it():
         supervisor.restart()
         assert supervisor.status().phase == "idle"
         assert supervisor.status().incident.number == 4
+
+
+def test_after_a_restart_that_fails_nothing_is_starting_and_the_next_one_succeeds(monkeypatch):
+    with running() as supervisor:
+        with monkeypatch.context() as patch:
+            patch.setattr(ProcessSupervisor, "_start_worker", fail_with(ConnectionLostError("no process is left")))
+            with pytest.raises(ConnectionLostError, match="no process is left"):
+                supervisor.restart()
+            status = supervisor.status()
+            assert (status.phase, status.code) == ("crashed", "crashed.worker")
+            assert status.message == "no process is left; restart() tries again"
+            assert (status.controller_pid, status.worker_pid) == (None, None)
+        supervisor.restart()
+        assert supervisor.status().phase == "idle"
+
+
+def test_an_error_in_the_supervision_is_reported_stops_the_arm_and_ends_requests(monkeypatch):
+    with running(auto_restart=False) as supervisor:
+        ticket = begin_moving(supervisor)
+        with monkeypatch.context() as patch:
+            patch.setattr(ProcessMonitor, "_check_for_loss", fail_with(ValueError("a bug")))
+            with pytest.raises(ConnectionLostError, match=r"supervision .* has failed \(ValueError: a bug\)"):
+                ticket.wait(SOON)
+            status = wait_for(lambda: s if (s := supervisor.status()).worker_pid is None else None)
+            assert status.phase == "crashed"
+        with connect(status.address, MODEL) as robot:
+            assert robot.state.faults == ()  # The control process has stopped the arm.
+        supervisor.restart()
+        assert supervisor.status().phase == "idle"
 
 
 def test_closing_in_mid_motion_brings_the_arm_to_rest_first():

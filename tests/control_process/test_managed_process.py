@@ -167,6 +167,23 @@ def test_many_come_and_go_at_once_and_no_file_stays_open(run):
     wait_for(lambda: len(os.listdir(server)) < 10)
 
 
+MANY = """
+import os, resource
+hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+resource.setrlimit(resource.RLIMIT_NOFILE, (1300, hard))
+files = [os.open("/dev/null", os.O_RDONLY) for _ in range(1100)]
+from rcilab.control_process.launch import start_controller
+controller = start_controller("xMatePro7")
+controller.end()
+print(controller.exit_description)
+"""
+
+
+def test_a_program_with_many_open_files_starts_and_ends_a_controller():
+    done = subprocess.run([sys.executable, "-c", MANY], capture_output=True, text=True, check=False, timeout=60.0)
+    assert (done.stdout, done.stderr) == ("exit code 0\n", "")
+
+
 LAST = """
 import atexit
 

@@ -176,7 +176,7 @@ def test_a_safety_stop_in_mid_motion_ends_it_with_a_record_and_the_session_goes_
     with pytest.raises(ControlError, match=r"stopped the motion at t = .*: an emergency stop is pressed") as caught:
         robot.control(callback)
     assert "network" not in str(caught.value)
-    assert "commands in a row" not in str(caught.value)
+    assert "cycles in a row" not in str(caught.value)
     assert len(caught.value.record) > 20
     robot.world.press("none")
     robot.recover()

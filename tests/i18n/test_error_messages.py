@@ -118,7 +118,7 @@ def test_a_note_keeps_its_words_in_a_file_of_its_own():
 
 
 def test_many_remarks_in_one_line_grow_with_their_number_and_are_said_in_every_language():
-    single = [Remark(f"{n} commands in a row were lost", "lost_in_row", count=n) for n in range(1, 41)]
+    single = [Remark(f"{n} cycles in a row had no command", "lost_in_row", count=n) for n in range(1, 41)]
     whole = Remark.all([Remark.all(single[:20]), *single[20:], "and so on"])
     assert str(whole) == "; ".join([*map(str, single), "and so on"])
     size = [len(json.dumps(Remark.all(single[:count]).as_dict())) for count in (10, 20, 40)]

@@ -35,7 +35,8 @@ class Arena:
     def __init__(self, *, wrap_plant: Callable[[Any], Any] | None = None, **options: Any) -> None:
         self.entries: list[LogEntry] = []
         settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
-        settings["patience"] = 1.0  # A client that falls silent is given up.
+        if options.get("lockstep", True):
+            settings["patience"] = 1.0  # A client that falls silent is given up.
         config = ControllerConfig(**{**settings, **options})
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)

@@ -16,9 +16,10 @@ import pytest
 import rcilab
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.errors import InvalidValueError, UsageError, VersionMismatchError
-from rcilab.i18n.translator import Remark
+from rcilab.i18n.translator import Remark, Text
 from rcilab.makers.rokae.faults import Fault
 from rcilab.recording.chunks import MAGIC, decode_chunks, encode_chunk, encode_header
+from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.live_recording import LiveRecording, RunFacts
 from rcilab.recording.run import Run, build_run, decode_run, load_run
 from rcilab.recording.run_file import CHUNK_CYCLES, RunFile, RunWriter, write_run
@@ -127,6 +128,17 @@ def test_a_spoiled_byte_costs_what_comes_after_it_and_nothing_before():
     back = decode_run(bytes(content))
     assert back.cycles.tobytes() == run.cycles[:CHUNK_CYCLES].tobytes()
     assert not back.is_complete
+    assert "the rest of its file is damaged" in repr(back)
+    assert ["Ended", "not known: the rest of the file is damaged"] in fact_rows(back, Text("en", "rcilab.recording"))
+
+
+@pytest.mark.parametrize("length", [1, 100, 20_000])
+def test_a_file_with_zeros_in_its_middle_is_damaged_and_a_short_one_is_not(length):
+    whole = export_run(some_run(), ".rcirun")
+    end = next(at for at, _ in block_places(whole)[3:])
+    assert decode_run(whole[:end] + bytes(length) + whole[end + length :]).is_damaged
+    assert not decode_run(whole[: end + length]).is_damaged
+    assert not decode_run(whole).is_damaged
 
 
 def test_what_was_written_before_a_crash_is_there(tmp_path):
@@ -301,7 +313,7 @@ def test_times_that_no_motion_has_are_refused(tmp_path, last):
     "settings",
     [{"safety_box": 5}, {"safety_box": {"size": [1], "pose": "x", "active": 3}}, {"safety_box": {}}, 5, None],
 )
-def test_settings_that_are_none_are_refused(tmp_path, settings):
+def test_settings_that_are_not_valid_are_refused(tmp_path, settings):
     run = some_run()
     replace(run, setup=replace(run.setup, settings=settings)).save(tmp_path / "a.rcirun")
     with pytest.raises(InvalidValueError, match="is damaged"):

@@ -19,16 +19,24 @@ from tests.recording.test_client_motions import MODEL, NEAR, SECONDS, as_run, co
 
 @pytest.fixture(scope="module")
 def sine() -> Run:
-    with watched() as (_place, motions), _place.connect() as robot:
+    with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         programs.joint_sine(robot, SECONDS, period=SECONDS)
         return as_run(collect(motions, 2)[1])
 
 
-def send_poses(robot: Robot, offsets: list[tuple[float, float, float]]) -> None:
+@pytest.fixture(scope="module")
+def line() -> Run:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
+        return as_run(collect(motions, 2)[1])
+
+
+def send_poses(robot: Robot, offsets: list[tuple[float, float, float]], law: int) -> None:
     """Commands the pose of the tool, moved by an offset a cycle, [m]."""
     poses = iter(offsets)
-    robot.start_move(wire.CARTESIAN_POSITION, wire.CARTESIAN)
+    robot.start_move(law, wire.CARTESIAN)
     begin: list[np.ndarray] = []
 
     def callback(state: wire.State) -> Output:
@@ -41,11 +49,11 @@ def send_poses(robot: Robot, offsets: list[tuple[float, float, float]]) -> None:
     robot.control(callback)
 
 
-def recorded_poses(offsets: list[tuple[float, float, float]]) -> Run:
+def recorded_poses(offsets: list[tuple[float, float, float]], law: int = wire.CARTESIAN_POSITION) -> Run:
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         with pytest.raises(ControlException):
-            send_poses(robot, offsets)
+            send_poses(robot, offsets, law)
         parts = collect(motions, 2)[1]
     assert parts[-1].end is not None
     return replace(as_run(parts), stopped=parts[-1].end.stopped)
@@ -82,6 +90,24 @@ def test_a_pose_without_joint_angles_is_the_violation(count: int) -> None:
     assert violation.count == 1
 
 
+@pytest.mark.parametrize("value", [np.inf, -1e300, np.nan])
+def test_commands_that_are_not_numbers_do_not_conform(sine: Run, value: float) -> None:
+    cycles = sine.cycles.copy()
+    played = np.flatnonzero(cycles["played"])[200]
+    cycles["command"][played - int(cycles["age"][played])] = value
+    report = check_sent(replace(sine, cycles=cycles), distance=None)
+    assert "joint.position" in {violation.condition.id for violation in report.violations}
+
+
+@pytest.mark.parametrize("value", [np.inf, -1e300, np.nan])
+def test_poses_that_are_not_numbers_do_not_conform(line: Run, value: float) -> None:
+    cycles = line.cycles.copy()
+    played = np.flatnonzero(cycles["played"])[100]
+    cycles["command_pose"][played - int(cycles["age"][played]), 0, 3] = value
+    report = check_sent(replace(line, cycles=cycles), distance=None)
+    assert "cartesian.frame" in {violation.condition.id for violation in report.violations}
+
+
 def test_poses_are_checked_by_their_own_angles() -> None:
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
@@ -105,6 +131,17 @@ def test_commands_that_never_arrived_are_interpolated(sine: Run) -> None:
     motion = sent_motion(without(sine, slice(300, 320), arrived=False))
     assert motion.notes == ("20 commands did not arrive and are interpolated",)
     np.testing.assert_allclose(motion.q, sent_motion(sine).q, rtol=0, atol=1e-6)
+
+
+def test_a_late_command_that_has_no_row_is_interpolated(sine: Run) -> None:
+    """After a pause the client answers its last state again: it sends one more command than there are states."""
+    cycles = without(sine, slice(300, 320), arrived=True).cycles.copy()
+    sent = np.flatnonzero(np.isfinite(sine.command).all(axis=1))
+    cycles["command"][sent[320:-1]] = sine.command[sent[321:]]
+    cycles["late"][np.flatnonzero(sine.cycles["played"])[320] :] = 21
+    motion = sent_motion(replace(sine, cycles=cycles))
+    assert motion.notes == ("1 commands did not arrive and are interpolated",)
+    np.testing.assert_allclose(motion.q[:1000], sent_motion(sine).q[:1000], rtol=0, atol=1e-6)
 
 
 def test_a_client_that_goes_on_where_it_paused_has_no_gap(sine: Run) -> None:
@@ -140,8 +177,19 @@ def test_a_motion_lasts_from_its_first_played_command_to_the_last(sine: Run) -> 
     assert sine.t[-1] > sine.duration
 
 
+def test_a_command_without_a_cycle_of_its_own_is_in_a_note_on_the_duration(sine: Run) -> None:
+    cycles = np.delete(sine.cycles, np.flatnonzero(sine.cycles["played"])[-1])
+    played = replace(sine, cycles=cycles)
+    last = np.flatnonzero(cycles["played"])[-1]
+    cycles["age"][last] = max(int(cycles["age"][last]) - 1, 0)  # It overtakes the one before it.
+    report = check_sent(played, distance=None)
+    assert report.motion.duration == pytest.approx(played.duration + CYCLE_TIME)
+    said = f"last {report.motion.duration:.3f} s, one a cycle; the controller played them in {played.duration:.3f} s"
+    assert any(said in note for note in report.motion.notes)
+
+
 def test_the_hold_after_the_last_command_is_not_the_clients(sine: Run) -> None:
-    """A client that ends at speed is advised to end at rest; one that was stopped is not."""
+    """A client that ends at speed is advised to end at standstill; one that was stopped is not."""
     end = int(np.flatnonzero(sine.cycles["played"])[300])
     cut = replace(sine, cycles=sine.cycles[: end + 1])
     assert not check(sent_motion(cut), MODEL, distance=None).ok
@@ -165,6 +213,14 @@ def test_a_jump_at_the_end_is_a_violation(sine: Run) -> None:
     assert with_stop(report.motion, MODEL, "joint_position") is report.motion
 
 
+def test_a_run_without_its_beginning_is_checked_from_there_on(sine: Run) -> None:
+    rest = replace(sine, cycles=sine.cycles[300:], truncated=True)
+    report = check_sent(rest, distance=None)
+    assert report.ok
+    assert not any(row.condition.stage == "start" for row in report.rows)
+    assert abs(next(row.value for row in report.rows if row.id == "joint.jerk")) < 50.0
+
+
 def test_a_first_step_that_no_limit_forbids_needs_no_advice(sine: Run) -> None:
     cycles = sine.cycles.copy()
     cycles["q_c"][0] -= 5e-8
@@ -173,6 +229,30 @@ def test_a_first_step_that_no_limit_forbids_needs_no_advice(sine: Run) -> None:
     cycles["q_c"][0] -= 5e-5
     report = check_sent(replace(sine, cycles=cycles))
     assert not next(row for row in report.rows if row.id == "start.position").ok
+
+
+@pytest.mark.parametrize("off", [1e-4, 9e-4])
+def test_a_start_that_the_controller_absorbed_is_not_a_jerk(sine: Run, off: float) -> None:
+    cycles = sine.cycles.copy()
+    cycles["q_c"][0, 0] -= off
+    report = check_sent(replace(sine, cycles=cycles), distance=None)
+    assert report.ok
+    (start,) = (row for row in report.rows if row.id == "start.position")
+    assert (start.verdict, start.value) == ("advice", pytest.approx(off, rel=1e-3))
+    assert any("of joint 1 from the arm's commanded position" in note for note in report.motion.notes)
+    first = np.flatnonzero(cycles["played"])[0]
+    cycles["faults"][first:] = 1
+    refused = check_sent(replace(sine, cycles=cycles[: first + 1]), distance=None)
+    assert "joint.jerk" in {violation.condition.id for violation in refused.violations}
+
+
+def test_a_compliant_start_that_the_controller_refused_does_not_conform() -> None:
+    run = recorded_poses([(0.0, 0.1, 0.0)] * 100, wire.CARTESIAN_IMPEDANCE)
+    assert run.setup.mode == "cartesian_impedance"
+    report = check_sent(run)
+    assert "cartesian.velocity.translation" in {violation.condition.id for violation in report.violations}
+    (start,) = (row for row in report.rows if row.id == "start.cartesian.position")
+    assert start.value == pytest.approx(0.1)
 
 
 def test_a_stop_of_poses_takes_as_long_as_its_speed_needs() -> None:

@@ -46,3 +46,17 @@ def test_a_command_tells_by_itself_how_far_ahead_it_belongs(steps: int) -> None:
 
 def test_at_rest_the_same_command_again_is_the_next_one() -> None:
     assert CommandExtrapolator([1.0, 2.0]).is_next([1.0, 2.0], 5)
+
+
+@pytest.mark.parametrize("gap", [2, 22, 50])
+def test_the_commands_of_a_whole_gap_follow_a_constant_jerk_and_are_taken(gap: int) -> None:
+    stream = fed(np.array([cubic(k) for k in (-3, -2, -1, 0)]))
+    found = stream.bridge(cubic(gap).tolist(), gap)
+    assert np.allclose(found, [cubic(k) for k in range(1, gap)], rtol=0, atol=1e-13)
+    assert stream.last == found[-1]
+
+
+def test_the_path_over_a_long_gap_is_straight() -> None:
+    found = np.array(fed(np.array([cubic(k) for k in (-3, -2, -1, 0)])).bridge([0.2] * 7, 1000))
+    assert found.shape == (49, 7)
+    assert np.allclose(np.diff(found, axis=0), (0.2 - cubic(0)) / 1000.0, rtol=0, atol=1e-12)

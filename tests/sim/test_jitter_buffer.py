@@ -207,6 +207,35 @@ def test_a_late_copy_of_a_played_command_is_a_copy() -> None:
     assert (len(playout), playout.duplicates, playout.late) == (0, 1, 0)
 
 
+def test_copies_are_found_at_any_distance_and_of_late_commands_too() -> None:
+    playout = JitterBuffer(prefill=0)
+    commands = [command(k) for k in range(1, 40)]
+    for each in commands:
+        playout.push(each)
+    assert not playout.push(commands[0])
+    assert not playout.push(commands[29])
+    assert take_ids(playout, 39) == list(range(1, 40))
+    assert take_ids(playout, 3) == ["lost"] * 3
+    late = command(41)
+    assert playout.push(late)
+    assert not playout.push(late)
+    assert (playout.late, playout.duplicates) == (1, 3)
+
+
+def test_a_copy_in_a_pause_does_not_shorten_it_for_late_commands() -> None:
+    playout = JitterBuffer(prefill=0)
+    last = command(100)
+    playout.push(last)
+    assert take_ids(playout, 1) == [100]
+    take_ids(playout, 20)
+    playout.push(last)
+    take_ids(playout, 5)
+    for number in range(101, 127):
+        playout.push(command(number))
+    assert take_ids(playout, 2) == [125, 126], "one cycle was bridged by the copy, 24 were lost"
+    assert playout.late == 24
+
+
 def test_who_says_the_same_again_has_nothing_new_but_is_not_lost() -> None:
     playout = JitterBuffer(prefill=0)
     first = command(5)
@@ -256,6 +285,29 @@ def test_commands_that_close_a_loop_are_fresh() -> None:
     assert len(playout) <= 2
     assert sum(playback.skipped for playback in played) >= 10
     assert playout.lost == 0
+
+
+def test_a_torque_that_is_skipped_has_no_extra_cycle() -> None:
+    """The vendor's client repeated the id of the last state: with a cycle for each, the next answer would be late."""
+    playout = JitterBuffer(prefill=0)
+    playout.begin(max_queued=0)
+    for k in (5, 5):
+        playout.push(command(k))
+    assert playout.backlog == 0
+    assert take_ids(playout, 1) == [5]
+    playout.push(command(6))
+    assert take_ids(playout, 1) == [6]
+    assert (playout.late, playout.lost) == (0, 0)
+
+
+def test_a_delay_of_torques_that_was_asked_for_is_no_backlog() -> None:
+    playout = JitterBuffer(prefill=0)
+    playout.begin(max_queued=2 * SLACK)
+    for k in range(400):
+        playout.push(command(k))
+        playout.take(by_whole_gap)
+        assert not playout.pop_extra_cycle()
+    assert len(playout) == 2 * SLACK
 
 
 def test_ids_that_begin_again_are_another_numbering() -> None:

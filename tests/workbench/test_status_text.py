@@ -186,11 +186,12 @@ def test_a_held_motion_has_its_own_word_and_the_cursor_stands_where_it_is_held()
         assert bar["cursor"] == {"share": 0.125}, "the place in the plan, not how long it took to come there"
 
 
-def test_health_says_how_many_commands_were_lost_in_a_row():
+def test_health_says_how_many_cycles_in_a_row_had_no_command():
     world = WorldStatus(model="xMatePro7", plant="ideal", cycle=9, phase="move", lost=30, lost_in_row=12)
     state = initial_state()
     spoiled = replace(state, world=replace(state.world, status=world))
-    assert "<th>Commands lost in a row (maximum)</th><td>12<br>" in health_html(spoiled, status(), Text("en"))
+    row = "<th>Cycles in a row without a command (maximum)</th><td>12<br>"
+    assert row in health_html(spoiled, status(), Text("en"))
     assert "<td>—<br>" in health_html(state, status(), Text("en")), "another controller does not tell"
 
 

@@ -65,6 +65,20 @@ def test_after_the_release_the_way_out_is_the_power(language, way_out) -> None:
     assert text("fault.was_stop") in html.unescape(faults_html(released, text, None))
 
 
+def test_the_times_of_a_clients_motion_count_from_its_first_played_command() -> None:
+    cycles = np.zeros(61, cycle_dtype(7, playout=True))
+    cycles["t"] = 1e-3 * np.arange(61)
+    cycles["played"][51:55], cycles["age"][51:55] = 1, 51
+    cycles["faults"][54:] = 1 << Fault.INSTABILITY_DETECTION
+    model = load_model("xMatePro7")
+    recording = whole_recording(build_run(cycles, plan=None, stopped="a fault", model=model))
+    state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
+    said = outcome_html(state, SupervisorStatus(phase="idle"), Text("en"))
+    assert "Ended by a fault at 0.003 s" in said
+    assert "Motion: 0.003 s. Recorded: 61 cycles, 0 without a command." in said
+    assert "no record" not in said
+
+
 @pytest.mark.parametrize("kind", ["estop", "gstop"])
 def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kind) -> None:
     name = {"estop": "an emergency stop was pressed", "gstop": "the safety gate was opened"}[kind]
@@ -80,7 +94,7 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
     said = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
     assert f"{name} (reported as kInstabilityDetection)" in said
-    assert "Recorded: 0.010 s, 3 cycles, 0 commands lost. 8 cycles have no record." in said
+    assert "Motion: 0.010 s. Recorded: 3 cycles, 0 without a command. 8 cycles have no record." in said
     assert run.stopped is not None
     chinese = describe_stop(run.stopped, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese

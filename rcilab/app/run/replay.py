@@ -45,7 +45,7 @@ def replayed(state: UiState, run: Run) -> UiState:
     else:
         motion = run.plan or run.commanded()  # A callback has no plan: its commands are drawn and checked.
         report = run.report or check(motion, model)
-    plan = replace(build_plan_view(model, motion, report), complete=True)
+    plan = replace(build_plan_view(model, motion, report), complete=True, is_recorded=run.has_playout)
     goal = goal_at(model, motion.goal)
     wanted = state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
     setup = replace(state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))

@@ -99,7 +99,7 @@ class WatchActions:
 def draw_plan(run: Run, model: RobotModel) -> Plan:
     """Returns the commands of a run as scene, timeline and curves draw a plan: those that are checked.
 
-    They end with a refused command, and continue with a stop where they still move.
+    They end with the newest one, or with a refused one.
     """
     report = check_client(run)
-    return replace(build_plan_view(model, report.motion, report), complete=True)
+    return replace(build_plan_view(model, report.motion, report), complete=True, is_recorded=True)

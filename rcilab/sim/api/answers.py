@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, cast
 
 from rcilab.i18n.translator import Remark
@@ -50,9 +50,9 @@ class WorldStatus:
     q: tuple[float, ...] = ()
     """Measured joint angles, [rad]."""
     lost: int = 0
-    """Cycles of the last motion whose command did not arrive in time."""
+    """Cycles of the last motion without a command; it may have come late, or never."""
     lost_in_row: int = 0
-    """Largest number of consecutive lost cycles; 10 to 20 end a motion."""
+    """Most of them in a row. A motion ends after `lost_limit`, and 30 more where commands are held (not torques)."""
     success_rate: float = 1.0
     """As in the state, 0 to 1."""
     missed: int = 0
@@ -86,6 +86,8 @@ class WorldStatus:
     soft_limits: SetSoftLimits | None = None
     inputs: tuple[int, ...] | None = None
     """Numbers of the digital inputs that are high."""
+    on_loss: str = ""
+    """What the arm does while commands are missing, from the next motion on; "": an older controller."""
 
 
 WorldAnswer: TypeAlias = Done | Refused | WorldStatus
@@ -98,11 +100,15 @@ _MOST_INPUTS = 32
 
 def status_as_dict(status: WorldStatus) -> dict[str, Any]:
     """Returns a status as a JSON object."""
-    content = {item.name: getattr(status, item.name) for item in fields(status)}
-    content |= {name: asdict(content[name]) for name in _SETUP if content[name] is not None}
+    content = _values(status)
+    content |= {name: _values(content[name]) for name in _SETUP if content[name] is not None}
     if isinstance(status.reason, Remark) and status.reason.code:
         content["remark"] = status.reason.as_dict()
     return content | {"commands": status.commands.as_dict(), "states": status.states.as_dict()}
+
+
+def _values(item: WorldStatus | SetTool | SetLoad | SetBox | SetSoftLimits) -> dict[str, Any]:
+    return {each.name: getattr(item, each.name) for each in fields(item)}
 
 
 def status_from_dict(content: dict[str, Any]) -> WorldStatus:
@@ -124,7 +130,7 @@ def status_from_dict(content: dict[str, Any]) -> WorldStatus:
     if "record" in checked:
         checked["record"] = as_integer(checked["record"], "record", -1, _LARGEST_COUNT)
     checked["reason"] = _reason(checked.get("reason", ""), checked.pop("remark", None))
-    for name in ("model", "plant", "phase", "button"):
+    for name in ("model", "plant", "phase", "button", "on_loss"):
         if name in checked:
             checked[name] = _text(checked[name])
     if "faults" in checked:

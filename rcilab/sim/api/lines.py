@@ -88,7 +88,7 @@ def _request(content: dict[str, Any]) -> WorldRequest:
 
 
 _LONGEST_REASON = 200  # [characters] A wrong value may be as long as the line.
-_SEPARATE_FIELDS = ("auto_limit", "pid", "record", "tool", "load", "box", "soft_limits", "inputs")
+_SEPARATE_FIELDS = ("auto_limit", "pid", "record", "tool", "load", "box", "soft_limits", "inputs", "on_loss")
 """Fields that were added to the status later, and are sent outside of it."""
 
 

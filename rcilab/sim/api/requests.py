@@ -308,12 +308,12 @@ class SetLoad:
 
 @dataclass(frozen=True, slots=True)
 class SetBox:
-    """Sets the safety box as on the teach pendant."""
+    """Sets the safety box as on the teach pendant, or without size and position switches that in force on or off."""
 
     name: ClassVar[str] = "set_box"
-    size: Floats
+    size: Floats | None = None
     """Edges along its own x, y and z, shape (3,), [m]."""
-    position: Floats
+    position: Floats | None = None
     """Of its centre in base, shape (3,), [m]."""
     wxyz: Floats = (1.0, 0.0, 0.0, 0.0)
     """Its orientation in base, shape (4,)."""
@@ -322,10 +322,12 @@ class SetBox:
 
     def __post_init__(self) -> None:
         """Checks the numbers; the controller checks their range."""
-        _put(self, "size", as_floats(self.size, 3, "size", "m"))
-        _put(self, "position", as_floats(self.position, 3, "position", "m"))
         _put(self, "wxyz", _as_orientation(self.wxyz))
         _put(self, "active", as_flag(self.active, "active"))
+        if self.size is None and self.position is None and self.wxyz == (1.0, 0.0, 0.0, 0.0):
+            return
+        _put(self, "size", as_floats(self.size, 3, "size", "m"))
+        _put(self, "position", as_floats(self.position, 3, "position", "m"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 A commanded pose passes the pose filter and the conditions of the tool, then the inverse kinematics on the present
 branch, then the soft-limit governor if enabled, and finally the conditions of the joint angles. A lost cycle continues
-with the acceleration of the last poses, or holds the joint angles of the last one; then the filter takes the way over
+with the acceleration of the last poses, or holds the joint angles of the last one; then the filter takes the path over
 the pause once the next pose is there.
 
 The arm angle of a 7-axis arm is the commanded one if it is valid. Otherwise it is held: from the start of the motion,
@@ -98,7 +98,7 @@ class CartesianGenerator:
         return self._reference.step(pose, None if self._is_free else psi, cycles)
 
     def _end_pause(self, values: list[float], cycles: int) -> list[list[float]]:
-        """Returns the poses on the way over a pause, for the filter if it is on; none without a pause."""
+        """Returns the poses on the path over a pause, for the filter if it is on; none without a pause."""
         if self._before_pause is None:
             return []
         self._stream, self._before_pause = self._before_pause, None

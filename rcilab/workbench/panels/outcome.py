@@ -95,17 +95,18 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
     assert run is not None
     lost = run.timing.lost
     facts = text("record.facts", duration=f"{run.duration:.3f}", cycles=len(run.t), lost=lost)
-    missing = round(run.duration / (CYCLE_TIME * state_cycles(run.cycles))) + 1 - len(run.t) - lost
+    rows = len(run.t) + (0 if run.has_playout else lost)  # A play-out has rows of the cycles without a command.
+    missing = round(float(run.t.max(initial=0.0)) / (CYCLE_TIME * state_cycles(run.cycles))) + 1 - rows
     if missing > 0:
         facts += " " + text("record.missing", count=missing)
-    moment = "" if recording.moment is None else f"{recording.moment:.3f}"
+    moment = "" if recording.moment is None else f"{recording.moment - run.begin:.3f}"
     if run.is_safety_stop:
         return "bad", text("record.safety_stop", moment=moment, why=_describe_stop(run, text)), facts
     if run.faults:
         faults = name_faults(run.faults)
         return "bad", text("record.faulted", faults=faults, moment=moment), facts
     if not run.is_complete:
-        return "warn", text("record.cut"), facts
+        return "warn", text("record.damaged" if run.is_damaged else "record.cut"), facts
     if run.stopped:
         return "warn", text("record.operator_absent" if recording.is_operator_absent else "record.stopped"), facts
     if run.missed_goal is not None:

@@ -6,6 +6,8 @@ import math
 import time
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
+import numpy as np
+
 from rcilab.app.run.played_motion import played_path, streamed_rows
 from rcilab.app.text import Text
 from rcilab.app.view_actions import PLOTS, has_plot
@@ -179,7 +181,7 @@ class Plots:
         plan, recording, actual = state.plan, state.recording, None
         if plan is not None and name not in self._planned:
             self._planned[name] = (
-                plan_curves(plan.motion, name, state.model)
+                plan_curves(plan.motion, name, state.model, start=plan.report.start, is_recorded=plan.is_recorded)
                 if self._streamed is None
                 else streamed_curves(self._streamed, name, state.model)
             )
@@ -187,6 +189,8 @@ class Plots:
             actual = None if recording.tau is None else Curves(t=_times(recording), values=recording.tau)
         elif recording is not None:
             actual = recorded_curves(_times(recording), recording.q, recording.q_c, recording.dq, name)
+            if name in ("ddq", "jerk"):
+                actual = _commanded_part(actual, state)
         return build_frame(
             self._planned.get(name), actual, state.model.limits.joint, name, state.plot_joint, factor=factor
         )
@@ -198,6 +202,8 @@ class Plots:
         if recording is not None:  # The second derivative of measured angles is noise: it is that of the commands.
             q = recording.q_c if name == "acceleration" else recording.q
             actual = tool_curves(state.model, _times(recording), q, name)
+            if name == "acceleration":
+                actual = _commanded_part(actual, state)
         return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
 
     def _error_frame(self, state: UiState, name: str, scale: PlotScale) -> Frame:
@@ -226,6 +232,18 @@ def _wanted(state: UiState) -> tuple[str, ...]:
         for name in PLOTS
         if name in state.plots and has_plot(state.model, name) and (finished or name not in ERRORS)
     )
+
+
+def _commanded_part(actual: Curves, state: UiState) -> Curves:
+    """Returns derivatives of recorded commands up to the client's last one, from which the controller stops the arm.
+
+    Those of a motion with a fault are returned as they are: its stop is to be seen.
+    """
+    plan, recording = state.plan, state.recording
+    if plan is None or not plan.is_recorded or (recording is not None and recording.moment is not None):
+        return actual
+    count = int(np.searchsorted(actual.t, plan.motion.duration + CYCLE_TIME / 2.0))
+    return Curves(t=actual.t[:count], values=actual.values[:count])
 
 
 def _times(recording: Recording) -> Any:

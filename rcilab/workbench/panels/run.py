@@ -124,18 +124,20 @@ class RunPanel:
         is_program = state.plan is not None and state.plan.program is not None
         self._again.visible = is_program and (may_plan_again(reason) or outdated(state) is not None)
         self._back.visible = may_go_back(state, reason)
-        self._inside.visible = may_lead_inside(state, status)
+        self._inside.visible = may_lead_inside(state, status) and not state.watched
         is_held = status.code == "moving.held"
         self._pause.visible, self._resume.visible = not is_held, is_held  # Visible beforehand: the layout is fixed.
         self._pause.disabled = status.code != "moving" or status.motion_plan_time is None
         self._speed_override.show(round(100.0 * state.drive.speed_override, 1))
+        self._speed_override.handle.disabled = bool(state.watched)
         self._way.show(progress_html(state, status, text))
         self._outcome.show("" if moving else outcome_html(state, status, text))
         self._plan.visible, self._to_target.visible = not is_program, is_program
-        self._plan.disabled = self._to_target.disabled = moving or not is_connected(status)
-        self._buttons["recover"].disabled = status.phase != "fault" or status.is_pressed
-        self._buttons["power_on"].disabled = moving or status.powered is not False or status.is_pressed
-        self._buttons["power_off"].disabled = moving or status.powered is not True
+        is_off = moving or bool(state.watched)
+        self._plan.disabled = self._to_target.disabled = is_off or not is_connected(status)
+        self._buttons["recover"].disabled = is_off or status.phase != "fault" or status.is_pressed
+        self._buttons["power_on"].disabled = is_off or status.powered is not False or status.is_pressed
+        self._buttons["power_off"].disabled = is_off or status.powered is not True
         self._faults.show(faults_html(status, text, state.world.status))
 
 

@@ -71,12 +71,14 @@ class TargetRobotPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the connection."""
-        text, moving, where = self._text, is_moving(status), destination(state, status)
+        text, where = self._text, destination(state, status)
+        is_fixed = is_moving(status) or bool(state.watched)
         if where != "preview" or self._picked != "address":
             self._picked = self._picked if self._picked == "address" else None
         self._choice.show(self._names[self._picked or where])
         is_planned = is_only_planned(state.model)
-        self._choice.handle.disabled = self._connect.disabled = moving or is_planned
+        self._choice.handle.disabled = self._connect.disabled = is_fixed or is_planned
+        self._address.handle.disabled = bool(state.watched)
         is_address = (self._picked or where) == "address"
         if self._address.show(state.control_lock, _address_of(state)) and state.typed_address:
             self._ask(_choose(None, "address", answer="no"))  # The page that asked has lost the controls.
@@ -86,7 +88,7 @@ class TargetRobotPanel:
         self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
         self._yes.visible = self._no.visible = bool(asked)
         self._again.visible = where in ("ideal", "mujoco") and status.phase in ("lost", "crashed")
-        self._leave.disabled = moving or where == "preview"
+        self._leave.disabled = is_fixed or where == "preview"
         tone = "warn" if status.code == "lost.rebooted" else _TONES.get(status.phase, "bad")
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name

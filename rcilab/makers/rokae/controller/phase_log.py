@@ -48,15 +48,15 @@ class PhaseLog:
             self._log_end(before, after)
 
     def _log_end(self, before: Situation, after: Situation) -> None:
-        playout, cycles = self._playout, self._playout.cycles
+        playout, duration = self._playout, CYCLE_TIME * self._playout.span
         is_fault = after.faults != before.faults or after.phase is not Phase.IDLE
-        figures = f"{cycles} cycles, {playout.lost} commands lost, {playout.late} late"
+        figures = f"{playout.cycles} cycles, {playout.lost} without a command; {playout.late} commands late"
         self._log(
             "motion_ended",
-            f"motion {'stopped' if is_fault else 'ended'} after {cycles * CYCLE_TIME:.3f} s: {figures}",
-            duration=round(cycles * CYCLE_TIME, 3),
-            cycles=cycles,
-            lost=playout.lost,
+            f"motion {'stopped' if is_fault else 'ended'} after {duration:.3f} s: {figures}",
+            duration=round(duration, 3),
+            cycles=playout.cycles,
+            without_command=playout.lost,
             late=playout.late,
             is_fault=is_fault,
         )

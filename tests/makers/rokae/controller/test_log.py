@@ -70,6 +70,23 @@ def test_a_client_that_vanishes_while_the_arm_moves_is_reported(how: str) -> Non
         wait_for_kind(found, "motion_ended")
 
 
+def test_the_advice_after_missing_commands_names_the_pauses_that_a_prefill_absorbs() -> None:
+    """At the fault it is not known how long the client will pause."""
+    with running(lockstep=True, patience=0.05) as found, Peer(found) as peer:
+        peer.run(MOTION.q[:150])
+        advice = wait_for_kind(found, "advice")
+        assert advice.text.startswith("--prefill N absorbs pauses of the client of N ms, 100 at most; ")
+
+
+def test_a_long_wait_of_lock_step_names_the_state_whose_answer_is_missing() -> None:
+    with running(lockstep=True) as found, Peer(found) as peer:
+        state = peer.run(MOTION.q[:50])
+        waiting = wait_for_kind(found, "waiting")
+        number = state.message_id
+        assert waiting.text == f"lock-step has waited 1 s for the command that answers state {number}; none came"
+        assert waiting.facts == {"state": number, "late": 0}
+
+
 def test_a_program_can_be_followed_by_its_log() -> None:
     with running(lockstep=True) as found, Peer(found) as peer:
         peer.run(MOTION.q)
@@ -97,9 +114,9 @@ def test_a_program_can_be_followed_by_its_log() -> None:
     started, ended = found.entries[2:4]
     assert started.text == "motion started: joint position"
     cycles = len(MOTION.q)
-    assert ended.facts["lost"] == ended.facts["late"] == 0
+    assert ended.facts["without_command"] == ended.facts["late"] == 0
     assert ended.facts["cycles"] == cycles
-    assert ended.facts["duration"] == pytest.approx(ended.facts["cycles"] * CYCLE_TIME)
+    assert ended.facts["duration"] == pytest.approx((cycles - 1) * CYCLE_TIME)
     assert ended.cycle - started.cycle >= ended.facts["cycles"], "the state before the first command, and the end"
     fault, stopped, refused = found.entries[5:8]
     assert "kCommandJointVelocityLimitsViolation" in fault.text

@@ -133,7 +133,16 @@ def test_a_client_that_vanishes_at_speed_has_lost_commands(make_hand) -> None:
     hand.start()
     hand.play(hand.swing(1, 2.0, 0.5))
     assert hand.rest().faults == (F.INSTABILITY_DETECTION,)
-    assert hand.cycle.reason == "20 commands in a row were lost"
+    said = "50 cycles in a row had no command: 30 by which one may be late, then 20 lost"
+    assert hand.cycle.reason == said
+
+
+def test_where_the_motion_is_bridged_no_command_may_be_late(make_hand) -> None:
+    hand = make_hand(on_loss="bridge")
+    hand.start()
+    hand.play(hand.swing(1, 0.5, 0.5))
+    assert hand.rest().faults == (F.INSTABILITY_DETECTION,)
+    assert hand.cycle.reason == "20 cycles in a row had no command"
 
 
 @pytest.mark.parametrize(("offset", "is_broken"), [(0.0, False), (0.02, True)])
@@ -190,7 +199,7 @@ def test_a_line_of_the_tool_is_held_in_its_joints(make_hand) -> None:
 def test_a_pause_in_which_the_arm_begins_to_brake_breaks_nothing_with_a_filter_on(
     make_hand, cut_off: float, pose: bool
 ) -> None:
-    """The filter continues on the way that the commands took meanwhile, not on that of the last commands before."""
+    """The filter continues on the path that the commands took meanwhile, not on that of the last commands before."""
     hand = make_hand()
     assert hand.ask(rci.SetFilters(cut_off, cut_off, 1000.0)) == 0
     hand.start(int(pose), 2 if pose else 1)

@@ -253,6 +253,26 @@ def test_commands_that_answer_the_same_state_again_are_the_next_ones(lockstep: R
         assert np.array_equal(last.q, MOTION.goal)
 
 
+def test_torques_that_answer_the_same_state_again_stop_no_motion(lockstep: Running) -> None:
+    """The vendor's client sends a second command for a state when the next one takes more than 5 ms."""
+    with Peer(lockstep) as peer:
+        assert peer.ask(rci.SetMotorPower(1)) == 0
+        assert peer.ask(rci.StartMove(4, 0)) in (0, 1)
+        while (state := peer.receive_state()).controller_mode != ControllerMode.TORQUE:
+            pass
+        for k in range(300):
+            for again in range(2):
+                packet = rci.CommandPacket(state.message_id, tau_c=(1e-3 * (k + again),) + (0.0,) * 6)
+                peer.udp.sendto(rci.encode_command(packet), peer.controller)
+            answered = state.message_id
+            while state.message_id == answered:
+                state = peer.receive_newest_state()
+                assert not state.faults
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+    playout = lockstep.server.controller.playout
+    assert (playout.late, playout.lost) == (0, 0)
+
+
 def test_garbage_in_unused_fields_changes_nothing(lockstep: Running) -> None:
     with Peer(lockstep) as peer:
         state = peer.start()

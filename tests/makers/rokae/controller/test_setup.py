@@ -219,6 +219,7 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
             world.set_soft_limits(*SOFT)
             with pytest.raises(UsageError):
                 world.set_load(Payload(mass=50.0))
+            world.set_on_loss("bridge")
             status = world.status()
     finally:
         server.request_stop()
@@ -227,6 +228,7 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
     assert (before.tool, before.load, before.box) == (SetTool((0.0,) * 3), SetLoad(0.0), None)
     assert before.soft_limits == SetSoftLimits(lower, upper)
     assert before.inputs == (0, 3)
+    assert (before.on_loss, status.on_loss) == ("hold", "bridge")
     assert status.q == Q
     assert status.tool is not None
     tool = as_setup(status.tool).T_flange_tool
@@ -238,10 +240,33 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
     texts = [entry.text for entry in entries if entry.kind == "set_up"]
     assert texts == [
         "arm placed at 5.73, 35.73, 5.73, 65.73, 5.73, 95.73, 5.73 deg, by the simulation port",
-        "tool set at 0, 10, 120 mm from the flange, by the simulation port",
-        "load set to 2 kg, by the simulation port",
-        "safety box set, by the simulation port",
-        "soft limits of the joints set, by the simulation port",
+        "tool set at 0, 10, 120 mm from the flange, wxyz 0.9689, 0, 0, 0.2474, by the simulation port",
+        "load set to 2 kg with its centre of mass at 0, 0, 50 mm from the flange, by the simulation port",
+        "safety box set to 1500, 1500, 1500 mm at 400, 0, 600 mm, active, by the simulation port",
+        "soft limits of the joints set from -28.65, 1.352, -28.65, 31.35, -28.65, 61.35, -28.65 deg "
+        "to 28.65, 58.65, 28.65, 88.65, 28.65, 118.6, 28.65 deg, by the simulation port",
+        "on_loss set to bridge from the next motion on, by the simulation port",
     ]
     placed = next(entry for entry in entries if entry.kind == "set_up")
     assert placed.facts == {"request": "place_arm", "q": Q}
+
+
+def test_a_safety_box_is_switched_off_and_on_without_naming_it_again() -> None:
+    config = ControllerConfig(model=MODEL.name, port=0, udp_port=0, lockstep=True, realtime=False)
+    server = build_virtual_controller(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    try:
+        assert server.world_address is not None
+        with SimulationControl(*parse_simulation_port(server.world_address)) as world:
+            with pytest.raises(UsageError, match="there is no safety box"):
+                world.ask(SetBox(active=False))
+            world.set_box(BOX)
+            for active in (False, True):
+                world.ask(SetBox(active=active))
+                assert world.status().box == SetBox(BOX.size, (0.4, 0.0, 0.6), active=active)
+    finally:
+        server.request_stop()
+        thread.join()
+    with pytest.raises(InvalidValueError, match="position needs 3 numbers"):
+        SetBox(BOX.size, active=False)
