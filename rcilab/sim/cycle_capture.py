@@ -169,7 +169,7 @@ class CycleCapture:
             self._add(row, now, lateness, command)
             return
         if is_late or not self._waiting:
-            free = self._find_free(self._find_place(command.number) if row is None else row)
+            free = self._find_free(self._find_row(command.number) if row is None else row)
             if free < self._count:
                 self._add(free, now, lateness, command)
                 if is_late and free != row:
@@ -182,7 +182,7 @@ class CycleCapture:
             self._waiting.append(_Arrival(now, lateness, command))
 
     def _find_free(self, row: int) -> int:
-        """Returns the first row from here on that has no command; the next one to come if there is none."""
+        """Returns the first row from here on that has no command; the next one to come if all have one."""
         first, last = self._taken
         is_known = first <= row <= last
         free = last + 1 if is_known else row
@@ -191,7 +191,7 @@ class CycleCapture:
         self._taken = (first if is_known else row), free - 1
         return free
 
-    def _find_place(self, number: int) -> int:
+    def _find_row(self, number: int) -> int:
         """Returns the row of a client's own number: it counts on from its first command; at first the newest row."""
         newest = max(self._count - 1, 0)
         row = newest if self._offset is None else number + self._offset
