@@ -201,8 +201,9 @@ class ProcessMonitor:
 
     def _start_monitoring(self) -> None:
         if self._thread is None or not self._thread.is_alive():
-            self._thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
-            self._thread.start()
+            thread = threading.Thread(target=self._monitor, name="rcilab-supervisor", daemon=True)
+            thread.start()
+            self._thread = thread
 
     def _monitor(self) -> None:
         """The monitoring thread: heartbeats, replies, processes that ended. It never blocks."""

@@ -232,7 +232,7 @@ class RingReader:
 
 
 def _decode(text: bytes) -> dict[str, Any] | None:
-    """Returns the object of a line of JSON; None if it is none."""
+    """Returns the object of a line of JSON; None if it is not one."""
     try:
         found = json.loads(text)
     except ValueError:

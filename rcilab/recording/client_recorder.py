@@ -88,11 +88,11 @@ class ClientRecorder:
             self._show("not_recorded", f"motion {motion.number} {rest}: {error}")
 
     def _describe_gap(self, part: MotionPart) -> str:
-        place = "at its end" if self._part else "which were all of it,"
+        where = "at its end" if self._part else "which were all of it,"
         if len(part.cycles):
-            place = f"before {part.cycles['t'][0]:.3f} s"
+            where = f"before {part.cycles['t'][0]:.3f} s"
         number = part.motion.number
-        return f"motion {number}: {part.skipped} cycles {place} are not recorded; they were {_OVERWRITTEN}"
+        return f"motion {number}: {part.skipped} cycles {where} are not recorded; they were {_OVERWRITTEN}"
 
     def _begin(self, motion: ClientMotion) -> None:
         between = range(self._last + 1, motion.number)
@@ -148,7 +148,7 @@ class ClientRecorder:
 
 
 def _last_time(path: Path) -> float:
-    """Returns the time of the last cycle in a file whose end could not be written, [s]; 0 if there is none."""
+    """Returns the time of the last cycle in a file whose end could not be written, [s]; 0 without a cycle."""
     try:
         t = load_run(path, max_rows=2 * _LONGEST).t
     except RcilabError:

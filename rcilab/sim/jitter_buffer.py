@@ -141,8 +141,9 @@ class JitterBuffer:
             self.duplicates += 1
             self._is_repeating = True
             return False
-        is_next = newest is None or command.number == newest.number + 1
-        if not is_next and (command in self._past or command in queue):
+        # With the newest id it may be the next command, see above, also if it equals an earlier one.
+        is_old = newest is not None and command.number not in (newest.number, newest.number + 1)
+        if is_old and (command in self._past or command in queue):
             self.duplicates += 1
             return False
         if newest is None or not 0 < newest.number - command.number <= LONGEST_GAP:

@@ -49,7 +49,7 @@ def as_setup(request: SetupRequest, box: SafetyBox | None = None) -> ArmSetup:
 
     Raises:
         InvalidValueError: A value is not valid.
-        UsageError: It switches a box on or off, and there is none.
+        UsageError: It switches a box on or off, and no box is set.
     """
     match request:
         case PlaceArm(q):
@@ -79,8 +79,8 @@ def describe_setup(request: SetupRequest) -> str:
         case SetLoad(mass, center_of_mass):
             what = f"load set to {mass:g} kg with its centre of mass at {_lengths(center_of_mass)} from the flange"
         case SetBox(size, position, wxyz, active):
-            place = "" if size is None or position is None else f" to {_lengths(size)} at {_lengths(position)}"
-            what = f"safety box set{place}{_turned(wxyz)}, {'active' if active else 'not active'}"
+            where = "" if size is None or position is None else f" to {_lengths(size)} at {_lengths(position)}"
+            what = f"safety box set{where}{_turned(wxyz)}, {'active' if active else 'not active'}"
         case SetSoftLimits(lower, upper):
             what = f"soft limits of the joints set from {_angles(lower)} to {_angles(upper)}"
     return f"{what}, by the simulation port"

@@ -252,7 +252,11 @@ def test_a_true_answer_is_understood() -> None:
         (b"x" * 70_000, "a line is longer than 65536 bytes"),
         (b"", "it closed the connection"),
     ],
-)
+    ids=[
+        "another process", "another descriptor", "no record", "no model", "an unknown value", "no object", "no list",
+        "long text", "a share of 5", "no remark", "no status", "another protocol", "a long line", "silence",
+    ],
+)  # fmt: skip
 def test_what_is_not_a_controller_or_contradicts_itself_is_refused_in_one_sentence(
     answer: bytes, expected: str
 ) -> None:

@@ -238,11 +238,11 @@ def test_after_a_restart_that_fails_nothing_is_starting_and_the_next_one_succeed
 
 def test_an_error_in_the_supervision_is_reported_stops_the_arm_and_ends_requests(monkeypatch):
     with running(auto_restart=False) as supervisor:
-        ticket = begin_moving(supervisor)
+        pending = begin_moving(supervisor)
         with monkeypatch.context() as patch:
             patch.setattr(ProcessMonitor, "_check_for_loss", fail_with(ValueError("a bug")))
             with pytest.raises(ConnectionLostError, match=r"supervision .* has failed \(ValueError: a bug\)"):
-                ticket.wait(SOON)
+                pending.wait(SOON)
             status = wait_for(lambda: s if (s := supervisor.status()).worker_pid is None else None)
             assert status.phase == "crashed"
         with connect(status.address, MODEL) as robot:

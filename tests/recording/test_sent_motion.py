@@ -184,8 +184,8 @@ def test_a_command_without_a_cycle_of_its_own_is_in_a_note_on_the_duration(sine:
     cycles["age"][last] = max(int(cycles["age"][last]) - 1, 0)  # It overtakes the one before it.
     report = check_sent(played, distance=None)
     assert report.motion.duration == pytest.approx(played.duration + CYCLE_TIME)
-    said = f"last {report.motion.duration:.3f} s, one a cycle; the controller played them in {played.duration:.3f} s"
-    assert any(said in note for note in report.motion.notes)
+    text = f"last {report.motion.duration:.3f} s, one a cycle; the controller played them in {played.duration:.3f} s"
+    assert any(text in note for note in report.motion.notes)
 
 
 def test_the_hold_after_the_last_command_is_not_the_clients(sine: Run) -> None:
@@ -214,8 +214,8 @@ def test_a_jump_at_the_end_is_a_violation(sine: Run) -> None:
 
 
 def test_a_run_without_its_beginning_is_checked_from_there_on(sine: Run) -> None:
-    rest = replace(sine, cycles=sine.cycles[300:], truncated=True)
-    report = check_sent(rest, distance=None)
+    cut = replace(sine, cycles=sine.cycles[300:], truncated=True)
+    report = check_sent(cut, distance=None)
     assert report.ok
     assert not any(row.condition.stage == "start" for row in report.rows)
     assert abs(next(row.value for row in report.rows if row.id == "joint.jerk")) < 50.0

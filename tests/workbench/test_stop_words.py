@@ -73,10 +73,10 @@ def test_the_times_of_a_clients_motion_count_from_its_first_played_command() -> 
     model = load_model("xMatePro7")
     recording = whole_recording(build_run(cycles, plan=None, stopped="a fault", model=model))
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
-    said = outcome_html(state, SupervisorStatus(phase="idle"), Text("en"))
-    assert "Ended by a fault at 0.003 s" in said
-    assert "Motion: 0.003 s. Recorded: 61 cycles, 0 without a command." in said
-    assert "no record" not in said
+    shown = outcome_html(state, SupervisorStatus(phase="idle"), Text("en"))
+    assert "Ended by a fault at 0.003 s" in shown
+    assert "Motion: 0.003 s. Recorded: 61 cycles, 0 without a command." in shown
+    assert "no record" not in shown
 
 
 @pytest.mark.parametrize("kind", ["estop", "gstop"])
@@ -92,9 +92,9 @@ def test_what_became_of_a_stopped_motion_names_the_stop_and_not_only_its_bit(kin
     recording = whole_recording(run)
     model = load_model("xMatePro7")
     state = UiState(model=model, goal=goal_at(model, model.home), recording=recording)
-    said = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
-    assert f"{name} (reported as kInstabilityDetection)" in said
-    assert "Motion: 0.010 s. Recorded: 3 cycles, 0 without a command. 8 cycles have no record." in said
+    shown = outcome_html(state, SupervisorStatus(phase="fault", code="fault.pressed", faults=FAULTS), Text("en"))
+    assert f"{name} (reported as kInstabilityDetection)" in shown
+    assert "Motion: 0.010 s. Recorded: 3 cycles, 0 without a command. 8 cycles have no record." in shown
     assert run.stopped is not None
     chinese = describe_stop(run.stopped, FAULTS, Text("zh"))
     assert {"estop": "急停", "gstop": "安全门"}[kind] in chinese

@@ -133,8 +133,8 @@ def test_a_client_that_vanishes_at_speed_has_lost_commands(make_hand) -> None:
     hand.start()
     hand.play(hand.swing(1, 2.0, 0.5))
     assert hand.rest().faults == (F.INSTABILITY_DETECTION,)
-    said = "50 cycles in a row had no command: 30 by which one may be late, then 20 lost"
-    assert hand.cycle.reason == said
+    text = "50 cycles in a row had no command: 30 by which one may be late, then 20 lost"
+    assert hand.cycle.reason == text
 
 
 def test_where_the_motion_is_bridged_no_command_may_be_late(make_hand) -> None:
