@@ -26,6 +26,8 @@ OTHER_STATE_FIELDS = (
 """Further fields of a complete row: the rest of the state, plain numbers last."""
 PLAYOUT_FIELDS = ("motion", "played", "age", "queued", "missed", "late")
 """Further fields of a row that a virtual controller records: what it did with the commands of its client."""
+RATE_FIELDS = ("command_dq", "command_twist", "command_goal")
+"""The last fields of such a row: commands of a client that are neither angles, nor poses, nor torques."""
 
 NOT_RECORDED = 2**64 - 1
 """The `age` of a played command that is in no row."""
@@ -33,6 +35,7 @@ NOT_RECORDED = 2**64 - 1
 _POSES = ("command_pose", "T_base_tool", "T_base_tool_c")
 _SCALARS = ("psi", "psi_c", "dpsi_c", "ddpsi_c")
 _SCREWS = {
+    "command_twist": ("m/s", "rad/s"),
     "tau_ext_in_base": ("N", "N m"),
     "tau_ext_in_stiff": ("N", "N m"),
     "tool_velocity_c": ("m/s", "rad/s"),
@@ -67,7 +70,8 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
     ======================  ==================================================================================
 
     A complete row continues with the rest of the state, `OTHER_STATE_FIELDS`, named as in `RobotState`. A field that is
-    missing in a file of an earlier version is NaN. A row that a virtual controller recorded ends with `PLAYOUT_FIELDS`:
+    missing in a file of an earlier version is NaN. A row that a virtual controller recorded ends with `PLAYOUT_FIELDS`
+    and `RATE_FIELDS`:
 
     ======================  ==================================================================================
     motion                  number of the motion of its client, from 1; 0 outside
@@ -76,6 +80,9 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
     queued                  commands left in the queue
     missed                  1: the motion was in progress and no command was there for this cycle
     late                    commands of this motion so far that came after their cycle and were dropped
+    command_dq              joint velocities sent, [rad/s], shape (n,); NaN when none were sent
+    command_twist           velocity of the tool sent, base axes, shape (6,), [m/s, rad/s]; NaN when none was sent
+    command_goal            joint angles sent as a goal to which the controller plans, [rad], shape (n,); NaN when none
     ======================  ==================================================================================
 
     There, received_ns is when the state was sent, sent_ns when the command of the row arrived, and lateness the time
@@ -112,6 +119,7 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
             ("command_tau", *vector),
             *((name, "<f8", _shape(name, n)) for name in STATE_FIELDS + (OTHER_STATE_FIELDS if complete else ())),
             *((name, "<u8") for name in (PLAYOUT_FIELDS if playout else ())),
+            *((name, "<f8", _shape(name, n)) for name in (RATE_FIELDS if playout else ())),
         ]
     )
 
@@ -143,6 +151,8 @@ UNITS = {
     "tau": "N m",
     "command_psi": "rad",
     "command_tau": "N m",
+    "command_dq": "rad/s",
+    "command_goal": "rad",
     "theta": "rad",
     "dq_c": "rad/s",
     "ddq_c": "rad/s^2",

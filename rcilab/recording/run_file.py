@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from rcilab.core.arrays import described
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, STATE_FIELDS, cycle_dtype
+from rcilab.core.cycle_log import OTHER_STATE_FIELDS, PLAYOUT_FIELDS, RATE_FIELDS, STATE_FIELDS, cycle_dtype
 from rcilab.core.errors import InvalidValueError, RcilabError
 from rcilab.core.file_bounds import DEFAULT_MAX_ROWS, require_bytes, require_max_rows, require_rows
 from rcilab.core.spatial import Pose
@@ -62,7 +62,7 @@ R = TypeVar("R")
 ENDING = ".rcirun"
 CHUNK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
 
-_OPTIONAL_FIELDS = {"braking", *STATE_FIELDS}  # Not recorded by the first versions.
+_OPTIONAL_FIELDS = {"braking", *STATE_FIELDS, *RATE_FIELDS}  # Not recorded by the first versions.
 _STOP_CODES = {
     "on request": "on_request",
     "the session was closed while a motion ran": "session_closed",

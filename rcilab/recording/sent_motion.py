@@ -19,7 +19,7 @@ from rcilab.conformance.start import StartState
 from rcilab.core.arrays import Array, JointPath, JointVector, as_vector
 from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.cycle_log import state_cycles
+from rcilab.core.cycle_log import RATE_FIELDS, state_cycles
 from rcilab.core.errors import PlanningError, UsageError
 from rcilab.core.state import COMPLIANT_MODES, MODES, Mode, require_mode
 from rcilab.model.robot_model import require_model
@@ -56,8 +56,9 @@ def sent_motion(run: Run) -> Motion:
     """Returns the motion that a client commanded: its commands in its own order, one a cycle.
 
     It has the joint angles as they were sent, or those of the poses that were sent, on the branch on which the arm
-    stood. What the arm did in a pause of the client is not the client's: a command that came late counts at its place,
-    and one that did not arrive is interpolated; `.notes` counts these. Where a virtual controller recorded which
+    stood. Velocities and goals are not angles: for them it has the joint angles to which the controller integrated or
+    planned them. What the arm did in a pause of the client is not the client's: a command that came late counts at its
+    place, and one that did not arrive is interpolated; `.notes` counts these. Where a virtual controller recorded which
     commands it played, it begins with the first one played and ends with the last, or with one that was refused.
 
     Raises:
@@ -70,6 +71,8 @@ def read_sent(run: Run) -> SentCommands:
     """Returns what a client commanded, see `sent_motion`, and whether its last command was a pose without angles."""
     cycles = run.cycles
     is_played = run.has_playout
+    if is_played and _has_rates(cycles):
+        return SentCommands(motion=_followed(cycles))
     of_poses = run.setup.mode.startswith("cartesian") or not np.isnan(cycles["command_pose"]).all()
     numbers = cycles["command_pose"].reshape(-1, 16) if of_poses else cycles["command"]
     sent = np.asarray(~np.isnan(numbers).all(axis=1), dtype=np.bool_)
@@ -242,6 +245,25 @@ def with_stop(motion: Motion, model: RobotModel, mode: str) -> Motion:
         except PlanningError:
             return motion
     return replace(Motion.from_cycles(np.concatenate((q, stop))), notes=motion.notes)
+
+
+def _has_rates(cycles: NDArray[np.void]) -> bool:
+    """Returns whether velocities or goals were commanded."""
+    return any(bool(np.isfinite(cycles[name]).any()) for name in RATE_FIELDS)
+
+
+def _followed(cycles: NDArray[np.void]) -> Motion:
+    """Returns the joint angles that the controller commanded, up to the last played command or a fault.
+
+    After the last goal, it has them up to the end of the motion.
+    """
+    played, faulty = np.flatnonzero(cycles["played"]), np.flatnonzero(cycles["faults"])
+    first, end = (int(played[0]), int(played[-1]) + 1) if played.size else (0, 1)
+    if np.isfinite(cycles["command_goal"]).any():
+        end = len(cycles)
+    if faulty.size:
+        end = min(end, max(int(faulty[0]), first + 1))
+    return Motion.from_cycles(cycles["q_c"][max(first - 1, 0) : end])
 
 
 def _answered_order(

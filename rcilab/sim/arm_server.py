@@ -409,9 +409,7 @@ class ArmServer:
             if playout.pop_extra_cycle():
                 self._advance_unsent()
             return
-        while self.controller.wants_commands and (
-            playout.backlog > 0 or (playout.prefill == 0 and arm.is_behind)
-        ):
+        while self.controller.wants_commands and (playout.backlog > 0 or (playout.prefill == 0 and arm.is_behind)):
             self._advance_unsent()
 
     def _advance_unsent(self) -> None:

@@ -85,6 +85,7 @@ class CycleCapture:
         "_motion",
         "_no_answer",
         "_no_joints",
+        "_no_rates",
         "_offset",
         "_offsets",
         "_playout",
@@ -120,6 +121,7 @@ class CycleCapture:
         self._fields_of = attrgetter(*_FIELDS)
         self._no_joints = np.full(n, math.nan).tobytes()
         self._no_answer = np.full(17 + n, math.nan).tobytes()
+        self._no_rates = np.full(6 + 2 * n, math.nan).tobytes()
         self._answer = self._find_answer(controller.arm.mode)
         self._modes: tuple[object, ...] = ()
         self._status = b""  # Faults and modes, packed: they rarely change.
@@ -262,15 +264,9 @@ class CycleCapture:
 
     def _find_answer(self, mode: MotionMode) -> tuple[Callable[..., None], int, Callable[[ArmCommand], Any]]:
         """Returns how a command of this mode is stored: the packer, its offset in a row, and its numbers."""
-        joints = struct.Struct(f"<{self._ring.n}d").pack_into
-        if mode.law is ControlLaw.TORQUE:
-            return joints, self._offsets["command_tau"], attrgetter("tau")
-        if mode.kind is CommandKind.POSES:
-            return struct.Struct("<17d").pack_into, self._offsets["command_pose"], _pose_of
-        if mode.kind is CommandKind.JOINT_ANGLES:
-            return joints, self._offsets["command"], attrgetter("q")
-        nothing = (math.nan,) * self._ring.n  # A record has no column for velocities and goals.
-        return joints, self._offsets["command"], lambda command: nothing
+        kind = CommandKind.TORQUES if mode.law is ControlLaw.TORQUE else mode.kind
+        name, count, numbers_of = _COLUMNS[kind]
+        return struct.Struct(f"<{count or self._ring.n}d").pack_into, self._offsets[name], numbers_of
 
     def _follow_motion(self, state: RobotState, is_following: bool) -> None:
         """Writes the event of a motion that begins or has ended."""
@@ -343,7 +339,7 @@ class CycleCapture:
             q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
             ext, ext_stiff, tool.matrix, theta, dq_c, ddq_c, tool_c.matrix, velocity_c, acceleration_c,
             tau_filtered, tau_c, dtau_c, dtheta, motor_tau, motor_tau_filtered,
-            _TAIL.pack(psi, psi_c, dpsi_c, ddpsi_c, *playout),
+            _TAIL.pack(psi, psi_c, dpsi_c, ddpsi_c, *playout), self._no_rates,
         )  # fmt: skip
         return b"".join(parts)
 
@@ -375,3 +371,14 @@ def describe_parameters(parameters: ArmParameters) -> dict[str, Any]:
 
 def _pose_of(command: ArmCommand) -> tuple[float, ...]:
     return (*command.T_base_tool, command.psi if command.has_psi else math.nan)
+
+
+_COLUMNS: dict[CommandKind, tuple[str, int, Callable[[ArmCommand], Any]]] = {
+    CommandKind.JOINT_ANGLES: ("command", 0, attrgetter("q")),
+    CommandKind.JOINT_VELOCITIES: ("command_dq", 0, attrgetter("dq")),
+    CommandKind.POSES: ("command_pose", 17, _pose_of),
+    CommandKind.TWISTS: ("command_twist", 6, attrgetter("twist")),
+    CommandKind.JOINT_GOALS: ("command_goal", 0, attrgetter("q")),
+    CommandKind.TORQUES: ("command_tau", 0, attrgetter("tau")),
+}
+"""The field of a row that has a kind of command, its numbers (0: one per joint), and what returns them."""

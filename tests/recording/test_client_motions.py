@@ -387,8 +387,8 @@ def test_the_next_motion_is_recorded_after_the_folder_was_removed(tmp_path: Path
     [
         pytest.param(b"", id="empty"),
         pytest.param(b"x" * 10_000, id="another file"),
-        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 1, 7, 1400, CAPACITY) + bytes(4000), id="cut"),
-        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 1, 2**31, 1400, CAPACITY) + bytes(4000), id="joints"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 2, 7, 1400, CAPACITY) + bytes(4000), id="cut"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 2, 2**31, 1400, CAPACITY) + bytes(4000), id="joints"),
     ],
 )
 def test_a_file_that_is_no_record_is_refused(content: bytes, tmp_path: Path) -> None:

@@ -1,0 +1,85 @@
+"""Commands of velocities and goals in the record of a virtual controller, and the motion that they make."""
+
+from __future__ import annotations
+
+from math import cos, pi
+
+import numpy as np
+import pytest
+
+from rcilab.core.cycle_ring import CycleRing
+from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.controller.phases import Phase
+from rcilab.makers.franka.wire.command_packet import CommandPacket
+from rcilab.makers.franka.wire.requests import AsyncMove
+from rcilab.makers.franka.wire.versions import VERSION_10, Status
+from rcilab.model.robot_model import load_model
+from rcilab.recording.client_motions import ClientMotions
+from rcilab.recording.playout import played_commands
+from rcilab.recording.run import build_run
+from rcilab.recording.sent_motion import check_sent, sent_motion
+from rcilab.sim.cycle_capture import CycleCapture
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
+
+CYCLES = 600
+FIELDS = {1: "command_dq", 3: "command_twist", 0: "command_goal"}
+"""By the number of the motion generator in a Move."""
+SPEED = 0.05  # [rad/s] and [m/s]
+DEVIATION = (0.1,) * 3
+
+
+def packet(number: int, generator: int, size: float, start: tuple[float, ...], *, is_last: bool) -> CommandPacket:
+    """A command of joint 7, or of the tool along z."""
+    q = (*start[:6], start[6] + 0.02)
+    dq, twist = (0.0,) * 6 + (size,), (0.0, 0.0, size, 0.0, 0.0, 0.0)
+    return CommandPacket(number, q, dq, (0.0,) * 16, twist, (0.0, -1.0), False, is_last, (0.0,) * 7, False)
+
+
+@pytest.mark.parametrize("generator", list(FIELDS))
+def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follow(generator: int) -> None:
+    model = load_model("FR3")
+    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_10)
+    facts = {"model": "FR3", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False}
+    ring = CycleRing.create(7, facts)
+    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    start = tuple(controller.state.q_c.tolist())
+    is_goal = generator == 0
+    move = AsyncMove(0, generator, DEVIATION, DEVIATION, is_goal, (0.5,) * 7)
+    assert controller.begin_move(move) is Status.MOTION_STARTED
+    controller.step()
+    capture.write()
+    sizes = [0.0 if k == CYCLES else SPEED * (1.0 - cos(2.0 * pi * k / CYCLES)) / 2.0 for k in range(CYCLES + 1)]
+    for k, size in enumerate(sizes):
+        is_last = k == CYCLES
+        controller.receive(packet(controller.cycle_number, generator, size, start, is_last=is_last))
+        controller.step()
+        capture.write()
+    while controller.phase is not Phase.IDLE:
+        assert not controller.faults
+        controller.step()
+        capture.write()
+    for _ in range(50):
+        controller.step()
+        capture.write()
+    parts = motions.poll(is_last=True)
+    assert [part.end is not None for part in parts] == [True]
+    run = build_run(
+        parts[0].cycles, plan=None, model=parts[0].motion.model, setup=parts[0].motion.setup, realtime=False
+    )
+    assert all(np.isfinite(run.cycles[name]).any() == (name == FIELDS[generator]) for name in FIELDS.values())
+    sent = run.cycles[FIELDS[generator]]
+    rows, sources = played_commands(run.cycles)
+    assert len(rows) == len(sizes)
+    motion = sent_motion(run)
+    moved = motion.q[-1] - np.array(start)
+    if is_goal:
+        assert sent[sources, 6] == pytest.approx(start[6] + 0.02)
+        assert moved[6] == pytest.approx(0.02, abs=1e-3)
+    else:
+        assert sent[sources].max(axis=1) == pytest.approx(sizes)
+        height = [model.pose(q).parts[1][2] for q in (start, motion.q[-1])]
+        way = height[1] - height[0] if generator == 3 else moved[6]
+        assert way == pytest.approx(SPEED * 1e-3 * CYCLES / 2.0, rel=1e-3)
+    assert check_sent(run).ok
+    ring.close()
