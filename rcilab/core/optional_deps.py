@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 
 from rcilab.core.errors import UsageError
 
-Extra: TypeAlias = Literal["export", "lab"]
+Extra: TypeAlias = Literal["export", "franka", "lab"]
 
 
 class MissingExtraError(UsageError):
@@ -38,8 +38,13 @@ def require_installed(library: str, purpose: str) -> None:
         raise MissingExtraError(library, purpose, "lab")
 
 
-def require_library(name: str, purpose: str) -> Any:
-    """Returns a library of the extra `export`.
+def require_library(name: str, purpose: str, extra: Extra = "export") -> Any:
+    """Returns a library of an extra.
+
+    Args:
+        name: Name of the module.
+        purpose: The feature that needs it.
+        extra: The extra that contains it.
 
     Raises:
         MissingExtraError: It is not installed.
@@ -47,4 +52,4 @@ def require_library(name: str, purpose: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise MissingExtraError(name.split(".")[0], purpose) from error
+        raise MissingExtraError(name.split(".")[0], purpose, extra) from error

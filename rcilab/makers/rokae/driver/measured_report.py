@@ -18,6 +18,7 @@ from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
 from rcilab.core.state import COMPLIANT_MODES, ControllerMode
 from rcilab.i18n.translator import Remark
+from rcilab.makers.command_findings import find_lost_commands
 from rcilab.makers.rokae.conditions import RCI_MEASURED_CONDITIONS
 from rcilab.makers.rokae.faults import BOX_FAULTS, RANGE_FAULTS, Fault
 
@@ -95,10 +96,9 @@ def describe_measured(
         yield _describe_range(faults, record, limits)
     if Fault.COLLISION in faults and np.isfinite(record["tau_ext_in_base"][-1]).all():
         yield _describe_collision(record, model, limits, collision_thresholds)
-    rate = float(record["success_rate"][-1])
-    if Fault.INSTABILITY_DETECTION in faults and rate < 1.0:
-        share = f"{100.0 * (1.0 - rate):.2g}"
-        yield Remark(f"{share} % of the last second's commands did not arrive in time", "late_commands", share=share)
+    lost = find_lost_commands(record) if Fault.INSTABILITY_DETECTION in faults else ""
+    if lost:
+        yield lost
 
 
 def describe_passed_face(faults: Iterable[Fault], record: NDArray[np.void], box: SafetyBox | None) -> str:

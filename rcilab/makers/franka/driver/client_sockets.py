@@ -1,0 +1,152 @@
+"""The sockets of a client library, to wait at them.
+
+The bindings of libfranka keep Python's global lock while they wait, without a time limit that could be set, and for
+answers of a controller that has closed the connection they wait forever. So a driver waits at duplicates of their
+sockets, and calls a library once what it reads is there. Nothing but outdated or foreign datagrams is read here.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import stat
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeVar
+
+from rcilab.core.errors import ConnectionLostError
+
+Client = TypeVar("Client")
+
+_FD = "/proc/self/fd"
+_ID_SIZE = 8  # [bytes] A state begins with its number.
+_MS = 1000.0
+
+
+class ClientSockets:
+    """Duplicates of a client's two sockets. Owned by one thread.
+
+    Args:
+        tcp: Connected to the controller.
+        udp: Where states arrive.
+        state_size: Size of a state, [bytes].
+        name: Name of the controller in errors.
+    """
+
+    def __init__(self, tcp: socket.socket, udp: socket.socket, state_size: int, name: str) -> None:
+        self._tcp, self._udp = tcp, udp
+        self._state_size = state_size
+        self._name = name
+        self._host = tcp.getpeername()[0]
+        self._head = bytearray(_ID_SIZE)
+        self._states_ready = select.poll()
+        self._states_ready.register(udp, select.POLLIN)
+        self._states_ready.register(tcp, select.POLLRDHUP)
+        self._is_open = select.poll()
+        self._is_open.register(tcp, select.POLLRDHUP)
+
+    def wait_for_state(self, after: int, timeout: float) -> bool:
+        """Returns whether a state with a number above `after` has arrived within a timeout, [s].
+
+        Raises:
+            ConnectionLostError: The controller has closed the connection.
+        """
+        deadline = time.monotonic() + timeout
+        while True:
+            events = self._states_ready.poll(max(0.0, deadline - time.monotonic()) * _MS)
+            if not events:
+                return False
+            if len(events) == 1 and events[0][0] == self._tcp.fileno():
+                raise self._lost()
+            if self._is_state(after):
+                return True
+
+    def require_open(self) -> None:
+        """Checks that the controller has not closed the connection.
+
+        Raises:
+            ConnectionLostError: It has.
+        """
+        if self._is_open.poll(0):
+            raise self._lost()
+
+    def abort(self) -> None:
+        """Ends the connection of the client, too, which then neither sends nor waits any more."""
+        with suppress(OSError):
+            self._tcp.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Closes the duplicates. May be called twice."""
+        self._tcp.close()
+        self._udp.close()
+
+    def _is_state(self, after: int) -> bool:
+        """Returns whether the next datagram is a state with a number above `after`; drops it if not."""
+        flags = socket.MSG_PEEK | socket.MSG_TRUNC | socket.MSG_DONTWAIT
+        try:
+            size, sender = self._udp.recvfrom_into(self._head, _ID_SIZE, flags)
+        except (BlockingIOError, InterruptedError):
+            return False
+        if size == self._state_size and sender[0] == self._host and int.from_bytes(self._head, "little") > after:
+            return True
+        with suppress(BlockingIOError):
+            self._udp.recv(1, socket.MSG_DONTWAIT)
+        return False
+
+    def _lost(self) -> ConnectionLostError:
+        return ConnectionLostError(
+            f"{self._name}: the connection is lost (it closed the connection); look whether the controller runs, and "
+            "connect again"
+        )
+
+
+def open_with_sockets(
+    open_client: Callable[[], Client], state_size: int, port: int, name: str
+) -> tuple[Client, ClientSockets]:
+    """Returns a new client and its sockets.
+
+    Args:
+        open_client: Connects a client.
+        state_size: Size of a state, [bytes].
+        port: TCP port of the controller.
+        name: Name of the controller in errors.
+
+    Raises:
+        ConnectionLostError: The client did not open a TCP and a UDP socket.
+    """
+    before = _open_sockets().keys()
+    client = open_client()
+    tcp = udp = None
+    for number in (fd for inode, fd in _open_sockets().items() if inode not in before):
+        duplicate = socket.socket(fileno=os.dup(number))  # Its flags are the client's: they stay as they are.
+        if tcp is None and _is_connection(duplicate, port):
+            tcp = duplicate
+        elif udp is None and duplicate.type == socket.SOCK_DGRAM:
+            udp = duplicate
+        else:
+            duplicate.close()
+    if tcp is None or udp is None:
+        raise ConnectionLostError(f"{name}: the client library is not connected; connect again")
+    return client, ClientSockets(tcp, udp, state_size, name)
+
+
+def _open_sockets() -> dict[int, int]:
+    """Returns the descriptor of each socket of this process, by inode."""
+    found: dict[int, int] = {}
+    for name in os.listdir(_FD):
+        with suppress(OSError):  # That of the listing itself is closed.
+            status = os.fstat(int(name))
+            if stat.S_ISSOCK(status.st_mode):
+                found[status.st_ino] = int(name)
+    return found
+
+
+def _is_connection(sock: socket.socket, port: int) -> bool:
+    if sock.type != socket.SOCK_STREAM:
+        return False
+    try:
+        return sock.getpeername()[1] == port
+    except OSError:
+        return False

@@ -1,0 +1,75 @@
+"""What is at an address: a short connection of our own, before the client library connects.
+
+The client libraries wait without a time limit for a controller that does not answer or closes the connection, and each
+of them has one version of the interface only.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from contextlib import suppress
+from struct import Struct
+
+from rcilab.core.errors import ConnectionLostError
+from rcilab.makers.franka.driver.address import FciAddress
+from rcilab.makers.network import find_route
+
+_CONNECT = Struct("<IIIHH")
+_ANSWER = Struct("<IIIBH")
+
+
+def find_version(address: FciAddress, version: int, timeout: float) -> int:
+    """Returns the version of the interface at an address.
+
+    Args:
+        address: Address of the controller.
+        version: The version to ask for: a controller of another one answers with its own.
+        timeout: For the connection and for the answer, [s].
+
+    Raises:
+        ConnectionLostError: No controller answers, or it has another client.
+    """
+    host = find_route(address).host
+    start = time.monotonic()
+    with socket.socket() as tcp, socket.socket(type=socket.SOCK_DGRAM) as udp:
+        tcp.settimeout(timeout)
+        udp.bind(("", 0))
+        try:
+            tcp.connect((host, address.port))
+        except OSError as error:
+            spent = time.monotonic() - start
+            reason = (
+                f"did not answer within {timeout:g} s"
+                if isinstance(error, TimeoutError)
+                else f"{error.strerror or error} after {spent:.1f} s of {timeout:g} s"
+            )
+            raise ConnectionLostError(
+                f"no robot at {address} ({reason}); check that it is switched on, that FCI is activated in Desk and "
+                "the joints are unlocked, that the IP address is the one shown there, and the cable; a virtual one is "
+                "started with, for example: rcilab controller --model FR3"
+            ).coded("no_robot", address=str(address)) from error
+        try:
+            tcp.sendall(_CONNECT.pack(0, 0, _CONNECT.size, version, udp.getsockname()[1]))
+            answer = _receive(tcp, _ANSWER.size)
+            found = _ANSWER.unpack(answer)[-1]
+            tcp.shutdown(socket.SHUT_WR)
+            with suppress(TimeoutError):
+                while tcp.recv(4096):  # Until the controller is ready for the next client.
+                    pass
+        except OSError as error:
+            raise ConnectionLostError(
+                f"{address}: the controller ended the connection before its first answer ({error.strerror or error}), "
+                "probably because another client is connected: it takes one at a time; close that one and connect again"
+            ) from error
+    return found
+
+
+def _receive(tcp: socket.socket, size: int) -> bytes:
+    received = b""
+    while len(received) < size:
+        piece = tcp.recv(size - len(received))
+        if not piece:
+            raise ConnectionResetError("it closed the connection")
+        received += piece
+    return received
