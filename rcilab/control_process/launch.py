@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import random
 import re
+import socket
 import time
 from collections.abc import Sequence
 
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.core.errors import ConnectionLostError
+from rcilab.makers.maker import client_port_of
 
 START_TIMEOUT = (
     20.0  # [s] Python with its numerical libraries takes about 1 s from a cold disk; more on a busy machine.
@@ -19,6 +22,8 @@ _WORLD = re.compile(r"^world (\S+)$", re.MULTILINE)
 class VirtualController(ManagedProcess):
     """A private `rcilab controller` on loopback and free ports; it ends with this process, even after a crash.
 
+    If the clients of its maker insist on a port, it has an address of its own on loopback.
+
     Args:
         model_name: Name of the arm.
         plant: "ideal" or "mujoco".
@@ -29,7 +34,9 @@ class VirtualController(ManagedProcess):
     def __init__(
         self, model_name: str, plant: str = "ideal", lockstep: bool = False, options: Sequence[str] = ()
     ) -> None:
-        arguments = ["controller", "--model", model_name, "--plant", plant, "--port", "0", *options]
+        port = client_port_of(model_name)
+        place = ["--port", "0"] if port is None else ["--host", _find_free_address(port)]
+        arguments = ["controller", "--model", model_name, "--plant", plant, *place, *options]
         if lockstep:
             arguments.append("--lockstep")
         super().__init__("rcilab.cli", [*arguments, "--exit-with-parent", str(parent_pid())], "the virtual controller")
@@ -93,3 +100,16 @@ def start_controller(
         controller.end()
         raise
     return controller
+
+
+def _find_free_address(port: int) -> str:
+    """Returns a loopback address at which a TCP port is free; any of 127/8 is this machine."""
+    choice = random.SystemRandom()
+    while True:
+        host = ".".join(["127", *(str(choice.randrange(1, 255)) for _ in range(3))])
+        with socket.socket() as probe:
+            try:
+                probe.bind((host, port))
+            except OSError:  # Taken.
+                continue
+        return host

@@ -101,7 +101,7 @@ class ControlLoop:
         self._driver = driver
         self._listener = driver.on_states
         self._model = model
-        self._has_psi = bool(model.redundancy)
+        self._has_psi = bool(model.redundancy) and driver.commands_arm_angle
         self._limits = limits
         self._mode = mode
         self._kind = _COMMANDS[mode]
@@ -316,7 +316,7 @@ class ControlLoop:
             state = self._next()
             self._answer(state, command)
             off, cycle = distance_to(state, command, has_psi=self._has_psi), cycle + 1
-            if off == 0.0 and not self._is_unexecuted:
+            if off <= self._driver.resolution and not self._is_unexecuted:
                 return state
             if cycle % SETTLE_CYCLES == 0:
                 if (

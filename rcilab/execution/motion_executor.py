@@ -115,6 +115,8 @@ class MotionExecutor:
         """
         self._stream = callback if isinstance(callback, MotionStream) else None
         self._is_torque, self._reason = mode == "torque", None
+        if self._stream is not None and not self._driver.commands_arm_angle:
+            self._stream.omit_arm_angle()
         if self._stream is not None and self._is_torque:
             filters = [*filters, RateLimiter(self._limits)]
         loop = ControlLoop(
@@ -167,6 +169,7 @@ class MotionStream:
         self._holds = False
         self._next: tuple[int, JointPath, bool] | None = None
         self._model = model
+        self._mode: Mode = mode
         self._command = build_commander(mode, model)
         self._settling = SETTLING if mode == "torque" else 0
         self._on_cycle = on_cycle
@@ -190,6 +193,11 @@ class MotionStream:
         is_over = not self._holds and self._next is None and row >= last + self._settling
         command = self._command(rows, min(row, last), state)
         return replace(command, finished=True) if is_over else command
+
+    def omit_arm_angle(self) -> None:
+        """Sends poses without the arm angle from here on: the controller takes none."""
+        if self._mode.startswith("cartesian"):
+            self._command = _poses(self._model, has_psi=False)
 
     def switch(self, first: int, rows: JointPath, *, holds: bool) -> bool:
         """Replaces the following rows; returns False, without effect, if they do not continue the stream.
@@ -233,16 +241,14 @@ def build_commander(mode: Mode, model: RobotModel) -> Commander:
     """
     if mode == "torque":
         return _torques(model)
-    return _poses(model) if mode.startswith("cartesian") else _angles
+    return _poses(model, has_psi=bool(model.redundancy)) if mode.startswith("cartesian") else _angles
 
 
 def _angles(rows: JointPath, k: int, state: RobotState) -> Command:
     return JointPosition(rows[k])
 
 
-def _poses(model: RobotModel) -> Commander:
-    has_psi = bool(model.redundancy)
-
+def _poses(model: RobotModel, *, has_psi: bool) -> Commander:
     def command(rows: JointPath, k: int, state: RobotState) -> Command:
         q = rows[k]
         try:

@@ -676,12 +676,17 @@ class RobotSession(Closeable):
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
     ) -> Run:
-        """Streams a path after checking its joint motion: its poses, to an arm that cannot take them its angles."""
+        """Streams a path after checking its joint motion: its poses, to an arm that cannot take them its angles.
+
+        Poses without an arm angle are only sent to a controller that holds its own, as the joint motion does.
+        """
         motion = follow_path(self.model, state.q_c, path, speed)
-        if find_missing_feature(self.model, "cartesian_position") is not None:
+        is_free = bool(self.model.redundancy) and not self._driver.commands_arm_angle
+        if is_free or find_missing_feature(self.model, "cartesian_position") is not None:
             self._require_allowed(motion, state)
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)
         self._require_allowed(motion, state, "cartesian_position")
-        callback = follow_poses(path, schedule(path, speed), with_psi, report_progress(motion, progress))
+        sends_psi = with_psi or not self._driver.holds_arm_angle
+        callback = follow_poses(path, schedule(path, speed), sends_psi, report_progress(motion, progress))
         return self._runner.run(callback, "cartesian_position", motion)

@@ -158,6 +158,12 @@ class Driver(Protocol):
     """Whether the controller is on this machine."""
     simulation_address: tuple[str, int] | None
     """Simulation port of a virtual controller; None: not known, or a real robot."""
+    resolution: float
+    """Largest rounding of commanded positions in states, [rad] or [m]; 0: they return as they were sent."""
+    commands_arm_angle: bool
+    """Whether poses can be sent with an arm angle; if not, the controller chooses it."""
+    holds_arm_angle: bool
+    """Whether the controller holds its arm angle while none is sent; if not, the joints move as little as possible."""
     on_states: Callable[[list[RobotState]], None]
     """Called with the states that arrive while the answer to a request is awaited, at least every 0.05 s."""
     poll: Callable[[float], list[RobotState]]

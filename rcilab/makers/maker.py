@@ -20,7 +20,7 @@ from rcilab.core.fault import FaultCode
 from rcilab.core.state import Mode
 from rcilab.makers.configuration import RobotConfiguration, SetupPart, require_setup
 from rcilab.model.robot_model import RobotModel
-from rcilab.robots import ROBOTS_BY_MAKER
+from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
 
 if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
@@ -105,6 +105,11 @@ class Maker(Protocol):
         ...
 
     @property
+    def client_port(self) -> int | None:
+        """The TCP port that its clients insist on, so that two controllers need two addresses; None: any port."""
+        ...
+
+    @property
     def robots(self) -> Mapping[str, str]:
         """Its arms: name -> module of the data file in its folder `robots`."""
         ...
@@ -154,6 +159,8 @@ class Maker(Protocol):
 
 class PlanningOnly:
     """The base of a maker whose arms can be planned for, but neither simulated nor driven."""
+
+    client_port: int | None = None
 
     def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
         """Returns no parameters: there is no controller."""
@@ -216,6 +223,19 @@ def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
     """Returns the parameters of an arm's controller, see `Maker.parameters`."""
     maker = maker_of(model)
     return () if maker is None else maker.parameters(model)
+
+
+def client_port_of(name: str) -> int | None:
+    """Returns the TCP port that the clients of an arm's controller insist on, see `Maker.client_port`.
+
+    Args:
+        name: Name of the arm.
+
+    Raises:
+        ModelError: There is no such arm.
+    """
+    maker = describe_robot(name).maker
+    return next((each.client_port for each in all_makers() if each.name == maker), None)
 
 
 def simulated_robots() -> tuple[str, ...]:

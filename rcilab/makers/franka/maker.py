@@ -1,22 +1,30 @@
-"""Franka: the arms Panda and FR3, their errors, conditions and virtual controller."""
+"""Franka: the arms Panda and FR3, their errors and conditions, driven by their client libraries."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
+from rcilab.core.state import MODES
+from rcilab.makers.franka.bounds import CLIENT_PORT, LONGEST_TOOL
 from rcilab.makers.franka.conditions import FCI_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots import ROBOTS
-from rcilab.makers.maker import Capabilities, PlanningOnly, Timing
+from rcilab.makers.maker import Capabilities, Timing
 
 if TYPE_CHECKING:
+    from rcilab.makers.driver import ExpectedArm
+    from rcilab.makers.franka.driver.address import FciAddress
+    from rcilab.makers.franka.driver.fci_driver import FciDriver
+    from rcilab.makers.parameters import ParameterGroup
+    from rcilab.makers.scenario import FaultScenario
+    from rcilab.model.robot_model import RobotModel
     from rcilab.sim.controller_config import ControllerConfig
     from rcilab.sim.maker_server import MakerServer
     from rcilab.sim.virtual_arm import VirtualArm
 
 
-class Franka(PlanningOnly):
+class Franka:
     """The maker of Panda and FR3."""
 
     name = "franka"
@@ -24,12 +32,42 @@ class Franka(PlanningOnly):
     interface = "Franka's own interface"
     scheme = "fci"
     robots = ROBOTS
-    capabilities = Capabilities(simulates=True, streams=True)
+    client_port = CLIENT_PORT
+    capabilities = Capabilities(
+        simulates=True,
+        drives=True,
+        streams=True,
+        modes=MODES,
+        setup=("tool", "load", "control"),
+        longest_tool=LONGEST_TOOL,
+    )
     timing = Timing()
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the FCI."""
         return FCI_CONDITIONS
+
+    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
+        """Returns stiffness and collision thresholds."""
+        from rcilab.makers.franka.parameters import parameter_groups
+
+        return parameter_groups()
+
+    def scenarios(self) -> tuple[FaultScenario, ...]:
+        """Returns none yet."""
+        return ()
+
+    def parse_address(self, text: str) -> FciAddress:
+        """Returns the parts of an address, fci://HOST."""
+        from rcilab.makers.franka.driver.address import parse_address
+
+        return parse_address(text)
+
+    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> FciDriver:
+        """Returns a connection to a controller of Franka."""
+        from rcilab.makers.franka.driver.fci_driver import open_driver
+
+        return open_driver(address, timeout, expected)
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
         """Returns the FCI server of an arm."""

@@ -31,6 +31,7 @@ class Rokae:
     title = "ROKAE"
     interface = "the RCI"
     scheme = "rci"
+    client_port = None
     robots = ROBOTS
     capabilities = Capabilities(
         simulates=True,

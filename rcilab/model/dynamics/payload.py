@@ -82,3 +82,16 @@ def _valid_inertia(inertia: Matrix) -> Matrix:
 
 
 NO_LOAD = Payload()
+
+
+def combine_payloads(first: Payload, second: Payload) -> Payload:
+    """Returns two bodies at the flange as one."""
+    mass = first.mass + second.mass
+    if not (first.mass and second.mass):
+        return second if second.mass else first
+    center = (first.mass * first.center_of_mass + second.mass * second.center_of_mass) / mass
+    inertia = np.zeros((3, 3))
+    for body in (first, second):
+        d = body.center_of_mass - center
+        inertia += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    return Payload(mass=mass, center_of_mass=center, inertia=inertia)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rcilab.core.errors import DecodeError, ModelError
+from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
 from rcilab.makers.franka.controller.model_library import build_model_library, runs_here
@@ -40,7 +41,6 @@ from rcilab.sim.channels import ClientLink, Peer, TcpChannel, UdpChannel
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
-DEFAULT_PORT = 1337
 _PROTOCOL = "FCI"
 _VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
 """The version of each arm's controller."""
@@ -54,7 +54,7 @@ def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
     controller = FciController(arm, version)
     if config.limit_table is not None:
         controller.limit_table = config.limit_table
-    return FciServer(controller, DEFAULT_PORT if config.port is None else config.port, config.udp_port)
+    return FciServer(controller, CLIENT_PORT if config.port is None else config.port, config.udp_port)
 
 
 class _Models(NamedTuple):

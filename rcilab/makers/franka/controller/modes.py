@@ -6,7 +6,8 @@ from math import inf
 from typing import NamedTuple
 
 from rcilab.core.state import ControllerMode, MotionGeneratorMode
-from rcilab.makers.franka.controller.settings import JOINT_STIFFNESS, Settings
+from rcilab.makers.franka.bounds import JOINT_STIFFNESS
+from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.wire.requests import AsyncMove, Move
 from rcilab.makers.franka.wire.versions import FciVersion, MoveController, MoveGenerator
 from rcilab.sim.actuator import ControlLaw

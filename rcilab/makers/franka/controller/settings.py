@@ -13,6 +13,15 @@ import numpy as np
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import IDENTITY, Pose
+from rcilab.makers.franka.bounds import (
+    CARTESIAN_STIFFNESS,
+    DEFAULT_CARTESIAN_STIFFNESS,
+    DEFAULT_THRESHOLD,
+    HEAVIEST_LOAD,
+    JOINT_STIFFNESS,
+    LARGEST_JOINT_STIFFNESS,
+    LONGEST_TOOL,
+)
 from rcilab.makers.franka.wire.requests import (
     Request,
     SetCartesianImpedance,
@@ -24,31 +33,24 @@ from rcilab.makers.franka.wire.requests import (
     SetLoad,
     SetNEToEE,
 )
-from rcilab.model.dynamics.payload import Payload
+from rcilab.model.dynamics.payload import Payload, combine_payloads
 from rcilab.robots import RobotDescription
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.contact_detector import ContactThresholds
 from rcilab.sim.filters import SAMPLING_RATE
 
-LONGEST_TOOL = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
-HEAVIEST_LOAD = 20.0  # [kg] rcilab's own bound; the rated payload is 3 kg.
-LARGEST_JOINT_STIFFNESS = 14250.0  # [N m/rad] Comments of libfranka's robot.h, as the two below.
-CARTESIAN_STIFFNESS = ((10.0, 3000.0), (1.0, 300.0))  # [N/m], [N m/rad] Smallest and largest, along and about an axis.
 LOWEST_FREQUENCY = 1.0  # [Hz]
-JOINT_STIFFNESS = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N m/rad] After power-up.
-DEFAULT_CARTESIAN_STIFFNESS = (2000.0, 2000.0, 2000.0, 100.0, 100.0, 100.0)  # [N/m], [N m/rad] The same.
-
 
 DEFAULT_THRESHOLDS = ContactThresholds(
-    contact_torque=(20.0,) * 7,
-    collision_torque=(20.0,) * 7,
-    contact_torque_accelerating=(20.0,) * 7,
-    collision_torque_accelerating=(20.0,) * 7,
-    contact_force=(20.0,) * 6,
-    collision_force=(20.0,) * 6,
-    contact_force_accelerating=(20.0,) * 6,
-    collision_force_accelerating=(20.0,) * 6,
+    contact_torque=(DEFAULT_THRESHOLD,) * 7,
+    collision_torque=(DEFAULT_THRESHOLD,) * 7,
+    contact_torque_accelerating=(DEFAULT_THRESHOLD,) * 7,
+    collision_torque_accelerating=(DEFAULT_THRESHOLD,) * 7,
+    contact_force=(DEFAULT_THRESHOLD,) * 6,
+    collision_force=(DEFAULT_THRESHOLD,) * 6,
+    contact_force_accelerating=(DEFAULT_THRESHOLD,) * 6,
+    collision_force_accelerating=(DEFAULT_THRESHOLD,) * 6,
 )
 """After power-up; rcilab's own choice."""
 
@@ -166,20 +168,7 @@ def _with_frames(settings: Settings) -> Settings:
 
 
 def _with_bodies(settings: Settings) -> Settings:
-    return replace(settings, load=_combined(settings.end_effector, settings.client_load))
-
-
-def _combined(first: Payload, second: Payload) -> Payload:
-    """Returns two bodies at the flange as one."""
-    mass = first.mass + second.mass
-    if not (first.mass and second.mass):
-        return second if second.mass else first
-    center = (first.mass * first.center_of_mass + second.mass * second.center_of_mass) / mass
-    inertia = np.zeros((3, 3))
-    for body in (first, second):
-        d = body.center_of_mass - center
-        inertia += body.inertia + body.mass * (d @ d * np.eye(3) - np.outer(d, d))
-    return Payload(mass=mass, center_of_mass=center, inertia=inertia)
+    return replace(settings, load=combine_payloads(settings.end_effector, settings.client_load))
 
 
 def _load(request: SetLoad) -> Payload:

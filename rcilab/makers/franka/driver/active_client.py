@@ -95,6 +95,14 @@ class ActiveClient(FciClient):
             self._await_end()
             self._finish()
 
+    def set_ee(self, columns: list[float]) -> None:
+        """The library's own setter."""
+        self.robot.set_EE(columns)
+
+    def set_k(self, columns: list[float]) -> None:
+        """The same for the stiffness frame."""
+        self.robot.set_K(columns)
+
     def close(self) -> None:
         """Ends the connection. May be called twice."""
         if self._control is not None:

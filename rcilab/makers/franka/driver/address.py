@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from rcilab.core.errors import InvalidValueError
 from rcilab.makers.address import is_loopback, split_address
+from rcilab.makers.franka.bounds import CLIENT_PORT
 
-CLIENT_PORT = 1337
-"""TCP port that every client of the FCI connects to."""
 _KNOWN_OPTIONS = ("world_port", "hand_port", "udp_port")
 """The last two are in the address that a virtual controller prints; clients find these ports by themselves."""
 _EXAMPLE = "fci://172.16.0.2"

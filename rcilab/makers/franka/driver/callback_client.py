@@ -116,6 +116,14 @@ class CallbackClient(FciClient):
                 raise ConnectionLostError(f"{self._name}: the motion did not end within {_END_TIMEOUT:g} s")
         self._motion = None
 
+    def set_ee(self, columns: list[float]) -> None:
+        """The library's own setter."""
+        self.robot.set_ee(columns)
+
+    def set_k(self, columns: list[float]) -> None:
+        """The same for the stiffness frame."""
+        self.robot.set_k(columns)
+
     def close(self) -> None:
         """Ends the connection. May be called twice."""
         if self._motion is not None:

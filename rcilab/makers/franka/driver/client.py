@@ -29,6 +29,7 @@ class FciClient(ABC):
         sockets: See above.
     """
 
+    robot: Any
     resolution: float
     """Largest rounding of commanded positions in states, [rad] or [m]."""
     commands_elbow: bool
@@ -73,6 +74,14 @@ class FciClient(ABC):
         """Ends the connection. May be called twice."""
         self.sockets.close()
         self.robot = None
+
+    @abstractmethod
+    def set_ee(self, columns: list[float]) -> None:
+        """The library's own setter, which both spell differently; 16 numbers, column-major."""
+
+    @abstractmethod
+    def set_k(self, columns: list[float]) -> None:
+        """The same for the stiffness frame."""
 
     @contextmanager
     def request(self, name: str) -> Iterator[None]:

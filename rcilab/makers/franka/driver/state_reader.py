@@ -77,7 +77,7 @@ class StateReader:
                 vector(raw, "dtheta"),
                 _UNKNOWN,
                 _UNKNOWN,
-                _errors_of(raw.current_errors),
+                errors_of(raw.current_errors),
                 raw.control_command_success_rate if robot_mode is RobotMode.MOVE else 1.0,
                 generator,
                 controller,
@@ -109,6 +109,13 @@ def number_of(raw: Any) -> int:
     return round(1e3 * raw.time.to_sec())
 
 
+def errors_of(errors: Any) -> tuple[FrankaError, ...]:
+    """Returns the errors that are set in the library's own type."""
+    if not errors:
+        return ()
+    return tuple(error for error, name in _ATTRIBUTES if getattr(errors, name, False))
+
+
 def _as_array(values: list[float]) -> Array:
     return make_readonly(np.array(values, dtype=np.float64))
 
@@ -119,9 +126,3 @@ def _as_opposite(values: list[float]) -> Array:
 
 def _as_pose(columns: list[float]) -> ReportedPose:
     return ReportedPose(make_readonly(np.array(columns, dtype=np.float64).reshape(4, 4).T.copy()))
-
-
-def _errors_of(errors: Any) -> tuple[FrankaError, ...]:
-    if not errors:
-        return ()
-    return tuple(error for error, name in _ATTRIBUTES if getattr(errors, name, False))

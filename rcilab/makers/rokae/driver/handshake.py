@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-import warnings
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rcilab.core.errors import CommandRejectedError, ConnectionLostError
-from rcilab.core.spatial import IDENTITY, as_pose, rotation_between
+from rcilab.core.spatial import IDENTITY, as_pose
+from rcilab.makers.known_setup import with_reported_tool
 from rcilab.makers.rokae.driver.address import RciAddress
 from rcilab.makers.rokae.driver.commands import RciCommands
 from rcilab.makers.rokae.driver.connection import RciConnection
@@ -17,8 +14,6 @@ from rcilab.makers.rokae.driver.identify import Lengths, require_same_arm
 
 if TYPE_CHECKING:
     from rcilab.model.robot_model import RobotModel
-
-_SAME_TOOL = 1e-3  # [m], [rad] The accuracy of the arm's own geometry.
 
 
 def require_arm_there(commands: RciCommands, name: str, lengths: Lengths, address: str) -> None:
@@ -49,24 +44,8 @@ def await_first_state(link: RciConnection, address: RciAddress, local: tuple[str
 
 
 def with_tool_of(link: RciConnection, model: RobotModel) -> RobotModel:
-    """Returns the model with the tool in the controller's state; warns if that is another one.
-
-    Poses of a session with another tool than its controller's would be off by the difference.
-    """
+    """Returns the model with the tool in the controller's state; warns if that is another one."""
     state = link.latest
     assert state is not None  # `await_first_state` has seen one.
     flange = model.with_tool(IDENTITY).forward(state.q_c)
-    tool = flange.inverse() @ as_pose(state.T_base_tool_c)
-    mine = model.T_flange_tool
-    off = float(np.linalg.norm(tool.position - mine.position))
-    turned = math.hypot(*rotation_between(tool.parts[0], mine.parts[0]))
-    if off < _SAME_TOOL and turned < _SAME_TOOL:
-        return model
-    if not mine.is_close(IDENTITY, 0.0):
-        warnings.warn(
-            f"the tool of {link.name} is {1e3 * off:.1f} mm and {math.degrees(turned):.1f} deg from the model's; the "
-            "session goes on with the controller's. robot.set_tool(model.T_flange_tool), or connect(..., apply=True), "
-            "sends the model's",
-            stacklevel=5,
-        )
-    return model.with_tool(tool)
+    return with_reported_tool(model, flange.inverse() @ as_pose(state.T_base_tool_c), link.name)

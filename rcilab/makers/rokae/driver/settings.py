@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcilab.core.arrays import Array, as_number, described
+from rcilab.core.arrays import Array, described
 from rcilab.core.errors import CommandRejectedError, InvalidValueError, ManualRecoveryError
 from rcilab.core.safety_box import SafetyBox, require_box
 from rcilab.core.spatial import Pose, as_pose
@@ -28,6 +28,7 @@ from rcilab.makers.rokae.bounds import (
 )
 from rcilab.makers.rokae.driver.connection import RciConnection
 from rcilab.makers.rokae.driver.refusal import Refusal, find_refusal
+from rcilab.makers.setting_values import bounded_vector
 from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
 
@@ -85,14 +86,14 @@ class RciSettings:
     def set_collision_behavior(self, thresholds: ArrayLike) -> None:
         """Sets the external torques that count as a collision, shape (n,), [N m]; see `limits.joint`."""
         largest = None if self._limits is None else self._limits.joint.collision_threshold
-        values = _vector("thresholds", thresholds, self._joints(), "N m", 0.0, largest)
+        values = bounded_vector("thresholds", thresholds, self._joints(), "N m", 0.0, largest)
         self._ask(rci.SetCollisionBehavior(_floats(values)))
 
     def set_cartesian_limit(self, box: SafetyBox) -> None:
         """Sets the safety box for the origin of the tool, and whether it is active."""
         require_box(box)
-        _vector("safety box size", box.size, _AXES[:3], "m", 0.0, LARGEST_BOX)
-        _vector("safety box centre", box.T_base_box.position, _AXES[:3], "m", -FARTHEST_BOX, FARTHEST_BOX)
+        bounded_vector("safety box size", box.size, _AXES[:3], "m", 0.0, LARGEST_BOX)
+        bounded_vector("safety box centre", box.T_base_box.position, _AXES[:3], "m", -FARTHEST_BOX, FARTHEST_BOX)
         self._ask(rci.SetCartesianLimit(box.size, box.T_base_box.as_row_major(), box.active))
 
     def set_joint_limit(self, lower: ArrayLike, upper: ArrayLike) -> None:
@@ -104,8 +105,8 @@ class RciSettings:
         least = largest = None
         if joint is not None:
             least, largest = joint.lower - LIMIT_TOLERANCE, joint.upper + LIMIT_TOLERANCE
-        low = _vector("lower", lower, self._joints(), "rad", least, largest)
-        high = _vector("upper", upper, self._joints(), "rad", least, largest)
+        low = bounded_vector("lower", lower, self._joints(), "rad", least, largest)
+        high = bounded_vector("upper", upper, self._joints(), "rad", least, largest)
         for i in range(self.n):
             if low[i] >= high[i]:
                 raise InvalidValueError(f"lower, joint {i + 1}", float(low[i]), f"rad must be below upper {high[i]:g}")
@@ -114,7 +115,7 @@ class RciSettings:
     def set_joint_impedance(self, stiffness: ArrayLike) -> None:
         """Sets the stiffness of joint impedance, shape (n,), [N m/rad]."""
         largest = None if self._limits is None else self._limits.joint.stiffness
-        values = _vector("stiffness", stiffness, self._joints(), "N m/rad", 0.0, largest)
+        values = bounded_vector("stiffness", stiffness, self._joints(), "N m/rad", 0.0, largest)
         self._ask(rci.SetJointImpedance(_floats(values)))
 
     def set_cartesian_impedance(self, stiffness: ArrayLike) -> None:
@@ -124,7 +125,9 @@ class RciSettings:
             c = self._limits.cartesian
             largest = np.repeat((c.translation_stiffness, c.rotation_stiffness), 3)
         self._ask(
-            rci.SetCartesianImpedance(_floats(_vector("stiffness", stiffness, _AXES, "N/m, N m/rad", 0.0, largest)))
+            rci.SetCartesianImpedance(
+                _floats(bounded_vector("stiffness", stiffness, _AXES, "N/m, N m/rad", 0.0, largest))
+            )
         )
 
     def set_cart_imp_desired_tau(self, wrench: ArrayLike) -> None:
@@ -133,7 +136,7 @@ class RciSettings:
         if self._limits is not None:
             largest = np.repeat((self._limits.cartesian.force, self._limits.cartesian.moment), 3)
         least = None if largest is None else -largest
-        self._ask(rci.SetCartImpDesiredTau(_floats(_vector("wrench", wrench, _AXES, "N, N m", least, largest))))
+        self._ask(rci.SetCartImpDesiredTau(_floats(bounded_vector("wrench", wrench, _AXES, "N, N m", least, largest))))
 
     def set_coor(self, T_flange_tool: Pose) -> None:
         """Sets the tool by its pose in the flange frame, at most 2 m long."""
@@ -148,14 +151,14 @@ class RciSettings:
             inertia: About the centre of mass, shape (3, 3), [kg m^2].
         """
         most = None if self._description is None else self._description.rated_payload
-        kilograms = float(_vector("mass", [mass], ("",), "kg", 0.0, most)[0])
+        kilograms = float(bounded_vector("mass", [mass], ("",), "kg", 0.0, most)[0])
         center = load_center(center_of_mass)
         try:
             flat = np.asarray(inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError, OverflowError) as error:
             raise InvalidValueError("inertia", described(inertia), "is not 3 x 3 numbers [kg m^2]") from error
         names = [f"row {row}, column {column}" for row in (1, 2, 3) for column in (1, 2, 3)]
-        values = _vector("inertia", flat, names, "kg m^2")
+        values = bounded_vector("inertia", flat, names, "kg m^2")
         # A physically impossible body is refused here.
         Payload(mass=kilograms, center_of_mass=center, inertia=values.reshape(3, 3))
         self._ask(rci.SetLoad(kilograms, _floats(center), _floats(values)))
@@ -163,12 +166,14 @@ class RciSettings:
     def set_filters(self, joint: float, cartesian: float, torque: float) -> None:
         """Sets the cut-off frequencies of the controller's filters of commands, 0.1 to 1000 [Hz]; 1000 is off."""
         names = ("joint", "cartesian", "torque")
-        values = _vector("cut-off frequency", [joint, cartesian, torque], names, "Hz", LOWEST_FREQUENCY, FILTER_OFF)
+        values = bounded_vector(
+            "cut-off frequency", [joint, cartesian, torque], names, "Hz", LOWEST_FREQUENCY, FILTER_OFF
+        )
         self._ask(rci.SetFilters(*_floats(values)))
 
     def set_torque_filter_cut_off_frequency(self, frequency: float) -> None:
         """Sets the cut-off frequency of the reported torques' filter, 0.1 to 1000 [Hz]; 1000 switches it off."""
-        values = _vector("frequency", [frequency], ("",), "Hz", LOWEST_FREQUENCY, FILTER_OFF)
+        values = bounded_vector("frequency", [frequency], ("",), "Hz", LOWEST_FREQUENCY, FILTER_OFF)
         self._ask(rci.SetTorqueFilterCutOffFrequency(float(values[0])))
 
     def set_fc_coor(
@@ -236,39 +241,13 @@ def flag(name: str, value: object) -> bool:
     raise InvalidValueError(name, described(value), "must be True or False")
 
 
-def _vector(
-    name: str, values: ArrayLike, axes: Sequence[str], unit: str, least: ArrayLike | None = None,
-    largest: ArrayLike | None = None,
-) -> Array:  # fmt: skip
-    """Returns a vector, one number per axis, each finite and inside its bounds; None is no bound."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        if len(axes) == 1:
-            as_number(values[0], name, unit)  # type: ignore[index]  # A single number was put into a list.
-        raise InvalidValueError(name, described(values), f"is not {len(axes)} numbers [{unit}]") from error
-    if array.shape != (len(axes),):
-        raise InvalidValueError(name, described(values), f"has shape {array.shape}, needs ({len(axes)},) [{unit}]")
-    low = np.broadcast_to(-np.inf if least is None else least, array.shape)
-    high = np.broadcast_to(np.inf if largest is None else largest, array.shape)
-    for axis, value, lowest, highest in zip(axes, array.tolist(), low.tolist(), high.tolist(), strict=True):
-        place = f"{name}, {axis}" if axis else name
-        if not math.isfinite(value):
-            raise InvalidValueError(place, value, f"must be finite [{unit}]")
-        if not lowest <= value <= highest:
-            span = f"is outside {lowest:.9g} to {highest:.9g}"
-            bounds = f"must not be below {lowest:g}" if highest == math.inf else span
-            raise InvalidValueError(place, value, f"{bounds} [{unit}]")
-    return array
-
-
 def load_center(center_of_mass: ArrayLike) -> Array:
     """Returns a load's centre of mass in the flange frame, [m], if the controller accepts its distance.
 
     Raises:
         InvalidValueError: It is not three finite numbers, or farther away.
     """
-    center = _vector("center_of_mass", center_of_mass, _AXES[:3], "m")
+    center = bounded_vector("center_of_mass", center_of_mass, _AXES[:3], "m")
     _require_near("center_of_mass", center.tolist())
     return center
 

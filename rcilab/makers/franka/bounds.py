@@ -1,0 +1,17 @@
+"""Ranges and initial values of the settings of a client."""
+
+from __future__ import annotations
+
+from typing import Final
+
+CLIENT_PORT: Final = 1337
+"""TCP port that every client connects to."""
+LONGEST_TOOL: Final = 2.0  # [m] Distance of a frame, or of a centre of mass, from the flange; rcilab's own bound.
+HEAVIEST_LOAD: Final = 20.0  # [kg] rcilab's own bound; the rated payload is 3 kg.
+LARGEST_JOINT_STIFFNESS: Final = 14250.0  # [N m/rad] Comments of libfranka's robot.h, as the two below.
+CARTESIAN_STIFFNESS: Final = ((10.0, 3000.0), (1.0, 300.0))
+"""Smallest and largest, along an axis and about it, [N/m], [N m/rad]."""
+JOINT_STIFFNESS: Final = (3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0)  # [N m/rad] After power-up.
+DEFAULT_CARTESIAN_STIFFNESS: Final = (2000.0, 2000.0, 2000.0, 100.0, 100.0, 100.0)  # [N/m], [N m/rad] The same.
+DEFAULT_THRESHOLD: Final = 20.0  # [N m], [N] Of every contact and collision after power-up; rcilab's own choice.
+LARGEST_THRESHOLD: Final = 1000.0  # [N m], [N] Of user interfaces; rcilab's own bound, the interface has none.

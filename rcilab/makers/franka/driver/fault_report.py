@@ -1,0 +1,92 @@
+"""The diagnosis of a motion that the controller stopped: error, joint, numbers, what to do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rcilab.core.arrays import JointVector
+from rcilab.core.limits import Limits
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.state import ControllerMode
+from rcilab.i18n.translator import Remark
+from rcilab.makers.command_findings import CommandConditions, find_commanded, find_followed, find_lost_commands
+from rcilab.makers.driver import FaultReport
+from rcilab.makers.franka.errors import FrankaError
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
+
+_HELD = "error.run holds the motion"
+_REFLEXES = frozenset({FrankaError.JOINT_REFLEX, FrankaError.CARTESIAN_REFLEX})
+_OF_JOINTS = (
+    "poses inside the tool's limits are not enough: the joints that they lead to have limits of their own "
+    "(check(motion, model, mode='cartesian_position') computes them); move the tool more slowly or with less "
+    "acceleration there, and stay away from singular poses"
+)
+_ADVICE = {
+    **dict.fromkeys(
+        _REFLEXES,
+        "check for contact; if the error is raised without contact, set the load (set_load) or raise the thresholds "
+        "(robot.fci.set_collision_behavior)",
+    ),
+    FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION: (
+        "check the network and the real-time configuration (rcilab doctor); the controller bridges up to 20 lost "
+        "commands in a row"
+    ),
+    FrankaError.CONTROLLER_TORQUE_DISCONTINUITY: (
+        "let torques change gradually; if your own control law oscillates, lower its damping first"
+    ),
+    FrankaError.JOINT_POSITION_LIMITS_VIOLATION: "move the joint back inside its range, by hand if recover() fails",
+}
+_SMOOTHNESS = (
+    "check that the commands are continuous up to their acceleration and inside the limits; otherwise lower the speed, "
+    "or filter them: control(callback, rate_limit='sdk', cut_off=100)"
+)
+
+
+def describe_faults(
+    faults: Iterable[FrankaError],
+    record: NDArray[np.void],
+    t: float,
+    model: RobotModel,
+    limits: Limits,
+    mode: ControllerMode,
+    *,
+    late: str = "",
+    pressed: str = "",
+    box: SafetyBox | None = None,
+    collision_thresholds: JointVector | None = None,
+) -> FaultReport:
+    """Returns the diagnosis of a motion's end; see `StreamingDriver.describe_faults`."""
+    faults = tuple(faults)
+    when = "before the first command" if math.isnan(t) else f"at t = {t:.3f} s"
+    if pressed:
+        return FaultReport(f"the controller stopped the motion {when}: {pressed}", _HELD, Remark(""))
+    names = ", ".join(f"{fault.manual_name} ({fault.cause})" for fault in faults)
+    table = model.description.conditions
+    assert table is not None  # Every Franka arm has one.
+    conditions = CommandConditions.of(table())
+    commanded, _ = find_commanded(faults, record, limits, conditions)
+    followed = find_followed(faults, record, model, limits, conditions)
+    lost = find_lost_commands(record) if FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION in faults else ""
+    found = [part for part in (commanded, followed, lost, _describe_reflex(faults, record)) if part]
+    advice = late or next((_ADVICE[fault] for fault in faults if fault in _ADVICE), "")
+    advice = advice or (_OF_JOINTS if followed else _SMOOTHNESS)
+    parts = [f"the controller stopped the motion {when}: {names}", *found, advice]
+    finding = Remark.all(part for part in found if isinstance(part, Remark))
+    return FaultReport("; ".join(parts), f"recover() clears the fault; {_HELD}", finding)
+
+
+def _describe_reflex(faults: tuple[FrankaError, ...], record: NDArray[np.void]) -> str:
+    """Returns the external force at the end, for a reflex; "" for other errors."""
+    if not (_REFLEXES & set(faults) and len(record)):
+        return ""
+    wrench = record["tau_ext_in_base"][-1]
+    if not np.isfinite(wrench).all():
+        return ""
+    return f"an external force of {np.linalg.norm(wrench[:3]):.3g} N acts at the tool"
