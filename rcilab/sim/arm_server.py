@@ -56,6 +56,7 @@ from rcilab.sim.simulation_port import SimulationPort
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, which it clocks.
 LEAD_TIME = 0.0005  # [s] From the start of a cycle until its state is due; longer than almost any cycle takes.
 RESEND_TIME = 0.02  # [s] In lock-step a state is repeated after this time until the first command arrives.
+START_TIMEOUT = 0.1  # [s] In lock-step, for the first command, if a client may need another state before it.
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
 )
@@ -242,6 +243,9 @@ class ArmServer:
                 self._await_recorder()
                 self._await_command()
                 self._timer.restart(self._clock.now())
+            elif self.config.lockstep and self.controller.awaits_start:
+                self._await_start()
+                self._timer.restart(self._clock.now())
             else:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
@@ -310,6 +314,16 @@ class ArmServer:
             elif self._clock.now() >= deadline:
                 self._has_timed_out = True
                 return
+
+    def _await_start(self) -> None:
+        """Serves the sockets until the first command arrives, or the client may wait for another state."""
+        deadline = self._clock.now() + START_TIMEOUT
+        while self.controller.awaits_start and not self._is_ending:
+            remaining = deadline - self._clock.now()
+            if remaining <= 0.0:
+                return
+            self._poll(min(remaining, _CHECK_PERIOD))
+            self._check_periodically()
 
     def _await_late_command(self) -> None:
         """Serves the sockets until the command of this cycle arrives or is lost, or patience ends.

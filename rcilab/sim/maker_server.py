@@ -122,6 +122,11 @@ class SimulatedController(Protocol):
         ...
 
     @property
+    def awaits_start(self) -> bool:
+        """Whether such a motion has begun for its client, which may still read states before its first command."""
+        ...
+
+    @property
     def is_starved(self) -> bool:
         """Whether such a motion is in progress and its next command has not arrived."""
         ...

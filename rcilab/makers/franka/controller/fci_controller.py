@@ -49,6 +49,7 @@ from rcilab.sim.virtual_arm import VirtualArm
 
 SINGULAR = 0.01  # Smallest singular value of the Jacobian, in metres and radians, at which a Cartesian motion begins.
 SUCCESS_WINDOW = 100  # [cycles] Over which the share of commands in time is reported.
+STATES_BEFORE_START = 2  # That a client reads after Move: one that shows the motion, and the one it answers.
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _BRAKED = (Phase.USER_STOPPED,)
@@ -102,6 +103,7 @@ class FciController:
         self._table = conditions()
         self._motion: MotionKind | None = None
         self._countdown = 0
+        self._shown_cycles = 0  # Since Move.
         self._limit_table = DEFAULT_TABLE
         self._message_id = 0
         arm.on_loss = "bridge"
@@ -186,11 +188,20 @@ class FciController:
     @property
     def wants_commands(self) -> bool:
         """Whether a client's motion is in progress; from its first command on, before which it reads several states."""
-        if self._motion is None or not self._motion.mode.is_streamed:
-            return False
-        playout = self.playout
-        has_begun = playout.is_playing or len(playout) > 0
-        return self.phase is Phase.MOVING and has_begun and not playout.is_finished
+        return self._is_streamed and self._has_started and not self.playout.is_finished
+
+    @property
+    def awaits_start(self) -> bool:
+        """Whether a client that reads every state has read those that it needs before its first command."""
+        return self._is_streamed and not self._has_started and self._shown_cycles >= STATES_BEFORE_START
+
+    @property
+    def _is_streamed(self) -> bool:
+        return self.phase is Phase.MOVING and self._motion is not None and self._motion.mode.is_streamed
+
+    @property
+    def _has_started(self) -> bool:
+        return self.playout.is_playing or len(self.playout) > 0
 
     @property
     def is_starved(self) -> bool:
@@ -252,6 +263,7 @@ class FciController:
         if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
+        self._shown_cycles = 0
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
@@ -308,6 +320,7 @@ class FciController:
     def step(self, *, is_sent: bool = True) -> RobotState:
         """Advances by one cycle and returns the state at its end."""
         self._message_id += is_sent
+        self._shown_cycles += is_sent
         command_violations, measured_violations = self.arm.step()
         violations = command_violations or measured_violations
         if violations:

@@ -188,6 +188,11 @@ class RciController:
         return self.phase is Phase.MOVING and not self.playout.is_finished
 
     @property
+    def awaits_start(self) -> bool:
+        """False: a client answers the first state of a motion, so `wants_commands` is true from then on."""
+        return False
+
+    @property
     def is_starved(self) -> bool:
         """Whether a motion is in progress and its next command is missing."""
         return self.phase is Phase.MOVING and self.playout.is_starved
