@@ -62,7 +62,7 @@ def recorder_process(folder: Path, ring: CycleRing, form: LogFormat, cycle: Call
         UsageError: The process cannot be started.
     """
     _require_writable(folder)
-    command = [sys.executable, "-m", "rcilab.cli.motion_recorder", os.fspath(folder), str(ring.descriptor), form]
+    command = [sys.executable, "-P", "-m", "rcilab.cli.motion_recorder", os.fspath(folder), str(ring.descriptor), form]
     # In a session of its own: a signal to the terminal's processes ends the controller, which then ends this one.
     process = subprocess.Popen(
         command,

@@ -100,6 +100,11 @@ class Condition:
         """Whether every joint has its own value and bound."""
         return self.signal in ("joint", "torque", "external_torque")
 
+    @property
+    def is_rate(self) -> bool:
+        """Whether it bounds how fast something changes during the motion."""
+        return self.order > 0 and self.stage == "throughout"
+
     def location(self, axis: int) -> str:
         """Returns the part of the arm that the value belongs to: "joint 2", "tool", "elbow", "links", "network"."""
         if self.is_per_joint:

@@ -29,6 +29,6 @@ def probe_realtime() -> tuple[bool, bool]:
         "from rcilab.realtime.scheduling import enter_realtime\n"
         f"s = enter_realtime({_PRIORITY}); print(s.policy, s.memory_locked)"
     )
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    answer = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
     policy, locked = answer.stdout.split()
     return policy == "SCHED_FIFO", locked == "True"

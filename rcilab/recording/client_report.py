@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 
 from rcilab.conformance.advice import share
-from rcilab.conformance.report import Report
+from rcilab.conformance.report import ConditionResult, Report
 from rcilab.core.errors import RcilabError
 from rcilab.core.state import require_mode
 from rcilab.i18n.translator import Remark
@@ -91,9 +91,19 @@ def _count_unknown(run: Run) -> int:
 
 
 def _describe_nearest(report: Report) -> str:
-    row = report.worst
-    verb = "nearest limit" if row.ok else "violates"
-    return f"{verb}: {row.condition.quantity} of {row.location}, {share(row.ratio)} of its bound at {row.time:.3f} s"
+    """Returns the condition nearest to its bound; next to a range of positions also that nearest of all rates."""
+    worst = report.worst
+    if not worst.ok:
+        return f"violates: {_describe_row(worst)}"
+    rows = [worst]
+    if worst.condition.order == 0:
+        rates = [row for row in report.rows if row.necessity == "necessary" and row.condition.is_rate]
+        rows += sorted(rates, key=lambda row: -row.ratio)[:1]
+    return f"nearest limit{'s' * (len(rows) > 1)}: {' and '.join(map(_describe_row, rows))}"
+
+
+def _describe_row(row: ConditionResult) -> str:
+    return f"{row.condition.quantity} of {row.location}, {share(row.ratio)} of its bound at {row.time:.3f} s"
 
 
 def _parts(reason: str | None) -> tuple[str, ...]:

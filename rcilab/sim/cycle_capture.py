@@ -180,8 +180,8 @@ class CycleCapture:
         if arrival is not None:
             self._add(count, *arrival)
             self._commands.pop(id(arrival.command), None)
-        elif self._waiting:
-            self._add(count, *self._waiting.popleft())
+        elif self._waiting and (due := self._pop_due(count)) is not None:
+            self._add(count, *due)
         self._counters[_ROWS] = count + 1
 
     def _take(self, command: ArmCommand) -> None:
@@ -247,6 +247,15 @@ class CycleCapture:
         self._commands[id(command)] = row
         if row < self._lowest:
             self._lowest = row
+
+    def _pop_due(self, row: int) -> _Arrival | None:
+        """Removes the first command that waits for this row or an earlier one by its number, and returns it."""
+        offset = self._offset
+        for k, arrival in enumerate(self._waiting):
+            if offset is None or arrival.command.number + offset <= row:
+                del self._waiting[k]
+                return arrival
+        return None
 
     def _pop_waiting(self, command: ArmCommand) -> _Arrival | None:
         """Removes a command from those that wait for a row, and returns it; None if it is not among them.

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from rcilab.cli import main
+from rcilab.cli.motion_recorder import recorder_process
+from rcilab.core.cycle_ring import CycleRing
 from rcilab.recording.run import load_run
 from tests.peers import programs, wire
 from tests.peers.arena import Process
@@ -41,6 +43,17 @@ def test_the_arm_goes_on_without_the_recorder(tmp_path: Path) -> None:
             programs.prepare(robot, NEAR, factor=1.0)
             assert not any(state.errors for state in robot.states)
     assert not list(tmp_path.iterdir())
+
+
+def test_modules_in_the_folder_of_the_user_do_not_replace_those_of_the_recorder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numpy.py").write_text("raise SystemExit('a file of the user')")
+    monkeypatch.chdir(tmp_path)
+    ring = CycleRing.create(7, {"model": "xMatePro7", "plant": "ideal", "url": "rci://127.0.0.1", "realtime": True})
+    with recorder_process(tmp_path / "runs", ring, "text", lambda: 0):
+        pass
+    ring.close()
 
 
 def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

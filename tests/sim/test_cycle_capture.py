@@ -197,3 +197,17 @@ def test_a_count_that_begins_again_at_the_number_of_an_early_state_is_recorded(b
     at = np.flatnonzero(rows["played"])
     assert (rows["age"][at] < 20).all()
     assert recorded(rows) == bench.sent
+
+
+def test_a_client_that_counts_ahead_leaves_the_row_of_a_lost_command_empty(bench: Bench) -> None:
+    """It sends one command for every state, four of them late and at once, and number 60 is lost."""
+    bench.cycles(3)
+    for number in range(10_000_000, 10_000_100):
+        if number != 10_000_060:
+            bench.send(number)
+        bench.cycles(number >= 10_000_003)
+    bench.cycles(10)
+    rows = bench.rows()
+    assert recorded(rows) == bench.sent
+    answered = np.flatnonzero(np.isfinite(rows["command"]).all(axis=1))
+    assert np.diff(answered).tolist() == [1] * 59 + [2] + [1] * 38

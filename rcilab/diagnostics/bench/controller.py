@@ -15,6 +15,7 @@ from rcilab.control_process.launch import VirtualController, start_controller
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import DeadlineError
+from rcilab.core.fault import name_faults
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.diagnostics.bench.compute import motion_of
@@ -25,6 +26,7 @@ from rcilab.makers.driver import parse_address
 from rcilab.makers.rokae import wire as rci
 from rcilab.makers.rokae.controller.rci_controller import RciController
 from rcilab.model.robot_model import RobotModel, load_model
+from rcilab.realtime.scheduling import realtime_section
 from rcilab.sim.controller_config import PLANT_KINDS, PlantKind
 from rcilab.sim.plants import build_plant
 from rcilab.sim.virtual_arm import VirtualArm
@@ -93,8 +95,10 @@ def bench_state_period(seconds: float = 10.0) -> Measurement:
     return measure_period("state_period", start_controller(_ROBOT), seconds)[0]
 
 
-def measure_period(name: str, controller: VirtualController, seconds: float) -> tuple[Measurement, int]:
+def measure_period(name: str, controller: VirtualController, seconds: float) -> tuple[Measurement, int | None]:
     """Returns the row of `bench_state_period` for a controller and the number of late cycles; ends the controller.
+
+    The number is None if the motion was stopped by a fault. The client has the priority of one that controls an arm.
 
     Args:
         name: Name of the row.
@@ -105,8 +109,8 @@ def measure_period(name: str, controller: VirtualController, seconds: float) -> 
     try:
         assert controller.address is not None
         address = parse_address(controller.address)
-        with CpuStallMonitor() as stalls:
-            stamps, is_faulty = _stream(address.host, address.port, commands, round(seconds / CYCLE_TIME))
+        with CpuStallMonitor() as stalls, realtime_section():
+            stamps, faults = _stream(address.host, address.port, commands, round(seconds / CYCLE_TIME))
     finally:
         controller.end()
     deviation = np.abs(np.diff(stamps) - CYCLE_TIME)
@@ -124,10 +128,10 @@ def measure_period(name: str, controller: VirtualController, seconds: float) -> 
     )
     if not has_fifo:
         note += "; SCHED_FIFO NOT PERMITTED, so there is no target"
-    if is_faulty:
-        note += "; THE MOTION WAS STOPPED BY A FAULT"
-    ok = p999 <= _JITTER_TARGET and not is_faulty if has_fifo else None
-    return replace(found, note=note, ok=ok), late
+    if faults:
+        note += f"; THE MOTION WAS STOPPED BY {faults}"
+    ok = p999 <= _JITTER_TARGET and not faults if has_fifo else None
+    return replace(found, note=note, ok=ok), None if faults else late
 
 
 def bench_lockstep() -> Measurement:
@@ -140,12 +144,12 @@ def bench_lockstep() -> Measurement:
         try:
             assert controller.address is not None
             address = parse_address(controller.address)
-            stamps, is_faulty = _stream(address.host, address.port, commands, round(_DURATION / CYCLE_TIME))
+            stamps, faults = _stream(address.host, address.port, commands, round(_DURATION / CYCLE_TIME))
         finally:
             controller.end()
         rates.append(summarise_rate("lockstep", np.diff(stamps[::_SPAN]) / _SPAN, _RATE_TARGET))
-        if is_faulty:
-            return replace(rates[-1], ok=False, note="THE MOTION WAS STOPPED BY A FAULT")
+        if faults:
+            return replace(rates[-1], ok=False, note=f"THE MOTION WAS STOPPED BY {faults}")
     found, other = rates
     return replace(
         found,
@@ -210,8 +214,8 @@ def _times(cycle: RciController, command: Callable[[int, int], bytes | None], co
     return times
 
 
-def _stream(host: str, port: int, command: Command, count: int) -> tuple[Array, bool]:
-    """Runs a motion with a minimal client; returns the arrival times of the states, [s], and whether one had faults."""
+def _stream(host: str, port: int, command: Command, count: int) -> tuple[Array, str]:
+    """Runs a motion with a minimal client; returns the arrival times of the states, [s], and the faults of the last."""
     with (
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
         socket.create_connection((host, port), timeout=_TIMEOUT) as tcp,
@@ -233,7 +237,7 @@ def _stream(host: str, port: int, command: Command, count: int) -> tuple[Array, 
         for k in range(count):
             udp.sendto(command(state.message_id, k), (host, port))
             state, stamps[k] = _receive(udp)
-        return stamps + offset, bool(state.faults)
+        return stamps + offset, name_faults(state.faults)
 
 
 def _receive(udp: socket.socket) -> tuple[RobotState, float]:

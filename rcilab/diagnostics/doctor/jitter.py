@@ -59,7 +59,7 @@ def measure_jitter(seconds: float, progress: Callable[[float, float], None]) -> 
     rows: list[Array] = []
     worst = 0.0
     loop = subprocess.Popen(
-        [sys.executable, "-m", "rcilab.diagnostics.doctor.jitter", repr(seconds)],
+        [sys.executable, "-P", "-m", "rcilab.diagnostics.doctor.jitter", repr(seconds)],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
