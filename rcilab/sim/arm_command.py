@@ -26,3 +26,5 @@ class ArmCommand(NamedTuple):
     """Joint velocities, n numbers, [rad/s]."""
     twist: tuple[float, ...] = ()
     """Velocity of the tool, base axes, linear first, 6 numbers, [m/s, rad/s]."""
+    elbow_side: float = 0.0
+    """Side of the elbow, +1 or -1, where the maker defines one; 0: not commanded."""

@@ -21,6 +21,8 @@ class ArmCondition(Enum):
     """Not a fault by itself, unless the maker has its own tolerance: it explains the limits that the jump violates."""
     START_ARM_ANGLE = "a motion begins near the reference's arm angle"
     """As START_TOLERANCE."""
+    ELBOW_SIDE = "the elbow stays on the side of the start"
+    """For arms whose maker defines an elbow flip."""
     COMMANDS_ARRIVE = "few commands in a row are lost, and the motion can continue without them"
     NO_COLLISION = "external joint torques stay below the collision thresholds"
 

@@ -168,6 +168,11 @@ class VirtualArm:
         return self.commanded.is_stationary and (self._cycles_at_rest > SETTLE_LIMIT or self._is_slow())
 
     @property
+    def has_stopped(self) -> bool:
+        """Whether its reference is stationary and the joints are on their servos, which may still settle."""
+        return self.commanded.is_stationary and not self._law.is_compliant
+
+    @property
     def can_engage_brakes(self) -> bool:
         """Whether the arm is stationary at its reference; never while it is compliant."""
         may_rest = self.commanded.is_stationary and not self._law.is_compliant

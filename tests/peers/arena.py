@@ -42,7 +42,7 @@ class Arena:
         self.plant = plant if wrap_plant is None else wrap_plant(plant)
         self.server = build_virtual_controller(config, plant=self.plant, log=self.entries.append)
         self.cycle: RciController = self.server.controller
-        self.host, port = re.match(r"rci://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
+        self.host, port = re.match(r"\w+://([\d.]+):(\d+)", self.server.url).groups()  # type: ignore[union-attr]
         self.port = int(port)
         self._actions: deque[Callable[[RciController], object]] = deque()
         self._step = self.cycle.step
@@ -88,7 +88,7 @@ class Process:
             )
         assert self.process.stdout is not None
         line = self.process.stdout.readline()
-        found = re.match(r"listening rci://([\d.]+):(\d+) ", line)
+        found = re.match(r"listening \w+://([\d.]+):(\d+)", line)
         assert found, f"instead of listening the controller said {line!r}"
         self.host, self.port = found[1], int(found[2])
         self.world_port = int(self.process.stdout.readline().rpartition(":")[2])

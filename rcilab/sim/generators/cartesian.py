@@ -72,7 +72,7 @@ class CartesianGenerator:
             error = find_frame_error(command.T_base_tool)
             if error is not None:
                 return invalid_pose(Remark(error, "no_pose"))
-            violation = find_arm_angle_error(command) if self._reference.has_psi else None
+            violation = self._reference.find_elbow_error(command)
             if violation is not None:
                 return GeneratorOutput(violations=(violation,))
             values = self._read(command)

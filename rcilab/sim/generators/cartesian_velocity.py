@@ -20,7 +20,7 @@ from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
 from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles
 from rcilab.sim.generators.motion_limits import MotionLimits
-from rcilab.sim.generators.pose_reference import PoseReference, find_arm_angle_error, invalid_pose
+from rcilab.sim.generators.pose_reference import PoseReference, invalid_pose
 from rcilab.sim.generators.rate_extrapolator import RateExtrapolator
 from rcilab.sim.jitter_buffer import Playback
 
@@ -53,7 +53,7 @@ class CartesianVelocityGenerator:
         """Processes the twist of this cycle, or bridges a cycle without one."""
         command = playback.command
         cycles = self._gap.step(playback._replace(skipped=0))  # A skipped velocity has moved nothing.
-        if command is not None and self._reference.has_psi and (violation := find_arm_angle_error(command)):
+        if command is not None and (violation := self._reference.find_elbow_error(command)):
             return GeneratorOutput(violations=(violation,))
         twist = self._stream.step(None if command is None else command.twist, playback.steps)
         if not isfinite(sum(twist)):

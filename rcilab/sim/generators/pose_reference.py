@@ -34,6 +34,10 @@ def find_arm_angle_error(command: ArmCommand) -> ArmViolation | None:
     return ArmViolation(ArmCondition.ARM_ANGLE_RANGE, remark)
 
 
+def _flipped(sentence: str) -> ArmViolation:
+    return ArmViolation(ArmCondition.ELBOW_SIDE, Remark(sentence, "elbow_side"))
+
+
 class PoseReference:
     """Checks commanded poses and arm angles and returns their joint angles, on the present branch.
 
@@ -56,12 +60,23 @@ class PoseReference:
         self.has_psi = bool(model.redundancy)
         self.pose = model.forward(q)
         self.psi = model.arm_angle(q) if self.has_psi else 0.0
+        self._side = self._find_side(q)
         self._jump: ArmViolation | None = None
         self._tracker = IkTracker(model)
         self._monitor = self._monitor_from(self.pose, self.psi)
         self._start: StartMonitor[CartesianMonitor] | None = None
         self._joints = JointReference(bounds, q, checks_box=False)
         self._joints_have_begun = False
+
+    def find_elbow_error(self, command: ArmCommand) -> ArmViolation | None:
+        """Returns the violation of a commanded elbow, angle or side, or None."""
+        if not self.has_psi:
+            return None
+        violation = find_arm_angle_error(command)
+        if violation is None and command.elbow_side != 0.0 and command.elbow_side != self._side:
+            sides = f"{command.elbow_side:g}, and the arm began on side {self._side:+d}"
+            return _flipped(f"elbow: the commanded side is {sides}")
+        return violation
 
     def begin(self, pose: Pose, psi: float) -> bool:
         """Processes the first command, before `step`; returns whether the motion starts there, at standstill.
@@ -115,6 +130,8 @@ class PoseReference:
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a bridged pose: {error}", "no_angles"))
             return invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
+        if cycles > 0 and self._find_side(q) != self._side:
+            return GeneratorOutput(violations=(_flipped("elbow: the commanded pose flips it to the other side"),))
         if not self._joints_have_begun:
             self._joints_have_begun = True
             self._joints.begin(q, is_checked=True)
@@ -135,6 +152,11 @@ class PoseReference:
     def settle(self) -> GeneratorOutput | None:
         """Continues the response to a pause after the last command; None without one."""
         return self._joints.settle()
+
+    def _find_side(self, q: Sequence[float]) -> int:
+        """Returns the side of the elbow, +1 or -1, or 0 where the maker defines no flip."""
+        model = self._bounds.model
+        return 0 if model.description.elbow_flip is None else model.elbow(q)[1]
 
     def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
         bounds = self._bounds

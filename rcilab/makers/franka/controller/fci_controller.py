@@ -29,14 +29,15 @@ from rcilab.makers.franka.controller.phases import (
     STOP_STATUSES,
     Phase,
 )
+from rcilab.makers.franka.controller.pose_deviation import PoseDeviations, find_deviation
 from rcilab.makers.franka.controller.reporter import StateReporter
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
 from rcilab.makers.franka.wire.command_packet import CommandPacket
-from rcilab.makers.franka.wire.requests import Move, Request
-from rcilab.makers.franka.wire.state_packet import NO_ERRORS, StatePacket, flags_of
-from rcilab.makers.franka.wire.versions import FciVersion, Status
+from rcilab.makers.franka.wire.requests import Move, Numbers, Request
+from rcilab.makers.franka.wire.state_packet import NO_ERRORS, NO_READINGS, StatePacket, flags_of
+from rcilab.makers.franka.wire.versions import FciVersion, MoveGenerator, Status
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
@@ -102,6 +103,8 @@ class FciController:
         assert conditions is not None  # Every Franka arm has them.
         self._table = conditions()
         self._motion: MotionKind | None = None
+        self._deviations = PoseDeviations()
+        self._final: Status | None = None  # Outcome of a motion whose commands have ended, once the arm has stopped.
         self._countdown = 0
         self._shown_cycles = 0  # Since Move.
         self._limit_table = DEFAULT_TABLE
@@ -171,7 +174,7 @@ class FciController:
         return StatePacket(
             self._message_id,
             reporter.numbers,
-            reporter.accelerometers,
+            reporter.accelerometers if self.version.has_floats else NO_READINGS,
             generator,
             controller,
             errors,
@@ -239,7 +242,8 @@ class FciController:
             return
         self.button = button
         if button == "none":
-            self._enter(Phase.IDLE if not self.faults else Phase.REFLEX)
+            free = Phase.IDLE if self.arm.has_stopped else Phase.STOPPING
+            self._enter(Phase.REFLEX if self.faults else free)
             return
         self.reason = _USER_STOP
         self._end(Status.EMERGENCY_ABORTED)
@@ -258,12 +262,14 @@ class FciController:
         if refusal is not None:
             return refusal
         motion = motion_of(request, self.version, self.settings)
-        if motion is None:
+        deviations = PoseDeviations.of(request)
+        if motion is None or not deviations.are_valid:
             return Status.INVALID_ARGUMENT
         if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
         self._shown_cycles = 0
+        self._deviations, self._final = deviations, None
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
@@ -301,6 +307,8 @@ class FciController:
         """Applies a setter; returns the status of the answer, and why it is refused."""
         if self.phase not in SETTABLE:
             return Status.NOT_POSSIBLE, f"not possible in phase {self.phase_name}"
+        if not self.arm.has_stopped:
+            return Status.NOT_POSSIBLE, "not possible while the arm stops"
         try:
             settings = apply_request(self.settings, request)
         except InvalidValueError as error:
@@ -313,8 +321,9 @@ class FciController:
         was_moving = self.phase is Phase.MOVING
         if was_moving:
             self._end(Status.ABORTED)
+            self._motion = None
             self._enter(Phase.STOPPING)
-        self.outcome = None
+        self.outcome = self._final = None
         return was_moving
 
     def step(self, *, is_sent: bool = True) -> RobotState:
@@ -325,21 +334,45 @@ class FciController:
         violations = command_violations or measured_violations
         if violations:
             self._raise(violations)
-        elif self.phase is Phase.MOVING and self.playout.is_finished and self.arm.is_standstill:
-            self.outcome = Status.SUCCESS
-            self.arm.discard_motion()
-            self._enter(Phase.IDLE)
-        elif self.phase is Phase.STOPPING and self.arm.is_standstill:
+        elif self.phase is Phase.MOVING and self.playout.is_finished and self.arm.commanded.is_stationary:
+            self._finish()
+        if self.phase is Phase.STOPPING and self.arm.has_stopped:
+            self.outcome, self._final = self._final or self.outcome, None
             self._enter(Phase.IDLE)
         elif self.phase is Phase.RECOVERING:
             self._recover()
         self.state = self._report()
+        self._check_deviation()
         self._check_reflex()
         return self.state
 
+    def _finish(self) -> None:
+        """Ends a motion after its last command; a compliant arm then stops where it is."""
+        self.arm.discard_motion()
+        if self._exceeds(self._deviations.goal):
+            self._set_errors((FrankaError.MAX_GOAL_POSE_DEVIATION_VIOLATION,))
+            return
+        self._final = Status.SUCCESS
+        self._enter(Phase.STOPPING)
+
+    def _exceeds(self, bounds: Numbers) -> bool:
+        """Returns whether the tool of a commanded motion is farther from it than these bounds of Move, and says so."""
+        motion = self._motion
+        if motion is None or motion.mode.law is ControlLaw.TORQUE:
+            return False
+        excess = find_deviation(self.arm.signals, bounds)
+        if excess is not None:
+            self.reason = excess
+        return excess is not None
+
+    def _check_deviation(self) -> None:
+        if self.phase is Phase.MOVING and self._exceeds(self._deviations.path):
+            self._set_errors((FrankaError.MAX_PATH_POSE_DEVIATION_VIOLATION,))
+            self.state = self._report()
+
     def _recover(self) -> None:
         self._countdown -= 1
-        if self._countdown <= 0 and self.arm.commanded.is_stationary:
+        if self._countdown <= 0 and self.arm.has_stopped:
             self.faults = ()
             self._reporter.reset_collisions()
             self._enter(Phase.IDLE)
@@ -375,14 +408,14 @@ class FciController:
         before, self.phase = self.phase, phase
         if phase not in IN_MOTION:
             self._motion = None
-        self.arm.is_monitored = phase in IN_MOTION
+        self.arm.is_monitored = self._motion is not None
         self.arm.resting_law = ControlLaw.BRAKED if phase in _BRAKED else ControlLaw.POSITION
         self.on_phase(before, phase)
 
     @property
     def _shown(self) -> tuple[int, int]:
-        """Controller and motion generator as in the state."""
-        if self.phase is not Phase.MOVING or self._motion is None:
+        """Controller and motion generator as in the state: a client waits until they are gone before the next Move."""
+        if self.phase not in IN_MOTION or self._motion is None:
             return _NO_CONTROLLER, _NO_GENERATOR
         return self._motion.controller, self._motion.generator + 1
 
@@ -407,15 +440,17 @@ class FciController:
 def _as_command(packet: CommandPacket, motion: MotionKind, version: FciVersion) -> ArmCommand:
     m = packet.O_T_EE_c
     rows = tuple(m[column * 4 + row] for row in range(4) for column in range(4))
-    is_torque = motion.mode.law is ControlLaw.TORQUE
+    is_alone = motion.generator is MoveGenerator.NONE and version.finishes_torques
+    angle, side = packet.elbow_c
     return ArmCommand(
         packet.message_id,
         packet.q_c,
         rows,
         packet.has_elbow,
-        packet.elbow_c[0],
-        packet.has_ended_torques if is_torque else packet.is_finished,
+        angle,
+        packet.has_ended_torques if is_alone else packet.is_finished,
         packet.tau_c,
         packet.dq_c,
         packet.O_dP_EE_c,
+        side if packet.has_elbow else 0.0,
     )

@@ -13,10 +13,11 @@ from rcilab.makers.franka.bounds import CLIENT_PORT
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.hand_server import HAND_PORT, HandServer
 from rcilab.makers.franka.controller.model_library import build_model_library, runs_here
-from rcilab.makers.franka.controller.phases import IN_MOTION, Phase
+from rcilab.makers.franka.controller.phases import Phase
 from rcilab.makers.franka.controller.robot_model import build_robot_model
 from rcilab.makers.franka.wire.command_packet import decode_command
 from rcilab.makers.franka.wire.frame import (
+    NO_WALL,
     FrameReader,
     decode_header,
     decode_request,
@@ -42,6 +43,7 @@ from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.virtual_arm import VirtualArm
 
 _PROTOCOL = "FCI"
+_RECOVERY_ENDS = {Phase.IDLE: Status.SUCCESS, Phase.USER_STOPPED: Status.EMERGENCY_ABORTED}
 _VERSIONS = {"Panda": VERSION_5, "FR3": VERSION_10}
 """The version of each arm's controller."""
 
@@ -181,8 +183,8 @@ class FciServer:
             self._answer(kind, command_id, outcome)
         if self._recovery is not None and self.controller.phase is not Phase.RECOVERING:
             command_id, self._recovery = self._recovery, None
-            is_done = self.controller.phase is Phase.IDLE
-            self._answer(AutomaticErrorRecovery, command_id, Status.SUCCESS if is_done else Status.ABORTED)
+            status = _RECOVERY_ENDS.get(self.controller.phase, Status.ABORTED)
+            self._answer(AutomaticErrorRecovery, command_id, status)
 
     def begin_shutdown(self) -> int:
         """Ends a motion in progress; returns for how many cycles states are still sent."""
@@ -223,7 +225,7 @@ class FciServer:
             case LoadModelLibrary(architecture=architecture, system=system):
                 self._send_library(command_id, architecture, system)
             case GetCartesianLimit():
-                self._answer(kind, command_id, Status.NOT_POSSIBLE, "no virtual walls are set")
+                self._answer(kind, command_id, Status.SUCCESS, content=NO_WALL)
             case _ if kind in SETTERS:
                 status, why = controller.set(request)
                 self._answer(kind, command_id, status, why)
@@ -252,6 +254,6 @@ class FciServer:
         playout = self.controller.playout
         if after is Phase.MOVING:
             self._link.log("motion_started", "motion started")
-        elif before in IN_MOTION and after not in IN_MOTION:
+        elif before is Phase.MOVING:
             text = f"motion ended after {playout.cycles} cycles: {playout.lost} commands lost, {playout.late} late"
             self._link.log("motion_ended", text, cycles=playout.cycles, lost=playout.lost, late=playout.late)

@@ -3,17 +3,20 @@
 Desired values (`_d`) are those of the reference, which the controller follows; commanded ones (`_c`) are the same: no
 filter lies between them that this arm would not follow. While torques move the arm, both are the measured ones.
 
-* The elbow is the angle of joint 3, and +1 where joint 4 is above the angle at which the arm is stretched, else -1.
+* The elbow is the angle of joint 3, and +1 where joint 4 is above the angle at which the arm is stretched, -1 below.
 * External torques and forces have the sign of libfranka's robot_state.h: those that the arm exerts on its environment
   are positive. The wrench is at the origin of the stiffness frame K, in axes of the base (`O_F_ext_hat_K`) or of K
   (`K_F_ext_hat_K`). In rcilab's own state they are those that the environment exerts on the arm.
 * A contact disappears with its force, a collision with the error recovery.
 * The drives have no elasticity: theta is q, dtheta is dq.
 * tau_J has gravity; tau_J_d and commanded torques have not: the controller compensates it.
-* The acceleration sensors read a stationary arm's: the reaction to gravity, in the axes of their link.
+* The acceleration sensors, two at each joint but the last, read those of a stationary arm: the reaction to gravity, in
+  the axes of Craig's frame of the joint.
 """
 
 from __future__ import annotations
+
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +28,8 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
-from rcilab.makers.franka.wire.state_packet import ACCELEROMETERS, NUMBERS, PLACES
+from rcilab.makers.franka.robots.arm import CRAIG
+from rcilab.makers.franka.wire.state_packet import NUMBERS, PLACES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.contact_detector import ContactDetector, Contacts
@@ -34,6 +38,7 @@ from rcilab.sim.wrench import wrench_at, wrench_in
 
 GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
+_SENSED_JOINTS = 6
 
 
 class StateReporter:
@@ -41,7 +46,6 @@ class StateReporter:
 
     Attributes:
         numbers: Those of the last state's datagram, see `FIELDS`, shape (284,).
-        accelerometers: Shape (36,), [m/s^2].
 
     Args:
         model: The arm with its tool and load.
@@ -53,7 +57,6 @@ class StateReporter:
         assert flip is not None  # Every Franka arm has one.
         self._flip = flip
         self.numbers: NDArray[np.float64] = np.zeros(NUMBERS)
-        self.accelerometers: NDArray[np.float64] = np.zeros(ACCELEROMETERS)
         self._zeros = readonly_copy(np.zeros(model.n))
         self._zeros6 = readonly_copy(np.zeros(6))
         self._tau_d = self._zeros
@@ -140,6 +143,20 @@ class StateReporter:
         present = self._contacts.present
         return any(present.joint_collision), any(present.cartesian_collision)
 
+    @property
+    def accelerometers(self) -> NDArray[np.float64]:
+        """Readings of the acceleration sensors, top then bottom, 6 joints with 3 axes each, shape (36,), [m/s^2]."""
+        assert self._signals is not None  # `report` has set it.
+        x, y, z = 0.0, 0.0, GRAVITY
+        readings: list[float] = []
+        for q, row in zip(self._signals.measured.q.tolist(), CRAIG[:_SENSED_JOINTS], strict=False):
+            c, s = cos(row.alpha), sin(row.alpha)
+            y, z = c * y + s * z, c * z - s * y
+            c, s = cos(q), sin(q)
+            x, y = c * x + s * y, c * y - s * x
+            readings += (x, y, z)
+        return np.array(readings * 2)
+
     def reset_collisions(self) -> None:
         """Clears the flags of collisions, as an error recovery does."""
         self._contacts.reset()
@@ -184,7 +201,7 @@ class StateReporter:
         return at_K, wrench_in(at_K, T_base_K.parts[0])
 
     def _side(self, q4: float) -> float:
-        return 1.0 if q4 > self._flip else -1.0
+        return float(np.sign(q4 - self._flip))
 
 
 def columns_of(pose: Pose) -> tuple[float, ...]:

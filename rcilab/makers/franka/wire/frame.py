@@ -11,6 +11,8 @@ from rcilab.makers.franka.wire.versions import FciVersion, Status
 
 _HEADER = Struct("<III")
 HEADER_SIZE = _HEADER.size
+NO_WALL = Struct("<3d16d?").pack(*(0.0,) * 3, *(float(k % 5 == 0) for k in range(16)), False)
+"""Content of the answer to GetCartesianLimit without a wall: its size, its frame (column-major), whether it acts."""
 LARGEST_REQUEST = 1024
 """Size of a request that ends the connection, in bytes: the largest one of the interface has 428."""
 

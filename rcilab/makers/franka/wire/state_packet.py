@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rcilab.core.arrays import readonly_copy
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.versions import FciVersion
 
@@ -71,6 +72,7 @@ _ID = Struct("<Q")
 _DOUBLES = Struct("<BB41s41sBd")
 _FLOATS = Struct("<BB41s41sBf")
 NO_ERRORS = bytes(len(FrankaError))
+NO_READINGS = readonly_copy(np.zeros(ACCELEROMETERS))
 
 
 class StatePacket(NamedTuple):
