@@ -21,7 +21,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from rcilab.core.arrays import Array, make_readonly, readonly_copy
+from rcilab.core.arrays import Array, JointVector, make_readonly, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Pose
@@ -33,6 +33,7 @@ from rcilab.makers.franka.wire.state_packet import NUMBERS, PLACES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.contact_detector import ContactDetector, Contacts
+from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.virtual_arm import CycleSignals
 from rcilab.sim.wrench import wrench_at, wrench_in
 
@@ -101,7 +102,7 @@ class StateReporter:
         dtau = (tau_d - self._tau_d) / CYCLE_TIME if self._signals is not None else self._zeros
         self._tau_d = tau_d
         rates = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
-        self._write(signals, rates, tau_d)
+        self._write(signals, rates)
         self._signals = signals
         return build_state(
             (
@@ -161,8 +162,8 @@ class StateReporter:
         """Clears the flags of collisions, as an error recovery does."""
         self._contacts.reset()
 
-    def _write(self, signals: CycleSignals, rates: Array, tau_d: Array) -> None:
-        commanded, tool_c, measured, tool, _, tau_ext, wrench = signals
+    def _write(self, signals: CycleSignals, rates: Array) -> None:
+        commanded, tool_c, measured, tool, tau_c, tau_ext, wrench = signals
         q_c, dq_c, ddq_c = commanded.arrays
         numbers, place = self.numbers, PLACES
         last = self._signals
@@ -174,7 +175,7 @@ class StateReporter:
         numbers[place["delbow_c"]] = tool_c.dpsi, 0.0
         numbers[place["ddelbow_c"]] = tool_c.ddpsi, 0.0
         numbers[place["tau_J"]] = measured.tau
-        numbers[place["tau_J_d"]] = tau_d
+        numbers[place["tau_J_d"]] = self._torque_without_gravity(commanded) if tau_c is None else tau_c
         numbers[place["dtau_J"]] = 0.0 if last is None else (measured.tau - last.measured.tau) / CYCLE_TIME
         numbers[place["q"]] = numbers[place["theta"]] = measured.q
         numbers[place["dq"]] = numbers[place["dtheta"]] = measured.dq
@@ -191,6 +192,9 @@ class StateReporter:
         contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
         for name, flags in zip(Contacts._fields, contacts.shown, strict=True):
             numbers[place[name]] = flags
+
+    def _torque_without_gravity(self, commanded: ReferenceTrajectory) -> JointVector:
+        return self._zeros if commanded.is_stationary else self._model.rigid_body.motion_torque(*commanded.arrays)
 
     def _at_stiffness_frame(self, T_base_tool: Pose, wrench: Array) -> tuple[Array, Array]:
         """Returns a wrench on the end effector (base axes, its origin) at the origin of K, in base and in K axes."""

@@ -8,7 +8,7 @@ import pytest
 
 from tests.peers.franka.arena import FciArena, fci_arena
 from tests.peers.franka.robot import Robot
-from tests.peers.franka.wire import ROBOT_IDLE
+from tests.peers.franka.wire import ROBOT_IDLE, ROBOT_MOVE
 
 
 @pytest.fixture(scope="module", params=[5, 10], ids=["v5", "v10"])
@@ -30,6 +30,8 @@ def ready(place: FciArena) -> Iterator[Robot]:
     controller = place.controller
     place.simulate("push", wrench=[0.0] * 6, rise_time=0.0)
     with place.connect() as robot:
+        place.simulate("press", button="none")
+        robot.state_when(lambda state: state.robot_mode != ROBOT_MOVE)
         assert robot.ask("automatic_error_recovery").status == "success"
         robot.state_when(lambda state: state.robot_mode == ROBOT_IDLE and not state.errors)
         place.between(lambda: controller._configure(type(controller.settings).of_arm(controller.model.description)))
