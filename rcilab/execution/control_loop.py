@@ -494,9 +494,13 @@ class ControlLoop:
 
     def _ended_error(self, state: RobotState) -> ControlError:
         self._log.write(state, self._driver.received_ns, self._time(state))
+        record = self._log.recorder.last(RECORD_CYCLES)
+        pressed = self._driver.find_safety_stop(state)
+        if pressed is not None:
+            sentence = f"the controller stopped the motion at t = {self._time(state):.3f} s: {pressed.sentence}"
+            return ControlError(sentence, (), record).coded("safety_stop", status=pressed.code)
         if not self._has_power():
             return self._power_off_error()
-        record = self._log.recorder.last(RECORD_CYCLES)
         mode = state.robot_mode.name.lower().replace("_", " ")
         return ControlError(
             f"the controller ended the motion by itself at t = {self._time(state):.3f} s without naming a fault "

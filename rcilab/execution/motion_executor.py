@@ -8,6 +8,7 @@ has it (4.3):
 
     tau = M (ddq_d + 2 D w (dq_d - dq) + w^2 (q_d - q)) + C dq
 
+For an arm with rotors and damping in its description M has the rotors, and the damping times dq_d is added.
 w = `TORQUE_FREQUENCY` and D = `TORQUE_DAMPING` are the same for every joint and deliberately small. This loop closes
 over the network: with the jitter buffer of the virtual controller a torque acts about 45 ms after the state that it
 answers, and a bandwidth much above 10 rad/s cannot be damped with that delay. The arm is compliant.
@@ -264,11 +265,17 @@ def _torques(model: RobotModel) -> Commander:
     stiffness, damping = TORQUE_FREQUENCY**2, 2.0 * TORQUE_DAMPING * TORQUE_FREQUENCY
     largest = TORQUE_SHARE * model.limits.joint.torque
     motion_torque = model.rigid_body.motion_torque
+    rotors, friction = model.description.rotor_inertia, model.description.damping
 
     def command(rows: JointPath, k: int, state: RobotState) -> Command:
         q, dq, ddq = _reference(rows, k)
         ddq = ddq + damping * (dq - state.dq) + stiffness * (q - state.q)
-        return JointTorque(np.clip(motion_torque(state.q, state.dq, ddq), -largest, largest))
+        tau = motion_torque(state.q, state.dq, ddq)
+        if rotors is not None:
+            tau = tau + rotors * ddq
+        if friction is not None:
+            tau = tau + friction * dq
+        return JointTorque(np.clip(tau, -largest, largest))
 
     return command
 

@@ -41,6 +41,7 @@ _GENERATORS = {
     ControllerMode.CARTESIAN_IMPEDANCE: MotionGeneratorMode.CARTESIAN_POSITION,
     ControllerMode.TORQUE: MotionGeneratorMode.IDLE,
 }
+_FRESH = 0.1  # [s] For a state that is sent after a call.
 _IDLE = ControllerMode.OTHER, MotionGeneratorMode.IDLE
 _UNPOWERED = (RobotMode.USER_STOPPED, RobotMode.OTHER)
 
@@ -133,6 +134,8 @@ class FciDriver:
                 "press the user stop, or lock the joints in Desk",
                 reason="no_power_off",
             )
+        for timeout in (0.0, _FRESH):  # The newest state may be from before the user stop was released.
+            self.on_states(self.poll(timeout))
         if not self.is_powered():
             reason = find_reason(self._client)
             assert reason is not None  # Both modes have one.

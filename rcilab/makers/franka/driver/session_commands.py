@@ -48,7 +48,6 @@ class FciSessionCommands(FciSettings):
         """Sets the end effector in the nominal end-effector frame; the session's `model` has it from then on."""
         with self._lock.acquire("setEE"):
             super().set_ee(NE_T_EE)
-            self._await_state()
             self._arm.model = self._arm.model.with_tool(self.tool)
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:

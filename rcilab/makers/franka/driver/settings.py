@@ -96,6 +96,7 @@ class FciSettings:
         """Sets the end effector in the nominal end-effector frame that is set in Desk, at most 2 m away."""
         with self._request("setEE"):
             self._client.set_ee(columns_of(_near_pose("NE_T_EE", NE_T_EE).matrix))
+        self._await_state()
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:
         """Sets the load, in addition to the end effector that is set in Desk.
@@ -108,6 +109,7 @@ class FciSettings:
         load = as_load(mass, center_of_mass, inertia)
         with self._request("setLoad"):
             self._client.robot.set_load(load.mass, load.center_of_mass.tolist(), load.inertia.ravel().tolist())
+        self._await_state()
 
     def automatic_error_recovery(self) -> None:
         """Clears the errors and returns once they are gone."""
@@ -127,7 +129,6 @@ class FciSettings:
         """Sets the end effector by its pose in the flange frame."""
         tool = _near_pose("T_flange_tool", T_flange_tool)
         self.set_ee(self._nominal_frame().inverse() @ tool)
-        self._await_state()
 
     @property
     def tool(self) -> Pose:
@@ -152,7 +153,6 @@ class FciSettings:
         if columns is not None:
             return pose_of(columns)
         self.set_ee(IDENTITY)  # panda-python does not report it: the end effector is there now.
-        self._await_state()
         return self.tool
 
     def _await_state(self) -> None:
