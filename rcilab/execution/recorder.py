@@ -68,6 +68,7 @@ class CycleLog:
         command: Command | None = None,
         *,
         is_awaited: bool = True,
+        counts_gap: bool = True,
     ) -> None:
         """Records one state and its answer, if there was one.
 
@@ -78,13 +79,14 @@ class CycleLog:
             sent_ns: Monotonic time of the answer, [ns]; 0 without one.
             command: The command sent as answer.
             is_awaited: Whether the loop waited for it; the lateness of a state that was already queued is unknown.
+            counts_gap: Whether the numbers between the last state and this one are those of lost states.
         """
         before, self.state = self.state, state
         number = state.message_id
         lost = 0
         if self._last_id is None or number < self._last_id:
             self._origins.clear()
-        elif number > self._last_id:
+        elif number > self._last_id and counts_gap:
             lost = max((number - self._last_id) // self._state_cycles - 1, 0)
             self.lost_total += lost
         self._last_id = number

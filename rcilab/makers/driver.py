@@ -164,6 +164,8 @@ class Driver(Protocol):
     """Whether poses can be sent with an arm angle; if not, the controller chooses it."""
     holds_arm_angle: bool
     """Whether the controller holds its arm angle while none is sent; if not, the joints move as little as possible."""
+    keeps_newest: bool
+    """Whether `poll` returns the newest state only, so that those that arrive between two calls are missing."""
     on_states: Callable[[list[RobotState]], None]
     """Called with the states that arrive while the answer to a request is awaited, at least every 0.05 s."""
     poll: Callable[[float], list[RobotState]]

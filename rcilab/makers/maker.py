@@ -157,32 +157,6 @@ class Maker(Protocol):
         ...
 
 
-class PlanningOnly:
-    """The base of a maker whose arms can be planned for, but neither simulated nor driven."""
-
-    client_port: int | None = None
-
-    def parameters(self, model: RobotModel) -> tuple[ParameterGroup, ...]:
-        """Returns no parameters: there is no controller."""
-        return ()
-
-    def scenarios(self) -> tuple[FaultScenario, ...]:
-        """Returns no scenarios: there is no virtual controller."""
-        return ()
-
-    def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
-        """Raises an error: there is no virtual controller."""
-        raise ModelError(f"{config.model} has no virtual controller")
-
-    def parse_address(self, text: str) -> RobotAddress:
-        """Raises an error: there is no driver."""
-        raise ModelError(f"{text} cannot be driven")
-
-    def open_driver(self, address: str, timeout: float, expected: ExpectedArm | None) -> StreamingDriver:
-        """Raises an error: there is no driver."""
-        raise ModelError(f"{address} cannot be driven")
-
-
 _FEATURE_NAMES: dict[Feature, str] = {
     "guiding": "hand guiding",
     "signals": "digital signals",

@@ -76,6 +76,7 @@ class FciDriver:
 
     scheme = "fci"
     holds_arm_angle = False
+    keeps_newest = True
 
     def __init__(self, client: FciClient, address: FciAddress, arm_name: str) -> None:
         self.name = str(address)
