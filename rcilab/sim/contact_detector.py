@@ -81,7 +81,10 @@ class ContactDetector:
 
     def configure(self, thresholds: ContactThresholds) -> None:
         """Sets other thresholds, and resets."""
-        self._thresholds = thresholds
+        self._thresholds = t = thresholds
+        torques = t.contact_torque, t.collision_torque, t.contact_torque_accelerating, t.collision_torque_accelerating
+        forces = t.contact_force, t.collision_force, t.contact_force_accelerating, t.collision_force_accelerating
+        self._lowest = min(map(min, torques)), min(map(min, forces))
         joints, axes = (False,) * len(thresholds.contact_torque), (False,) * len(thresholds.contact_force)
         self._none = self.present = self.shown = Contacts(joints, axes, joints, axes)
 
@@ -91,8 +94,13 @@ class ContactDetector:
 
     def step(self, tau_ext: Sequence[float], wrench: Sequence[float], *, is_accelerating: bool) -> None:
         """Processes the external torques and forces of this cycle; see `find_contacts`."""
-        self.present = now = find_contacts(self._thresholds, tau_ext, wrench, is_accelerating=is_accelerating)
+        if max(map(abs, tau_ext)) <= self._lowest[0] and max(map(abs, wrench)) <= self._lowest[1]:
+            self.present = now = self._none
+        else:
+            self.present = now = find_contacts(self._thresholds, tau_ext, wrench, is_accelerating=is_accelerating)
         last = self.shown
+        if now is self._none is last:
+            return
         self.shown = Contacts(
             now.joint_contact,
             now.cartesian_contact,

@@ -74,10 +74,10 @@ class IkTracker:
         q = np.array(near)
         for number in range(_MOST_STEPS):
             J, error = self._differential(q, T_base_tool)
-            square = J @ J.T
+            square = J.dot(J.T)
             if number == 0 and np.linalg.det(square) < _SMALLEST:
                 raise SingularError("the tool cannot move in every direction there")
-            q = q + J.T @ np.linalg.solve(square, error)
+            q = q + J.T.dot(self._body.tool_solver.solve(square, error))
             if np.abs(error).max() < _CONVERGING:
                 return q.tolist()
         raise UnreachableError("no joint angles near the last ones put the tool there")

@@ -16,6 +16,7 @@ filter lies between them that this arm would not follow. While torques move the 
 
 from __future__ import annotations
 
+from itertools import chain
 from math import cos, sin
 
 import numpy as np
@@ -32,7 +33,7 @@ from rcilab.makers.franka.robots.arm import CRAIG
 from rcilab.makers.franka.wire.state_packet import NUMBERS, PLACES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.contact_detector import ContactDetector, Contacts
+from rcilab.sim.contact_detector import ContactDetector
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.virtual_arm import CycleSignals
 from rcilab.sim.wrench import wrench_at, wrench_in
@@ -40,6 +41,9 @@ from rcilab.sim.wrench import wrench_at, wrench_in
 GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
 _SENSED_JOINTS = 6
+_O_T_EE, _O_T_EE_D = PLACES["O_T_EE"], PLACES["O_T_EE_d"]
+_FROM_ELBOW = slice(PLACES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
+_ELBOWS, _FLAGS, _MOTION = slice(0, 4), slice(4, 30), slice(30, None)
 
 
 class StateReporter:
@@ -78,7 +82,6 @@ class StateReporter:
             numbers[PLACES[name]] = columns_of(pose)
         _write_body(numbers, "m_ee", "I_ee", "F_x_Cee", settings.end_effector)
         _write_body(numbers, "m_load", "I_load", "F_x_Cload", settings.client_load)
-        numbers[PLACES["O_ddP_O"]] = (0.0, 0.0, -GRAVITY)
         self._signals: CycleSignals | None = None
 
     def report(
@@ -165,33 +168,27 @@ class StateReporter:
     def _write(self, signals: CycleSignals, rates: Array) -> None:
         commanded, tool_c, measured, tool, tau_c, tau_ext, wrench = signals
         q_c, dq_c, ddq_c = commanded.arrays
-        numbers, place = self.numbers, PLACES
-        last = self._signals
-        numbers[place["O_T_EE"]] = tool.matrix.T.ravel()
-        numbers[place["O_T_EE_d"]] = numbers[place["O_T_EE_c"]] = tool_c.matrix.T.ravel()
-        numbers[place["elbow"]] = tool.psi, self._side(float(measured.q[_JOINT_4]))
-        elbow_d = tool_c.psi, self._side(float(q_c[_JOINT_4]))
-        numbers[place["elbow_d"]] = numbers[place["elbow_c"]] = elbow_d
-        numbers[place["delbow_c"]] = tool_c.dpsi, 0.0
-        numbers[place["ddelbow_c"]] = tool_c.ddpsi, 0.0
-        numbers[place["tau_J"]] = measured.tau
-        numbers[place["tau_J_d"]] = self._torque_without_gravity(commanded) if tau_c is None else tau_c
-        numbers[place["dtau_J"]] = 0.0 if last is None else (measured.tau - last.measured.tau) / CYCLE_TIME
-        numbers[place["q"]] = numbers[place["theta"]] = measured.q
-        numbers[place["dq"]] = numbers[place["dtheta"]] = measured.dq
-        numbers[place["q_d"]] = q_c
-        numbers[place["dq_d"]] = dq_c
-        numbers[place["ddq_d"]] = ddq_c
-        numbers[place["O_dP_EE_d"]] = numbers[place["O_dP_EE_c"]] = rates[:6]
-        numbers[place["O_ddP_EE_c"]] = rates[6:]
-        numbers[place["tau_ext_hat_filtered"]] = 0.0 - tau_ext  # Not -0.0 without any.
+        q, dq, tau, last = measured.q, measured.dq, measured.tau, self._signals
+        T_c = tool_c.matrix.T.ravel()
+        tau_d = self._torque_without_gravity(commanded) if tau_c is None else tau_c
         at_K, self._wrench_in_K = self._at_stiffness_frame(tool.pose, wrench)
-        numbers[place["O_F_ext_hat_K"]] = 0.0 - at_K
-        numbers[place["K_F_ext_hat_K"]] = 0.0 - self._wrench_in_K
-        contacts = self._contacts
-        contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
-        for name, flags in zip(Contacts._fields, contacts.shown, strict=True):
-            numbers[place[name]] = flags
+        self._contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
+        elbow_c = tool_c.psi, self._side(float(q_c[_JOINT_4]))
+        elbows = tool.psi, self._side(float(q[_JOINT_4])), *elbow_c
+        flags = chain.from_iterable(self._contacts.shown)
+        motion = (0.0, 0.0, -GRAVITY, *elbow_c, tool_c.dpsi, 0.0, tool_c.ddpsi, 0.0)
+        few = np.array((*elbows, *flags, *motion))
+        self.numbers[_O_T_EE] = tool.matrix.T.ravel()
+        self.numbers[_O_T_EE_D] = T_c
+        # External values have the other sign than in rcilab; a difference from 0.0 is not -0.0 without any.
+        np.concatenate(
+            (
+                few[_ELBOWS], tau, tau_d, self._zeros if last is None else (tau - last.measured.tau) / CYCLE_TIME,
+                q, q_c, dq, dq_c, ddq_c, few[_FLAGS], 0.0 - tau_ext, 0.0 - at_K, 0.0 - self._wrench_in_K,
+                rates[:6], few[_MOTION], T_c, rates, q, dq,
+            ),
+            out=self.numbers[_FROM_ELBOW],
+        )  # fmt: skip
 
     def _torque_without_gravity(self, commanded: ReferenceTrajectory) -> JointVector:
         return self._zeros if commanded.is_stationary else self._model.rigid_body.motion_torque(*commanded.arrays)
