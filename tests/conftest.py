@@ -15,6 +15,9 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from rcilab.makers.maker import Capabilities, maker_of
+from rcilab.model.robot_model import load_model
+
 _COMMON = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("rcilab", _COMMON, derandomize=True, database=None)
 settings.register_profile("explore", _COMMON, print_blob=True)  # `.ci/run`: a random seed, and failures remembered.
@@ -54,6 +57,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Puts the lanes first: they take longest (`--no-loadscope-reorder`)."""
     lanes = [*_LANES]
     items.sort(key=lambda item: lanes.index(group) if (group := group_of(item)) in _LANES else len(lanes))
+
+
+@pytest.fixture
+def only_planned(monkeypatch: pytest.MonkeyPatch) -> str:
+    """The name of an arm that can be planned for, checked and drawn only, as one of a maker without a controller."""
+    name = "Panda"
+    maker = maker_of(load_model(name))
+    assert maker is not None
+    monkeypatch.setattr(type(maker), "capabilities", Capabilities())
+    return name
 
 
 @pytest.fixture(scope="session", autouse=True)

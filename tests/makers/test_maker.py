@@ -14,6 +14,7 @@ import pytest
 import rcilab
 from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.text import Text
+from rcilab.control_process.supervisor import Supervisor
 from rcilab.core.errors import InvalidValueError, ModelError
 from rcilab.core.fault import FaultCode
 from rcilab.makers.driver import parse_address
@@ -28,8 +29,10 @@ from rcilab.makers.maker import (
     require_simulator,
     simulated_robots,
 )
+from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES, describe_robot
+from rcilab.sim.controller_config import ControllerConfig
 
 FEATURES = [name for part in get_args(Feature) for name in (get_args(part) or (part,))]
 MAKERS = pytest.mark.parametrize("maker", all_makers(), ids=lambda maker: maker.name)
@@ -61,16 +64,16 @@ def test_every_row_of_a_maker_raises_one_of_its_own_faults_or_none(maker: Maker)
 
 
 @pytest.mark.parametrize(
-    ("address", "model", "scheme"),
+    ("address", "model", "normal"),
     [
-        ("fci://robot", None, "fci"),
-        (" RCI://robot:1 ", None, "rci"),
-        ("robot", "Panda", "fci"),
-        ("robot", "xMate3", "rci"),
+        ("fci://10.0.0.1", None, "fci://10.0.0.1:1337"),
+        (" RCI://10.0.0.1:1 ", None, "rci://10.0.0.1:1"),
+        ("10.0.0.1", "Panda", "fci://10.0.0.1:1337"),
+        ("10.0.0.1", "xMate3", "rci://10.0.0.1:1337"),
     ],
 )
-def test_an_address_leads_to_the_maker_of_its_scheme_or_of_the_model(both_driven, address, model, scheme):
-    assert parse_address(address, None if model is None else load_model(model)) == f"{scheme} takes {address}"
+def test_an_address_leads_to_the_maker_of_its_scheme_or_of_the_model(address, model, normal):
+    assert str(parse_address(address, None if model is None else load_model(model))) == normal
 
 
 @pytest.mark.parametrize(
@@ -81,16 +84,9 @@ def test_an_address_leads_to_the_maker_of_its_scheme_or_of_the_model(both_driven
         ("robot", None, "has no scheme, needs fci:// or rci://"),
     ],
 )
-def test_an_address_of_no_maker_or_of_another_one_names_the_schemes(both_driven, address, model, problem):
+def test_an_address_of_no_maker_or_of_another_one_names_the_schemes(address, model, problem):
     with pytest.raises(InvalidValueError, match=problem):
         parse_address(address, None if model is None else load_model(model))
-
-
-@pytest.fixture
-def both_driven(monkeypatch: pytest.MonkeyPatch) -> None:
-    for maker in all_makers():
-        monkeypatch.setattr(type(maker), "capabilities", replace(maker.capabilities, drives=True))
-        monkeypatch.setattr(type(maker), "parse_address", lambda self, text: f"{self.scheme} takes {text}")
 
 
 @MAKERS
@@ -126,10 +122,18 @@ def test_every_feature_is_there_or_lacks_with_a_reason_in_both_languages(maker: 
         assert Text("en").render(said) != Text("zh").render(said)
 
 
-def test_an_arm_that_is_only_planned_says_what_can_be_done_with_it():
-    for refuse in (require_driver, require_simulator):
-        with pytest.raises(ModelError, match=r"Panda is driven by Franka's own interface.*drive one of .*xMatePro3"):
-            refuse(load_model("Panda"))
+def test_an_arm_that_is_only_planned_says_what_can_be_done_with_it(only_planned):
+    model, problem = load_model(only_planned), "Panda is driven by Franka's own interface.*drive one of .*xMatePro3"
+    for refuse in (
+        require_driver,
+        require_simulator,
+        rcilab.simulate,
+        Supervisor,
+        lambda arm: rcilab.connect("rci://127.0.0.1:9", model=arm),
+        lambda arm: build_virtual_controller(ControllerConfig(model=arm.name)),
+    ):
+        with pytest.raises(ModelError, match=problem):
+            refuse(model)
 
 
 def test_a_controller_without_a_feature_is_named_with_it(monkeypatch: pytest.MonkeyPatch):

@@ -140,8 +140,8 @@ def test_a_part_that_is_lacking_cannot_be_edited_restored_or_sent(lacking, store
         require_parts(MODEL, RobotConfiguration(joints=SoftJointLimits(lower=(0.0,), upper=(1.0,))))
 
 
-def test_an_arm_that_is_only_planned_for_keeps_its_setup(store) -> None:
-    panda = load_model("Panda")
+def test_an_arm_that_is_only_planned_for_keeps_its_setup(store, only_planned) -> None:
+    panda = load_model(only_planned)
     for part in ("box", "tool", "load", "joints"):
         assert explain_missing_part(panda, part) is None
 

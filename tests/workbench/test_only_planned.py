@@ -22,8 +22,8 @@ from rcilab.workbench.security import require_openable
 from tests.waiting import wait_for
 
 
-def test_it_is_planned_and_checked_in_preview_and_not_executed():
-    with Workbench(WorkbenchConfig(model="Panda", port=0)) as bench:
+def test_it_is_planned_and_checked_in_preview_and_not_executed(only_planned):
+    with Workbench(WorkbenchConfig(model=only_planned, port=0)) as bench:
         model = bench.store.state.model
         bench.store.update(goal=goal_at(model, model.home + 0.1))
         bench.dispatcher.ask(PlanGoal(page=None))
@@ -41,8 +41,8 @@ def test_it_is_planned_and_checked_in_preview_and_not_executed():
         assert bench.dispatcher.errors == bench.renderer.errors == []
 
 
-def test_why_it_cannot_run_stands_once_on_the_run_tab_and_its_verdict_needs_no_robot():
-    model = load_model("Panda")
+def test_why_it_cannot_run_stands_once_on_the_run_tab_and_its_verdict_needs_no_robot(only_planned):
+    model = load_model(only_planned)
     store = Store(UiState(model=model, goal=goal_at(model, model.home + 0.1)))
     status, text = SupervisorStatus(), Text("en")
     GoalActions(store, SimpleNamespace(status=lambda: status)).plan(PlanGoal())
@@ -54,6 +54,6 @@ def test_why_it_cannot_run_stands_once_on_the_run_tab_and_its_verdict_needs_no_r
     assert text("check.passed") in panel._planned._shown
 
 
-def test_it_is_not_opened_at_an_address():
-    with pytest.raises(ModelError, match="Panda is driven by Franka's own interface"):
-        require_openable("127.0.0.1", None, "rci://127.0.0.1:1337", "Panda")
+def test_it_is_not_opened_at_an_address(only_planned):
+    with pytest.raises(ModelError, match=f"{only_planned} is driven by Franka's own interface"):
+        require_openable("127.0.0.1", None, "rci://127.0.0.1:1337", only_planned)

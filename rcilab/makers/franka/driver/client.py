@@ -11,7 +11,7 @@ import numpy as np
 
 from rcilab.core.arrays import Matrix
 from rcilab.core.command import Command
-from rcilab.core.errors import CommandRejectedError
+from rcilab.core.errors import CommandRejectedError, RcilabError
 from rcilab.core.state import ControllerMode
 from rcilab.makers.franka.driver.client_sockets import ClientSockets
 from rcilab.makers.franka.driver.state_reader import number_of
@@ -94,6 +94,8 @@ class FciClient(ABC):
         self.sockets.require_open()
         try:
             yield
+        except RcilabError:
+            raise
         except Exception as error:  # The libraries have no common base class, and panda-python no types.
             self.sockets.require_open()
             raise CommandRejectedError(name, str(error).removeprefix("libfranka: ")) from error

@@ -214,7 +214,7 @@ class FciDriver:
         try:
             self._client.begin(mode)
         except CommandRejectedError as refusal:
-            self.poll(0.0)
+            self.poll(_FRESH)
             reason = find_reason(self._client)
             if reason is None:
                 raise

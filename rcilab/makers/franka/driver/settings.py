@@ -89,13 +89,15 @@ class FciSettings:
 
     def set_k(self, EE_T_K: Pose) -> None:
         """Sets the stiffness frame in the end effector's, at most 2 m away: the axes of impedance and of forces."""
+        frame = _near_pose("EE_T_K", EE_T_K)
         with self._request("setK"):
-            self._client.set_k(columns_of(_near_pose("EE_T_K", EE_T_K).matrix))
+            self._client.set_k(columns_of(frame.matrix))
 
     def set_ee(self, NE_T_EE: Pose) -> None:
         """Sets the end effector in the nominal end-effector frame that is set in Desk, at most 2 m away."""
+        frame = _near_pose("NE_T_EE", NE_T_EE)
         with self._request("setEE"):
-            self._client.set_ee(columns_of(_near_pose("NE_T_EE", NE_T_EE).matrix))
+            self._client.set_ee(columns_of(frame.matrix))
         self._await_state()
 
     def set_load(self, mass: float, center_of_mass: ArrayLike, inertia: ArrayLike) -> None:

@@ -1,0 +1,158 @@
+"""What a session sets at a Franka controller, and what this interface cannot do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.control_process.launch import start_controller
+from rcilab.core.command import JointPosition
+from rcilab.core.errors import CommandRejectedError, ControlError, InvalidValueError, ModelError, UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
+from rcilab.execution.session import connect
+from rcilab.makers.configuration import ControllerParameters, RobotConfiguration
+from rcilab.makers.franka.errors import FrankaError
+from rcilab.makers.maker import parameters_of
+from rcilab.makers.parameters import default_parameters
+from rcilab.model.dynamics.payload import Payload
+from rcilab.model.robot_model import load_model
+from tests.makers.franka.driver.conftest import ARMS
+
+LOAD = Payload(mass=1.0, center_of_mass=np.array([0.0, 0.0, 0.05]))
+TOOL = Pose(position=[0.01, 0.0, 0.12], wxyz=[0.92387953, 0.0, 0.0, -0.38268343])
+
+
+def test_the_tool_is_that_of_the_state_and_of_the_model(robot):
+    robot.set_tool(TOOL)
+    assert robot.model.T_flange_tool.is_close(TOOL, 1e-12)
+    assert robot.fci.tool.is_close(TOOL, 1e-6)
+    reported, computed = robot.state.T_base_tool, robot.model.forward(robot.state.q)
+    assert np.abs(reported.matrix - computed.matrix).max() <= 1e-6
+
+
+def test_the_stiffness_frame_and_the_end_effector_are_set_by_their_own_requests(robot):
+    robot.fci.set_ee(TOOL)
+    assert robot.model.T_flange_tool.is_close(TOOL, 1e-6)
+    robot.fci.set_k(Pose(position=[0.0, 0.0, 0.05]))
+    with pytest.raises(InvalidValueError, match=r"EE_T_K: 3.0 m from the flange is farther than 2 m"):
+        robot.fci.set_k(Pose(position=[0.0, 0.0, 3.0]))
+    robot.fci.set_k(Pose())
+
+
+def test_the_load_is_that_of_the_state_and_of_the_model(robot):
+    robot.set_load(1.5, [0.0, 0.01, 0.06], 1e-3 * np.eye(3))
+    assert robot.model.load.mass == 1.5
+    assert robot.fci.load.mass == pytest.approx(1.5)
+    assert robot.fci.load.center_of_mass == pytest.approx([0.0, 0.01, 0.06])
+    expected = robot.model.torque(robot.state.q).gravity
+    assert robot.state.tau == pytest.approx(expected, abs=0.01)
+    with pytest.raises(InvalidValueError, match="mass"):
+        robot.set_load(30.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def test_parameters_are_taken_and_bounds_named(robot):
+    defaults = default_parameters(parameters_of(robot.model))
+    soft = ControllerParameters(
+        joint_stiffness=(600.0,) * 7,
+        cartesian_stiffness=(500.0,) * 3 + (20.0,) * 3,
+        collision_thresholds=(30.0,) * 13,
+    )
+    for control in (soft, defaults):
+        robot.configure(RobotConfiguration(control=control))
+    with pytest.raises(InvalidValueError, match=r"stiffness, joint 2: 20000.0 is outside 0 to 14250 \[N m/rad\]"):
+        robot.fci.set_joint_impedance([600.0, 20000.0, 600.0, 600.0, 600.0, 600.0, 600.0])
+    with pytest.raises(InvalidValueError, match=r"stiffness, x: 5.0 is outside 10 to 3000"):
+        robot.fci.set_cartesian_impedance([5.0, 500.0, 500.0, 20.0, 20.0, 20.0])
+    with pytest.raises(InvalidValueError, match="upper_torques, joint 1: 10.0"):
+        robot.fci.set_collision_behavior([20.0] * 7, [10.0] * 7, [20.0] * 6, [20.0] * 6)
+    with pytest.raises(InvalidValueError, match="known: joint_stiffness"):
+        robot.configure(RobotConfiguration(control=ControllerParameters(filters=(100.0,))))
+
+
+def test_soft_springs_let_a_push_move_the_arm(robot):
+    q0 = robot.state.q_c
+
+    def hold(state, t):
+        if 0.1 <= t < 0.1005:
+            robot.simulation.push([0.0, 10.0, 0.0, 0.0, 0.0, 0.0], duration=0.2)
+        return JointPosition(q0, finished=t >= 0.4)
+
+    moved = []
+    for stiffness in (default_parameters(parameters_of(robot.model))["joint_stiffness"], (600.0,) * 7):
+        robot.configure(RobotConfiguration(control=ControllerParameters(joint_stiffness=stiffness)))
+        run = robot.control(hold, "joint_impedance")
+        moved.append(float(np.abs(run.cycles["q"] - q0).max()))
+        robot.move_j(robot.model.home)
+    robot.configure(RobotConfiguration(control=default_parameters(parameters_of(robot.model))))
+    assert moved[0] <= 1e-5
+    assert moved[1] > 1e-3
+
+
+def test_a_force_above_its_threshold_is_a_reflex_with_its_size(robot):
+    q0 = robot.state.q_c
+    robot.fci.set_collision_behavior([10.0] * 7, [10.0] * 7, [10.0] * 6, [10.0] * 6)
+
+    def hold(state, t):
+        if 0.05 <= t < 0.0505:
+            robot.simulation.push([0.0, 0.0, -25.0, 0.0, 0.0, 0.0], duration=0.2)
+        return JointPosition(q0, finished=t >= 0.5)
+
+    with pytest.raises(ControlError, match="an external force of 25 N acts at the tool; check for contact") as caught:
+        robot.control(hold)
+    assert FrankaError.CARTESIAN_REFLEX in caught.value.faults
+    robot.recover()
+    robot.configure(RobotConfiguration(control=default_parameters(parameters_of(robot.model))))
+
+
+def test_what_the_interface_cannot_do_is_refused_with_its_reason(robot):
+    for refused, problem in (
+        (lambda: robot.set_safety_box(SafetyBox(size=[1.0, 1.0, 1.0])), "no safety box"),
+        (lambda: robot.set_output(0, True), "no digital signals"),
+        (robot.reboot, "no restart on request"),
+    ):
+        with pytest.raises(ModelError, match=f"the controller of {robot.model.name} has {problem}"):
+            refused()
+    with pytest.raises(CommandRejectedError, match="cannot switch motor power; press the user stop, or lock"):
+        robot.power_off()
+    assert robot.is_powered()
+
+
+def test_requests_are_refused_while_a_motion_runs(robot):
+    q0 = robot.state.q_c
+    caught = []
+
+    def hold(state, t):
+        if t == 0.05:
+            for refused in (robot.recover, lambda: robot.fci.set_joint_impedance([600.0] * 7)):
+                with pytest.raises(UsageError, match="is not possible while a motion is running") as error:
+                    refused()
+                caught.append(error.value.code)
+        return JointPosition(q0, finished=t >= 0.1)
+
+    robot.control(hold)
+    assert caught == ["moving", "moving"]
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_a_session_that_sends_nothing_has_tool_and_load_of_the_controller(name):
+    model = load_model(name)
+    controller = start_controller(name)
+    try:
+        with connect(controller.address, model.with_tool(TOOL).with_load(LOAD), apply=True) as robot:
+            assert robot.fci.tool.is_close(TOOL, 1e-6)
+        with connect(controller.address) as robot:
+            assert robot.model.name == name
+            assert robot.model.T_flange_tool.is_close(TOOL, 1e-6)
+            assert robot.model.load.mass == pytest.approx(LOAD.mass)
+        other = model.with_tool(Pose(position=[0.0, 0.0, 0.3])).with_load(Payload(mass=2.0))
+        with (
+            pytest.warns(UserWarning, match="of the model|from the model's") as warned,
+            connect(controller.address, other) as robot,
+        ):
+            assert robot.model.T_flange_tool.is_close(TOOL, 1e-6)
+    finally:
+        controller.end()
+    said = [str(warning.message) for warning in warned]
+    assert any("the tool of" in text and "180.3 mm" in text for text in said), said
+    assert any("the load of" in text and "is 1 kg, that of the model 2 kg" in text for text in said), said
