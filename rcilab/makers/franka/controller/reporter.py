@@ -65,6 +65,7 @@ class StateReporter:
         self._zeros = readonly_copy(np.zeros(model.n))
         self._zeros6 = readonly_copy(np.zeros(6))
         self._tau_d = self._zeros
+        self._q = self._zeros
         self.configure(model, settings)
 
     def configure(self, model: RobotModel, settings: Settings) -> None:
@@ -106,7 +107,7 @@ class StateReporter:
         self._tau_d = tau_d
         rates = make_readonly(np.array([*tool_c.twist, *tool_c.acceleration]))
         self._write(signals, rates)
-        self._signals = signals
+        self._signals, self._q = signals, measured.q
         return build_state(
             (
                 message_id,
@@ -150,10 +151,9 @@ class StateReporter:
     @property
     def accelerometers(self) -> NDArray[np.float64]:
         """Readings of the acceleration sensors, top then bottom, 6 joints with 3 axes each, shape (36,), [m/s^2]."""
-        assert self._signals is not None  # `report` has set it.
         x, y, z = 0.0, 0.0, GRAVITY
         readings: list[float] = []
-        for q, row in zip(self._signals.measured.q.tolist(), CRAIG[:_SENSED_JOINTS], strict=False):
+        for q, row in zip(self._q.tolist(), CRAIG[:_SENSED_JOINTS], strict=False):
             c, s = cos(row.alpha), sin(row.alpha)
             y, z = c * y + s * z, c * z - s * y
             c, s = cos(q), sin(q)

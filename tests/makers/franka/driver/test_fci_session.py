@@ -98,7 +98,7 @@ def test_a_callback_begins_at_the_arm_and_its_last_command_is_reached(robot):
     assert len(run.t) >= 1000
     assert np.abs(robot.state.q_c - q0).max() <= 1e-6
 
-    with pytest.raises(InvalidValueError, match="first command.*must be the present position"):
+    with pytest.raises(InvalidValueError, match=r"first command.*must be the present position"):
         robot.control(lambda state, t: JointPosition(q0 + 0.01))
     assert robot.state.robot_mode is RobotMode.IDLE
 
@@ -190,7 +190,7 @@ def test_an_error_of_the_arm_is_named_explained_and_recorded_and_recovery_clears
     error.run.save(tmp_path / "fault.rcirun")
     assert load_run(tmp_path / "fault.rcirun").faults == error.faults
 
-    with pytest.raises(CommandRejectedError, match="Move was refused.*a fault has stopped the arm: recover"):
+    with pytest.raises(CommandRejectedError, match=r"Move was refused.*a fault has stopped the arm: recover"):
         robot.control(jump)
     robot.recover()
     assert robot.state.faults == ()
@@ -207,7 +207,7 @@ def test_a_joint_that_poses_make_too_fast_is_found(robot):
         T[0, 3] += 0.02 if t > 0.05 else 0.0
         return CartesianPosition(T)
 
-    with pytest.raises(ControlError, match="tool: commanded.*translation") as caught:
+    with pytest.raises(ControlError, match=r"tool: commanded.*translation") as caught:
         robot.control(leap, "cartesian_position")
     assert FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION in caught.value.faults
 

@@ -1,0 +1,26 @@
+"""A state between a setter and the next cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rcilab.makers.franka.controller.fci_controller import FciController
+from rcilab.makers.franka.wire.requests import SetLoad
+from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.versions import VERSION_10, Status
+from rcilab.model.robot_model import load_model
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
+
+MODEL = load_model("FR3")
+
+
+def test_a_state_after_a_setter_has_its_values_and_the_readings_of_the_last_cycle():
+    controller = FciController(VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0), VERSION_10)
+    controller.step()
+    before = controller.packet.accelerometers
+    status, _ = controller.set(SetLoad(1.0, (0.0, 0.0, 0.05), (0.0,) * 9))
+    after = controller.packet
+    assert status is Status.SUCCESS
+    assert after.numbers[PLACES["m_load"]] == 1.0
+    assert np.array_equal(after.accelerometers, before)
