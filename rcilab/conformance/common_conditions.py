@@ -79,6 +79,17 @@ def compliant_limits(limits: Limits) -> Limits:
     )
 
 
+def unlimited_accelerations(limits: Limits) -> Limits:
+    """Returns the bounds without accelerations and the speed of the arm angle, for makers with no error for them."""
+    joint, cartesian, arm_angle = limits.joint, limits.cartesian, limits.arm_angle
+    return replace(
+        limits,
+        joint=replace(joint, acceleration=readonly_copy(np.full_like(joint.acceleration, np.inf))),
+        cartesian=replace(cartesian, translation_acceleration=np.inf, rotation_acceleration=np.inf),
+        arm_angle=None if arm_angle is None else replace(arm_angle, velocity=np.inf),
+    )
+
+
 def _symmetric(name: str, factor: float = 1.0) -> Callable[[AnyLimits], Bounds]:
     """Returns the bounds function of a joint quantity, such as "velocity"."""
 

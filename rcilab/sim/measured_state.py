@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from operator import gt
 
-from rcilab.conformance.common_conditions import compliant_limits
+from rcilab.conformance.common_conditions import compliant_limits, unlimited_accelerations
 from rcilab.conformance.measured_monitor import MeasuredMonitor, find_collision_joint
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox
@@ -59,6 +59,7 @@ class MeasuredStateMonitor:
         thresholds: Sequence[float],
         *,
         checks_tool: bool,
+        checks_accelerations: bool = True,
         is_compliant: bool,
     ) -> None:
         """Begins to check a motion.
@@ -68,8 +69,11 @@ class MeasuredStateMonitor:
             box: Safety box of the tool; None without one.
             thresholds: External joint torques that count as a collision, n numbers, [N m].
             checks_tool: Whether tool poses are commanded, so that tool speed and arm angle are checked.
+            checks_accelerations: Whether accelerations and the speed of the arm angle are checked.
             is_compliant: Whether external forces move the arm.
         """
+        if not checks_accelerations:
+            limits = unlimited_accelerations(limits)
         self._monitor = MeasuredMonitor(compliant_limits(limits) if is_compliant else limits, box)
         self._monitor.reset(self.measured.q.tolist())
         self._thresholds = thresholds

@@ -225,7 +225,9 @@ class VirtualArm:
         """Resets everything for a motion in this mode."""
         self._motion.prepare(mode, self.on_loss)
 
-    def begin_motion(self, limits: Limits, *, start: StartTolerance | None = None) -> None:
+    def begin_motion(
+        self, limits: Limits, *, start: StartTolerance | None = None, checks_accelerations: bool = True
+    ) -> None:
         """Follows commands from now on, from the present reference.
 
         Args:
@@ -233,6 +235,7 @@ class VirtualArm:
             start: Largest difference of the first command from the reference, by the maker's own rule: a start outside
                 it ends the motion by this violation alone. None: `start_tolerance`, beyond which the jump violates
                 limits. It is not checked for velocities and goals.
+            checks_accelerations: Whether measured accelerations and the speed of the arm angle are checked.
         """
         mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
         tolerance = start_tolerance(mode.law, parameters)
@@ -253,6 +256,7 @@ class VirtualArm:
             bounds.entry_box(),
             parameters.collision_thresholds,
             checks_tool=mode.is_cartesian,
+            checks_accelerations=checks_accelerations,
             is_compliant=mode.law.is_compliant,
         )
         self._tau_c = [0.0] * self.model.n if mode.law is ControlLaw.TORQUE else None

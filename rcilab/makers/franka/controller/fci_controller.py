@@ -273,7 +273,7 @@ class FciController:
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
-        self.arm.begin_motion(replace(limits, joint=unchecked), start=_START)
+        self.arm.begin_motion(replace(limits, joint=unchecked), start=_START, checks_accelerations=False)
         self._enter(Phase.MOVING)
         self.state = self._report()
         return Status.MOTION_STARTED

@@ -94,7 +94,7 @@ def test_move_is_answered_at_once_and_again_after_the_end(robot: Robot) -> None:
 
 def test_no_command_is_needed_before_the_first_one(robot: Robot) -> None:
     start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
-    late = robot.skip(100)
+    late = robot.skip(5)  # Each takes a tenth of a second in lock-step.
     assert modes(late) == modes(start)
     assert late.success_rate == 1.0
     assert robot.play(late, programs.motion(start, wire.JOINT_POSITION), cycles=201).status == "success"

@@ -1,0 +1,67 @@
+"""The errors of commands: each raised by its name and bit, in the right cycle, and recovered from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.peers.franka import programs, wire
+from tests.peers.franka.arena import FciArena
+from tests.peers.franka.faults import CASES, END, TORQUE, near_end
+from tests.peers.franka.robot import Output, Robot
+from tests.peers.franka.wire import ERROR_NAMES
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_wrong_command_raises_its_error_and_is_not_followed(robot: Robot, place: FciArena, name: str) -> None:
+    case, version = CASES[name], robot.version
+    if case.q is not None:
+        q = near_end(version) if case.q == END else case.q
+        answer = place.simulate("place_arm", q=q)
+        assert answer["ok"], answer
+        robot.skip(3)
+    generator = case.generator
+    if generator == TORQUE:
+        generator = wire.NONE if version == 10 else wire.JOINT_VELOCITY
+    start = robot.move(case.controller, generator)
+    wrong = case.build(start)
+    ending = robot.play(start, wrong.outputs)
+    errors = case.errors if isinstance(case.errors, str) else case.errors[version]
+    expected = {ERROR_NAMES[int(number)] for number in errors.split() if number != "..."}
+    found = set(ending.state.errors)
+    assert (found >= expected) if "..." in errors else (found == expected), found
+    assert ending.status == "reflex"
+    assert ending.state.reflex_reason == ending.state.errors
+    assert (ending.state.robot_mode, ending.state.generator, ending.state.controller) == (wire.ROBOT_REFLEX, 0, 3)
+    if wrong.at >= 0:
+        assert ending.sent - 1 in (wrong.at, wrong.at + 1)  # One more may be on its way.
+    recover(robot, ending.state.errors)
+
+
+def recover(robot: Robot, errors: tuple[str, ...]) -> None:
+    """Recovers after errors and moves."""
+    assert robot.try_move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION) == "not possible"
+    assert robot.ask("automatic_error_recovery").status == "success"
+    state = robot.state_when(lambda state: state.robot_mode == wire.ROBOT_IDLE)
+    assert state.errors == ()
+    assert state.reflex_reason == errors
+    assert any(state.robot_mode == wire.ROBOT_RECOVERING for state in robot.states)
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    assert start.reflex_reason == ()
+    ending = robot.play(start, programs.motion(start, wire.JOINT_POSITION, height=-0.002), cycles=201)
+    assert (ending.status, ending.state.errors) == ("success", ())
+
+
+def test_the_last_good_command_is_where_the_arm_stops_from(robot: Robot) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    program = programs.motion(start, wire.JOINT_POSITION, cycles=800, height=0.1)
+    good = [program(start, k) for k in range(300)]
+    ending = robot.play(start, [*good, Output(q=programs.with_offset(start.q_d, 0, 1.0))])
+    assert ending.state.errors
+    stopped = robot.state_when(lambda state: state.dq_d == programs.ZERO)
+    last = good[-1].q
+    assert last is not None
+    assert 0.0 < abs(stopped.q_d[3] - last[3]) < 0.02
+    assert stopped.q_d[0] == pytest.approx(start.q_d[0], abs=1e-6)
+    rows = np.array([state.q_d for state in robot.states[-200:]])
+    assert (np.abs(np.diff(rows, 2, axis=0)) < 1.3e-5).all()

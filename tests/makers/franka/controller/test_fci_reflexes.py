@@ -1,0 +1,157 @@
+"""Errors of what the arm meets: forces, deviations from its motion, measured velocities, and missing commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tests.makers.franka.controller.test_fci_errors import recover
+from tests.peers.franka import programs, wire
+from tests.peers.franka.arena import FciArena
+from tests.peers.franka.robot import Ending, Output, Robot
+from tests.peers.franka.wire import ERROR_NAMES
+
+SOFT = wire.doubles(*(200.0,) * 3, *(20.0,) * 3)
+HIGH = 1000.0
+
+
+def thresholds(torque: float, force: float) -> bytes:
+    return wire.doubles(*(torque,) * 28, *(force,) * 24)
+
+
+def stay(robot: Robot, controller: int, cycles: int = 1500, **deviations: tuple[float, ...]) -> Ending:
+    """Commands the present pose for some cycles."""
+    start = robot.move(controller, wire.CARTESIAN_POSE, **deviations)
+    return robot.play(start, [Output(pose=start.O_T_EE_c)] * cycles)
+
+
+CASES: dict[str, tuple[str, tuple[float, float], list[float], dict[str, tuple[float, ...]]]] = {
+    "a force above its threshold": ("7", (HIGH, 10.0), [0.0, 0.0, -20.0, 0.0, 0.0, 0.0], {}),
+    "torques above theirs": ("6", (3.0, HIGH), [0.0, 0.0, -20.0, 0.0, 0.0, 0.0], {}),
+    "the path of a soft arm": ("9", (HIGH, HIGH), [0.0, 0.0, -10.0, 0.0, 0.0, 0.0], {"path": (0.01, 3.12, 6.28)}),
+    "the orientation of a soft arm": ("9", (HIGH, HIGH), [0, 0, 0, 0, 0, 2.0], {"path": (10.0, 0.05, 6.28)}),
+    "the end of a soft arm": ("8", (HIGH, HIGH), [0.0, 0.0, -10.0, 0.0, 0.0, 0.0], {"goal": (0.01, 3.12, 6.28)}),
+    "a push that turns the tool too fast": ("4", (HIGH, HIGH), [0.0, 0.0, 0.0, 0.0, 0.0, 15.0], {}),
+}
+"""Errors, thresholds of torques and forces, wrench on the tool, largest deviations."""
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_a_force_does_to_the_arm_ends_its_motion(toucher: Robot, felt: FciArena, name: str) -> None:
+    numbers, bounds, wrench, deviations = CASES[name]
+    assert toucher.ask("set_collision_behavior", thresholds(*bounds)).status == "success"
+    assert toucher.ask("set_cartesian_impedance", SOFT).status == "success"
+    felt.simulate("push", wrench=wrench)
+    ending = stay(toucher, wire.CARTESIAN_IMPEDANCE, **deviations)
+    felt.simulate("release")
+    assert ending.state.errors == tuple(ERROR_NAMES[int(number)] for number in numbers.split())
+    assert ending.status == "reflex"
+    assert ending.state.reflex_reason == ending.state.errors
+    assert toucher.ask("set_collision_behavior", thresholds(HIGH, HIGH)).status in ("success", "not possible")
+    toucher.skip(300)
+    recover(toucher, ending.state.errors)
+
+
+def test_deviations_within_their_bounds_end_nothing(toucher: Robot, felt: FciArena) -> None:
+    assert toucher.ask("set_cartesian_impedance", SOFT).status == "success"
+    felt.simulate("push", wrench=[0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
+    bounds = (0.1, 0.5, 1.0)
+    ending = stay(toucher, wire.CARTESIAN_IMPEDANCE, 600, path=bounds, goal=bounds)
+    assert ending.status == "success"
+    assert ending.state.errors == ()
+
+
+def lose(place: FciArena, cycles: int) -> np.ndarray:
+    """Advances the arm by cycles without a command; returns its commanded angles, shape (cycles, 7), [rad]."""
+    rows: list[np.ndarray] = []
+    place.between(lambda: rows.extend(place.controller.step().q_c for _ in range(cycles)))
+    return np.array(rows)
+
+
+def by_time(robot: Robot, lost: Callable[[int], None], cycles: int = 600) -> Ending:
+    """Runs a motion whose program goes by the numbers of states; `lost` is called before each command."""
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    program = programs.motion(start, wire.JOINT_POSITION, cycles=cycles, height=0.05)
+
+    def callback(state: wire.State, k: int) -> Output:
+        lost(k)
+        return program(state, state.message_id - start.message_id)
+
+    return robot.play(start, callback, cycles=cycles + 1)
+
+
+def test_a_motion_bridges_nineteen_lost_cycles_with_constant_acceleration(robot: Robot, place: FciArena) -> None:
+    seen: list[np.ndarray] = []
+
+    def lost(k: int) -> None:
+        if k == 291:  # Around the farthest place, where the acceleration changes least.
+            seen.append(lose(place, 19))
+
+    assert by_time(robot, lost).status == "success"
+    acceleration = np.diff(seen[0][:, 3], 2)
+    assert acceleration == pytest.approx(np.full(17, acceleration[0]), abs=1e-12)
+    assert abs(acceleration[0]) > 1e-8
+
+
+def test_twenty_lost_cycles_in_a_row_end_a_motion(robot: Robot, place: FciArena) -> None:
+    faults: list[object] = []
+
+    def lost(k: int) -> None:
+        if k == 150:
+            lose(place, 19)
+            faults.append(place.controller.faults)
+            lose(place, 1)
+            faults.append([fault.manual_name for fault in place.controller.faults])
+
+    ending = by_time(robot, lost)
+    assert faults == [(), ["communication_constraints_violation"]]
+    assert ending.status == "reflex"
+    assert ending.state.errors == ("communication_constraints_violation",)
+    recover(robot, ending.state.errors)
+
+
+def test_a_client_that_falls_silent_loses_its_motion(robot: Robot) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    state = start
+    for _ in range(10):
+        robot.answer(state, Output(q=start.q_d))
+        state = robot.state()
+    ended = robot.state_when(lambda state: state.robot_mode == wire.ROBOT_REFLEX)
+    assert ended.errors == ("communication_constraints_violation",)
+    assert robot.ending() == "reflex"
+
+
+def test_torques_are_held_over_lost_cycles(robot: Robot, place: FciArena) -> None:
+    generator = wire.NONE if robot.version == 10 else wire.JOINT_VELOCITY
+    state = robot.move(wire.EXTERNAL, generator)
+    for k in range(20):
+        output = Output(dq=programs.ZERO, tau=(0.0,) * 6 + (0.02 * k,))
+        robot.answer(state, output)
+        state = robot.state()
+    held: list[float] = []
+
+    def advance() -> None:
+        for _ in range(10):
+            place.controller.step()
+            held.append(place.controller.arm.signals.tau_c[6])
+
+    place.between(advance)
+    assert held == pytest.approx([0.38] * 10)
+    assert robot.play(robot.state(), [output] * 3).status == "success"
+
+
+@pytest.mark.parametrize("generator", [wire.JOINT_VELOCITY, wire.CARTESIAN_VELOCITY, wire.CARTESIAN_POSE])
+def test_every_generator_bridges_lost_cycles(robot: Robot, place: FciArena, generator: int) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, generator)
+    program = programs.motion(start, generator, cycles=600, height=0.03)
+
+    def callback(state: wire.State, k: int) -> Output:
+        if k in (100, 200, 320):
+            lose(place, 4)
+        return program(state, state.message_id - start.message_id)
+
+    ending = robot.play(start, callback, cycles=600)
+    assert ending.state.errors == ()
+    assert ending.status == "success"
