@@ -43,6 +43,7 @@ from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.api import SafetyButton
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_setup import ArmSetup, require_stand
+from rcilab.sim.generators import CommandKind
 from rcilab.sim.generators.start import StartTolerance
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.violations import Violations, describe_violations
@@ -438,19 +439,21 @@ class FciController:
 
 
 def _as_command(packet: CommandPacket, motion: MotionKind, version: FciVersion) -> ArmCommand:
-    m = packet.O_T_EE_c
-    rows = tuple(m[column * 4 + row] for row in range(4) for column in range(4))
+    """Returns what a motion uses of a command: the rest of the datagram may hold anything."""
+    kind, is_cartesian = motion.mode.kind, motion.mode.is_cartesian
+    m, has_elbow = packet.O_T_EE_c, is_cartesian and packet.has_elbow
+    rows = tuple(m[column * 4 + row] for row in range(4) for column in range(4)) if kind is CommandKind.POSES else ()
     is_alone = motion.generator is MoveGenerator.NONE and version.finishes_torques
-    angle, side = packet.elbow_c
+    angle, side = packet.elbow_c if has_elbow else (0.0, 0.0)
     return ArmCommand(
         packet.message_id,
-        packet.q_c,
+        packet.q_c if kind in (CommandKind.JOINT_ANGLES, CommandKind.JOINT_GOALS) else (),
         rows,
-        packet.has_elbow,
+        has_elbow,
         angle,
         packet.has_ended_torques if is_alone else packet.is_finished,
-        packet.tau_c,
-        packet.dq_c,
-        packet.O_dP_EE_c,
-        side if packet.has_elbow else 0.0,
+        packet.tau_c if motion.mode.law is ControlLaw.TORQUE else (),
+        packet.dq_c if kind is CommandKind.JOINT_VELOCITIES else (),
+        packet.O_dP_EE_c if kind is CommandKind.TWISTS else (),
+        side,
     )
