@@ -49,6 +49,10 @@ class StatusWriter:
         self._block.tool[15] = 0.0
         self._counters[Counter.LOST] = 0
 
+    def announce_silence(self, seconds: float) -> None:
+        """Allows this process to write no heartbeat for a time, [s], as while a driver waits for an answer."""
+        self._counters[Counter.WORKER_HEARTBEAT] = time.monotonic_ns() + round(1e9 * seconds)
+
     def write_heartbeat(self) -> None:
         """Writes the heartbeat, and the rate of states once a second."""
         now = time.monotonic_ns()

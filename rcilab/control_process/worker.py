@@ -296,7 +296,10 @@ class ControlProcess:
         self._status.set_phase("lost", "lost.rebooted", address=self._address)
 
     def _recover(self) -> None:
-        self._require_driver().recover()
+        driver = self._require_driver()
+        if driver.recovery_silence > 0.0:
+            self._status.announce_silence(driver.recovery_silence)
+        driver.recover()
         self._read_power()
         self._report_ready()
 

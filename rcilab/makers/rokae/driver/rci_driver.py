@@ -84,6 +84,7 @@ class RciDriver:
     resolution = 0.0
     commands_arm_angle = holds_arm_angle = True
     keeps_newest = False
+    recovery_silence = 0.0
 
     def __init__(self, connection: RciConnection, address: RciAddress, arm_name: str) -> None:
         self.connection = connection
