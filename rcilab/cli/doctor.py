@@ -22,7 +22,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "doctor", help="check this machine for planning, simulating and streaming", description=DESCRIPTION
     )
-    parser.add_argument("--robot", metavar="rci://HOST:PORT", help="also check the network route to this robot")
+    parser.add_argument("--robot", metavar="SCHEME://HOST", help="also check the network route to this robot")
     parser.add_argument(
         "--seconds",
         type=float,

@@ -78,7 +78,7 @@ def test_a_controller_that_ends_is_reported_and_the_session_can_be_closed(contro
             os.kill(controller.pid, signal.SIGKILL)
         return JointPosition(state.q_c)
 
-    with pytest.raises(ConnectionLostError, match="the connection is lost|no state for 1 s"):
+    with pytest.raises(ConnectionLostError, match=r"the connection is lost|no state for 1 s"):
         robot.control(hold)
     with pytest.raises(ConnectionLostError, match="the connection is lost"):
         robot.recover()
