@@ -204,9 +204,9 @@ def good_client_works(host: str, port: int, version: int) -> None:
         assert (ending.status, ending.state.errors) == ("success", ())
 
 
-def fuzz_frames(version: int, count: int, seed: int) -> None:
+def fuzz_frames(version: int, plant: str, count: int, seed: int) -> None:
     """Sends fuzzed frames to a controller that a good client then uses."""
-    with Process("--lockstep", model=MODELS[version]) as controller:
+    with Process("--lockstep", "--plant", plant, model=MODELS[version]) as controller:
         with FrameFuzzer(controller.host, controller.port, version, seed) as fuzzer:
             fuzzer.send(count)
             assert fuzzer.answered

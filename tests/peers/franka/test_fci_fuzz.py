@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import pytest
 
+from tests.peers.arena import PLANTS
 from tests.peers.franka import fuzz
 from tests.peers.franka.wire import VERSIONS
 
 
+@pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("version", VERSIONS)
-def test_the_next_client_works_after_fuzzed_frames(version: int) -> None:
-    fuzz.fuzz_frames(version, 400, 11)
+def test_the_next_client_works_after_fuzzed_frames(version: int, plant: str) -> None:
+    fuzz.fuzz_frames(version, plant, 400, 11)
 
 
 @pytest.mark.parametrize("version", VERSIONS)
