@@ -156,8 +156,12 @@ class ControlProcess:
             self._status.write_heartbeat()  # Otherwise every row counts as a heartbeat.
         for state in states:
             assert self._driver is not None
-            counts_gap = is_awaited or not self._driver.keeps_newest
-            self._log.write(state, self._driver.received_ns, is_awaited=is_awaited, counts_gap=counts_gap)
+            self._log.write(
+                state,
+                self._driver.received_ns,
+                is_awaited=is_awaited,
+                counts_gap=not self._driver.keeps_newest,
+            )
 
     def _update_phase(self, state: RobotState) -> None:
         """Updates the phase from a state of the robot while nothing moves."""

@@ -142,7 +142,7 @@ def test_a_robot_is_told_parameters_after_a_second_press_only(language: str) -> 
         assert [told["joint_stiffness"] for told in robot.told] == [(500.0, *stiffness[1:])]
 
 
-def test_refusals_are_told_in_the_language_of_the_panel() -> None:
+def test_refusals_are_told_in_the_language_of_the_panel(only_planned: str) -> None:
     from rcilab.core.errors import CommandRejectedError, InvalidValueError
     from rcilab.makers.rokae import wire as rci
 
@@ -157,8 +157,7 @@ def test_refusals_are_told_in_the_language_of_the_panel() -> None:
             said = text.render(status_texts.describe_refusal(error))
             assert str(error) not in said
             assert not re.search(r"\b(status|what|error|robot)\.[a-zA-Z_]+", said), said
-    panda = rcilab.load_model("Panda")
-    with notebook.RunPanel(panda, language="zh") as panel:
+    with notebook.RunPanel(rcilab.load_model(only_planned), language="zh") as panel:
         panel.connect.click()
         assert "Franka" in text_of(panel._outcome)
         assert "plan for it" not in text_of(panel._outcome)
