@@ -36,6 +36,7 @@ from rcilab.sim.api import (
     Direction,
     Floor,
     GetStatus,
+    Guide,
     Limits,
     LineReader,
     LoopBack,
@@ -135,6 +136,10 @@ class SimulationControl(Closeable):
     def press(self, button: SafetyButton) -> None:
         """Presses the emergency stop ("estop") or opens the safety gate ("gstop"); "none" resets both."""
         self.ask(Press(button))
+
+    def guide(self, on: bool = True) -> None:
+        """Presses the buttons of the arm that let a hand guide it, or releases them; a Franka arm has them."""
+        self.ask(Guide(on))
 
     def set_input(self, signal: int, level: bool) -> None:
         """Sets a digital input by its number, from 0; of an xMate, 4 and 5 are DI1_0 and DI1_1."""

@@ -25,7 +25,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.sim.arm_parameters import ArmParameters
 from rcilab.sim.compliance import ModalDamping
 from rcilab.sim.force_frame import ForceAxes
-from rcilab.sim.hand_guiding import GuidedFreedom, guide_torque, wall_torque
+from rcilab.sim.hand_guiding import FREE, GuidedFreedom, guide_torque, wall_torque
 from rcilab.sim.impedance_control import cartesian_impedance, joint_impedance
 from rcilab.sim.plant import Drive, Measurement, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
@@ -67,7 +67,8 @@ class Actuator:
         self._axes = ForceAxes(model, parameters)
         self._wrench = (0.0,) * 6  # The present desired wrench.
         self.configure(model, parameters)
-        self._freedom = GuidedFreedom.ALL
+        self._freedom = FREE
+        self._q3_held = 0.0
 
     def configure(self, model: RobotModel, parameters: ArmParameters) -> None:
         """Sets new parameters, and the model with their tool and load."""
@@ -82,6 +83,7 @@ class Actuator:
         """Begins hand guiding; the directions that are not free are held at the present pose."""
         self._freedom = freedom
         self._T_held = self._model.forward(measured.q)
+        self._q3_held = float(measured.q[2])
 
     def setpoint(
         self,
@@ -138,7 +140,7 @@ class Actuator:
                 axes=None if self._axes.is_world else np.array(self._axes.rotation(tool.pose)).reshape(3, 3),
                 damper=self._damper,
             )
-        return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits)
+        return guide_torque(model, measured, self._freedom, self._T_held, self._soft_limits, self._q3_held)
 
 
 def _approach(wrench: tuple[float, ...], desired: tuple[float, ...]) -> tuple[float, ...]:

@@ -19,6 +19,7 @@ from rcilab.sim.api import (
     Done,
     Floor,
     GetStatus,
+    Guide,
     Limits,
     LoopBack,
     Mount,
@@ -130,6 +131,8 @@ class Environment:
                 self._apply_push()
             case Press(button):
                 self._controller.press_button(button)
+            case Guide(on):
+                self._controller.guide(on)
             case SetInput(signal, level):
                 self._controller.set_input(signal, level)
             case LoopBack(on):

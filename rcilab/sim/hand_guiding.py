@@ -1,13 +1,14 @@
 """Hand guiding and the walls of the safety box: the torques on a guided arm.
 
 A guided arm is weightless (`Drive.TORQUE` compensates gravity and friction) and lightly damped. Directions that are not
-free are held with the stiffest springs of the Cartesian impedance: TRANSLATION holds the orientation of the tool,
-ROTATION its position. Close to a joint limit a spring pushes back, up to the joint's torque limit.
+free are held with the stiffest springs of the Cartesian impedance, an elbow that is not free with a spring at joint 3.
+Close to a joint limit a spring pushes back, up to the joint's torque limit.
 """
 
 from __future__ import annotations
 
-from enum import Enum
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,18 +26,26 @@ JOINT_DAMPING = 0.02  # [N m s/rad per N m of torque limit] in addition, for lig
 STOP_ZONE = (
     0.05  # [rad] before a joint limit in which its spring grows from nothing to the torque limit; a tuning value
 )
+_ELBOW = 2  # From 0.
 _DAMPED_OUTWARD = 1e-6  # [rad/s] no damping parallel to walls
 
 
-class GuidedFreedom(Enum):
+@dataclass(frozen=True, slots=True)
+class GuidedFreedom:
     """Free directions of a guided arm."""
 
-    ALL = "all"
-    """Every joint."""
-    TRANSLATION = "translation"
-    """The tool's position; its orientation is held."""
-    ROTATION = "rotation"
-    """The tool's orientation; its position is held."""
+    axes: tuple[bool, ...] = (True,) * 6
+    """Translation along and rotation about the axes of the base."""
+    has_free_elbow: bool = True
+    """Whether joint 3, the elbow as Franka defines it, is free."""
+
+
+FREE = GuidedFreedom()
+"""Every joint."""
+FREE_TRANSLATION = GuidedFreedom((True,) * 3 + (False,) * 3)
+"""The tool's position; its orientation is held."""
+FREE_ROTATION = GuidedFreedom((False,) * 3 + (True,) * 3)
+"""The tool's orientation; its position is held."""
 
 
 def guide_torque(
@@ -45,6 +54,7 @@ def guide_torque(
     freedom: GuidedFreedom,
     T_held: Pose,
     limits: JointLimits | None = None,
+    q3_held: float = 0.0,
 ) -> JointVector:
     """Returns the torque on a guided arm, without gravity, shape (n,), [N m].
 
@@ -54,15 +64,19 @@ def guide_torque(
         freedom: Free directions.
         T_held: Pose of the tool in base at the start of guiding.
         limits: Joint limits; None: those of the arm.
+        q3_held: Angle of joint 3 at the start, [rad]; used if the elbow is not free.
     """
     terms = model.rigid_body.tool_terms(measured.q, measured.dq)
-    stiffness, spring = _limit_springs(measured.q, model.limits.joint if limits is None else limits)
-    if freedom is not GuidedFreedom.ALL:
-        held = slice(3, 6) if freedom is GuidedFreedom.TRANSLATION else slice(0, 3)
+    limits = model.limits.joint if limits is None else limits
+    stiffness, spring = _limit_springs(measured.q, limits)
+    for held, hold, error in _held(model, terms, freedom, T_held):
         J = terms.jacobian[held]
-        hold, error = _held(model, terms, freedom, T_held)
         stiffness = stiffness + hold * (J.T @ J)
         spring = spring + J.T @ (hold * error)
+    if not freedom.has_free_elbow:
+        hold = limits.torque[_ELBOW] / STOP_ZONE
+        stiffness[_ELBOW, _ELBOW] += hold
+        spring[_ELBOW] += hold * (q3_held - measured.q[_ELBOW])
     spring = spring - JOINT_DAMPING * model.limits.joint.torque * measured.dq
     coriolis = model.rigid_body.motion_torque(measured.q, measured.dq, np.zeros(model.n))
     return design_damping(terms.mass_inverse, stiffness, GUIDE_DAMPING).torque(spring, -measured.dq) + coriolis
@@ -94,12 +108,18 @@ def wall_torque(model: RobotModel, measured: Measurement, box: SafetyBox, stiffn
     return design_damping(terms.mass_inverse, J.T * stiffness @ J, _DAMPED_OUTWARD).torque(spring, -measured.dq)
 
 
-def _held(model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: Pose) -> tuple[float, Array]:
-    """Returns stiffness and error of the held directions; the error has shape (3,), in base axes."""
+def _held(
+    model: RobotModel, terms: ToolTerms, freedom: GuidedFreedom, T_held: Pose
+) -> Iterator[tuple[list[int], float, Array]]:
+    """Yields the held axes, 0 to 5, of translation and of rotation, with their stiffness and errors, in base axes."""
     cartesian = model.limits.cartesian
-    if freedom is GuidedFreedom.ROTATION:
-        return cartesian.translation_stiffness, T_held.position - terms.pose.position
-    return cartesian.rotation_stiffness, np.array(rotation_between(terms.pose.parts[0], T_held.parts[0]))
+    along = [axis for axis in range(3) if not freedom.axes[axis]]
+    about = [axis for axis in range(3, 6) if not freedom.axes[axis]]
+    if along:
+        yield along, cartesian.translation_stiffness, (T_held.position - terms.pose.position)[along]
+    if about:
+        error = np.array((0.0, 0.0, 0.0, *rotation_between(terms.pose.parts[0], T_held.parts[0])))
+        yield about, cartesian.rotation_stiffness, error[about]
 
 
 def _limit_springs(q: JointVector, limits: JointLimits) -> tuple[Array, JointVector]:

@@ -93,6 +93,14 @@ class SimulatedController(Protocol):
         """Presses or releases an emergency stop."""
         ...
 
+    def guide(self, on: bool) -> None:
+        """Begins or ends hand guiding by the buttons of the arm.
+
+        Raises:
+            UsageError: The arm has no such buttons, or cannot be guided now.
+        """
+        ...
+
     def set_up(self, setup: ArmSetup) -> None:
         """Sets the arm up as on its teach pendant; a reboot keeps it.
 

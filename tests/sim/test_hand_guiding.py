@@ -11,7 +11,7 @@ from rcilab.core.arrays import Array
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.model.robot_model import RobotModel, load_model
-from rcilab.sim.hand_guiding import GuidedFreedom, guide_torque, wall_torque
+from rcilab.sim.hand_guiding import FREE, FREE_ROTATION, FREE_TRANSLATION, GuidedFreedom, guide_torque, wall_torque
 from rcilab.sim.ideal_plant import IdealPlant
 from rcilab.sim.mujoco_plant import MuJoCoPlant
 from rcilab.sim.plant import Drive, Measurement, Plant, Setpoint
@@ -26,7 +26,7 @@ def model(request: pytest.FixtureRequest) -> RobotModel:
     return load_model(request.param, tool=Pose([0.0, 0.0, 0.1]))
 
 
-def guide(model: RobotModel, freedom: GuidedFreedom = GuidedFreedom.ALL) -> Law:
+def guide(model: RobotModel, freedom: GuidedFreedom = FREE) -> Law:
     T = model.forward(model.home)
     return lambda measured: guide_torque(model, measured, freedom, T)
 
@@ -65,7 +65,7 @@ def test_translation_leaves_the_orientation(make: Maker, model: RobotModel) -> N
     plant, T = make(model), model.forward(model.home)
     rest = plant.reset(model.home)
     plant.push([-6.0, 8.0, -5.0, 0.5, 0.5, 0.5])
-    led = model.forward(run(plant, guide(model, GuidedFreedom.TRANSLATION), 500, rest).q)
+    led = model.forward(run(plant, guide(model, FREE_TRANSLATION), 500, rest).q)
     assert np.linalg.norm(led.position - T.position) > 0.05
     assert turned(led, T) < 0.02
 
@@ -75,7 +75,7 @@ def test_rotation_leaves_the_position(make: Maker, model: RobotModel) -> None:
     plant, T = make(model), model.forward(model.home)
     rest = plant.reset(model.home)
     plant.push([5.0, 5.0, -5.0, 0.5, 1.0, 0.4])
-    led = model.forward(run(plant, guide(model, GuidedFreedom.ROTATION), 300, rest).q)
+    led = model.forward(run(plant, guide(model, FREE_ROTATION), 300, rest).q)
     assert turned(led, T) > 0.1
     assert np.linalg.norm(led.position - T.position) < 0.006
 
@@ -105,7 +105,7 @@ def test_walls_push_the_tool_back_into_the_box_and_nothing_inside_it(make: Maker
     assert not wall_torque(model, rest, box, stiffness).any()
     outward = tilted.rotation[:, 1]
     plant.push([*(20.0 * outward), 0.0, 0.0, 0.0])
-    free = guide(model, GuidedFreedom.TRANSLATION)
+    free = guide(model, FREE_TRANSLATION)
     pressed = run(plant, lambda m: free(m) + wall_torque(model, m, box, stiffness), 2500, rest)
     assert outward @ (model.forward(pressed.q).position - T.position) == pytest.approx(0.05 + 20.0 / 2000.0, rel=0.03)
     asleep = SafetyBox(size=(0.1, 0.1, 0.1), T_base_box=tilted, active=False)

@@ -72,6 +72,18 @@ class Press:
 
 
 @dataclass(frozen=True, slots=True)
+class Guide:
+    """Presses the buttons of the arm that let a hand guide it, or releases them; for arms that have such buttons."""
+
+    name: ClassVar[str] = "guide"
+    on: bool
+
+    def __post_init__(self) -> None:
+        """Checks it."""
+        _put(self, "on", as_flag(self.on, "on"))
+
+
+@dataclass(frozen=True, slots=True)
 class SetInput:
     """Sets a digital input of the controller."""
 
@@ -357,6 +369,7 @@ WorldRequest: TypeAlias = (
     Push
     | Release
     | Press
+    | Guide
     | SetInput
     | LoopBack
     | AutoLimit

@@ -53,6 +53,7 @@ REQUESTS = st.one_of(
     ),
     st.just(world.Release()),
     st.builds(world.Press, st.sampled_from(["none", "estop", "gstop"])),
+    st.builds(world.Guide, st.booleans()),
     st.builds(world.SetInput, st.integers(0, 5), st.booleans()),
     st.builds(world.LoopBack, st.booleans()),
     st.builds(world.AutoLimit, st.booleans()),

@@ -35,7 +35,7 @@ from rcilab.makers.franka.controller.settings import Settings, apply_request, ap
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
 from rcilab.makers.franka.wire.command_packet import CommandPacket
-from rcilab.makers.franka.wire.requests import Move, Numbers, Request
+from rcilab.makers.franka.wire.requests import Move, Numbers, Request, SetLoad, SetNEToEE
 from rcilab.makers.franka.wire.state_packet import NO_ERRORS, NO_READINGS, StatePacket, flags_of
 from rcilab.makers.franka.wire.versions import FciVersion, MoveGenerator, Status
 from rcilab.model.robot_model import RobotModel
@@ -45,6 +45,7 @@ from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.arm_setup import ArmSetup, require_stand
 from rcilab.sim.generators import CommandKind
 from rcilab.sim.generators.start import StartTolerance
+from rcilab.sim.hand_guiding import GuidedFreedom
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.violations import Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
@@ -54,7 +55,9 @@ SUCCESS_WINDOW = 100  # [cycles] Over which the share of commands in time is rep
 STATES_BEFORE_START = 2  # That a client reads after Move: one that shows the motion, and the one it answers.
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
-_BRAKED = (Phase.USER_STOPPED,)
+_RESTING_LAWS = {Phase.USER_STOPPED: ControlLaw.BRAKED, Phase.GUIDING: ControlLaw.GUIDE}
+_PLACES_THE_ARM = (SetNEToEE, SetLoad)
+"""Settings of tool and load, with which the arm begins anew at its present angles."""
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
 _START = StartTolerance(
     joint=(START_TOLERANCE,) * 7,
@@ -250,6 +253,20 @@ class FciController:
         self._end(Status.EMERGENCY_ABORTED)
         self._enter(Phase.USER_STOPPED)
 
+    def guide(self, on: bool) -> None:
+        """Presses or releases the buttons at the wrist with which a hand guides the arm.
+
+        Raises:
+            UsageError: A motion is in progress, an error is set, or the user stop is pressed.
+        """
+        if on and self.phase is Phase.IDLE:
+            self._enter(Phase.GUIDING)
+            self.arm.begin_guiding(GuidedFreedom(self.settings.free_axes, self.settings.free_elbow))
+        elif on and self.phase is not Phase.GUIDING:
+            raise UsageError(f"the arm cannot be guided in phase {self.phase_name}; end its motion or clear its error")
+        elif not on and self.phase is Phase.GUIDING:
+            self._enter(Phase.STOPPING)
+
     def receive(self, packet: CommandPacket) -> None:
         """Queues a command from the network while a motion is in progress; others are counted."""
         if self._motion is None or self.phase is not Phase.MOVING:
@@ -308,13 +325,15 @@ class FciController:
         """Applies a setter; returns the status of the answer, and why it is refused."""
         if self.phase not in SETTABLE:
             return Status.NOT_POSSIBLE, f"not possible in phase {self.phase_name}"
-        if not self.arm.has_stopped:
-            return Status.NOT_POSSIBLE, "not possible while the arm stops"
+        if isinstance(request, _PLACES_THE_ARM) and not self.arm.has_stopped:
+            return Status.NOT_POSSIBLE, "not possible while the arm moves"
         try:
             settings = apply_request(self.settings, request)
         except InvalidValueError as error:
             return Status.INVALID_ARGUMENT, str(error)
         self._configure(settings)
+        if self.phase is Phase.GUIDING:
+            self.arm.begin_guiding(GuidedFreedom(settings.free_axes, settings.free_elbow))
         return Status.SUCCESS, ""
 
     def lose_client(self) -> bool:
@@ -410,7 +429,7 @@ class FciController:
         if phase not in IN_MOTION:
             self._motion = None
         self.arm.is_monitored = self._motion is not None
-        self.arm.resting_law = ControlLaw.BRAKED if phase in _BRAKED else ControlLaw.POSITION
+        self.arm.resting_law = _RESTING_LAWS.get(phase, ControlLaw.POSITION)
         self.on_phase(before, phase)
 
     @property

@@ -235,6 +235,14 @@ class RciController:
         """Numbers of the digital inputs that are high."""
         return tuple(signal for signal, level in enumerate(self.settings.inputs) if level)
 
+    def guide(self, on: bool) -> None:
+        """Raises an error: the client starts and stops hand guiding.
+
+        Raises:
+            UsageError: Always.
+        """
+        raise UsageError("this arm is guided after StartDrag of its client: use robot.rci.start_drag, then push")
+
     def set_input(self, signal: int, level: bool) -> None:
         """Sets the level of a digital input, 0 to 5; with loop-back on, until the outputs are set again.
 

@@ -31,7 +31,7 @@ from rcilab.model.dynamics.payload import Payload
 from rcilab.robots import RobotDescription
 from rcilab.sim.arm_parameters import ArmParameters, Floats, ForceAxesKind
 from rcilab.sim.arm_setup import ArmSetup
-from rcilab.sim.hand_guiding import GuidedFreedom
+from rcilab.sim.hand_guiding import FREE, FREE_ROTATION, FREE_TRANSLATION, GuidedFreedom
 
 _FORCE_AXES = {
     rci.ForceFrame.WORLD: ForceAxesKind.WORLD,
@@ -39,9 +39,9 @@ _FORCE_AXES = {
     rci.ForceFrame.PATH: ForceAxesKind.PATH,
 }
 _FREEDOMS = {
-    rci.DragType.FREE: GuidedFreedom.ALL,
-    rci.DragType.TRANSLATION: GuidedFreedom.TRANSLATION,
-    rci.DragType.ROTATION: GuidedFreedom.ROTATION,
+    rci.DragType.FREE: FREE,
+    rci.DragType.TRANSLATION: FREE_TRANSLATION,
+    rci.DragType.ROTATION: FREE_ROTATION,
 }
 
 
@@ -124,7 +124,7 @@ def apply_request(settings: Settings, request: rci.Request, arm: RobotDescriptio
 
 def guided_freedom(request: rci.StartDrag) -> GuidedFreedom:
     """Returns the free directions of a drag: in joint space all joints, for any type, as with the vendor's client."""
-    return GuidedFreedom.ALL if request.space == rci.DragSpace.JOINT else _FREEDOMS[rci.DragType(request.type)]
+    return FREE if request.space == rci.DragSpace.JOINT else _FREEDOMS[rci.DragType(request.type)]
 
 
 def _changes(request: rci.Request, arm: RobotDescription, settings: Settings) -> dict[str, object]:

@@ -31,12 +31,14 @@ def ready(place: FciArena) -> Iterator[Robot]:
     place.simulate("push", wrench=[0.0] * 6, rise_time=0.0)
     with place.connect() as robot:
         place.simulate("press", button="none")
+        place.simulate("guide", on=False)
         robot.state_when(lambda state: state.robot_mode != ROBOT_MOVE)
         assert robot.ask("automatic_error_recovery").status == "success"
         robot.state_when(lambda state: state.robot_mode == ROBOT_IDLE and not state.errors)
         place.between(lambda: controller._configure(type(controller.settings).of_arm(controller.model.description)))
-        answer = place.simulate("place_arm", q=controller.model.home.tolist())
-        assert answer["ok"], answer
+        home = controller.model.home.tolist()
+        while not place.simulate("place_arm", q=home)["ok"]:  # It may still settle on its servos.
+            robot.skip(50)
         robot.skip(3)
         place.arena.entries.clear()
         yield robot

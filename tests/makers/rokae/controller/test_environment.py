@@ -84,6 +84,12 @@ def test_a_push_ends_after_its_time_and_a_new_one_replaces_it(place) -> None:
     assert place.status.pushed
 
 
+def test_an_arm_without_buttons_for_guiding_refuses_them(place) -> None:
+    answer = place.handle(world.Guide(True))
+    assert isinstance(answer, world.Refused)
+    assert "StartDrag" in answer.reason
+
+
 def test_the_status_has_what_was_chosen_and_counted(place) -> None:
     assert place.handle(world.Limits("sdk")) == world.Done()
     assert place.handle(world.Limits("none")) == world.Refused("limit table: 'none' is unknown; known: manual, sdk")
