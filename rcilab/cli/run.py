@@ -155,6 +155,7 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
     """Appends the motions with their outcomes to `moves` and returns the name of the arm."""
     from rcilab.conformance.check import check
     from rcilab.execution.command_validation import find_start_mismatch
+    from rcilab.makers.maker import commanded_start
     from rcilab.model.robot_model import load_model
     from rcilab.motion import Program
     from rcilab.recording.export import require_ending
@@ -180,7 +181,8 @@ def _run(args: Namespace, stopper: _Stopper, moves: list[_Move]) -> str:
             raise UsageError(
                 f"{args.file} has {motion.n} joints and {robot.model.name} has {robot.model.n}: it is for another arm"
             )
-        mismatch = find_start_mismatch(motion.q[0], state.q_c, _TO_START)
+        start = commanded_start(motion.q[0], state.q_c, robot.model)
+        mismatch = find_start_mismatch(motion.q[0], start, _TO_START)
         if not args.to_start:  # Before the report, whose violations would all have this cause.
             _require_ready(mismatch, robot, state)
         if mismatch is None:
@@ -283,9 +285,11 @@ def _move(
 ) -> None:
     """Checks a motion, shows the report, asks for confirmation, runs the motion, and appends it to `moves`."""
     from rcilab.conformance.check import check
+    from rcilab.makers.maker import commanded_start
 
     out = _text_stream(args)
-    report = check(motion, robot.model, start=robot.state.q_c, box=box)
+    start = commanded_start(motion.q[0], robot.state.q_c, robot.model)
+    report = check(motion, robot.model, start=start, box=box)
     if not report.ok:
         moves.append(_refuse(report, args))
         return

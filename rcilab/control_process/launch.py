@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.core.errors import ConnectionLostError
-from rcilab.makers.maker import client_port_of
+from rcilab.makers.maker import find_maker
 
 START_TIMEOUT = (
     20.0  # [s] Python with its numerical libraries takes about 1 s from a cold disk; more on a busy machine.
@@ -34,7 +34,8 @@ class VirtualController(ManagedProcess):
     def __init__(
         self, model_name: str, plant: str = "ideal", lockstep: bool = False, options: Sequence[str] = ()
     ) -> None:
-        port = client_port_of(model_name)
+        maker = find_maker(model_name)
+        port = None if maker is None else maker.client_port
         place = ["--port", "0"] if port is None else ["--host", _find_free_address(port)]
         arguments = ["controller", "--model", model_name, "--plant", plant, *place, *options]
         if lockstep:

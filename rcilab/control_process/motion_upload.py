@@ -16,6 +16,7 @@ from rcilab.core.arrays import JointVector
 from rcilab.core.errors import CertificateError, PlanningError, RcilabError, UsageError
 from rcilab.core.state import Mode, require_mode
 from rcilab.execution.command_validation import find_start_mismatch
+from rcilab.makers.maker import commanded_start
 from rcilab.motion import Motion, require_motion
 from rcilab.motion.speed_scaling import SpeedScaledMotion
 
@@ -55,6 +56,7 @@ def require_admissible(
     require_certificate(certificate)
     require_mode(mode)
     q_c = require_ready(status, is_operator_overdue=is_operator_overdue)
+    q_c = commanded_start(motion.q[0], q_c, model)
     if certificate is None:
         raise CertificateError("the motion has not been checked: check(motion, model) first", ["certificate"])
     mismatch = find_start_mismatch(motion.q[0], q_c)

@@ -14,6 +14,7 @@ from rcilab.control_process.managed_process import ManagedProcess, parent_pid
 from rcilab.control_process.snapshot import read_snapshot
 from rcilab.control_process.status import MESSAGES
 from rcilab.core.errors import ConnectionLostError
+from rcilab.makers.maker import find_maker
 from rcilab.sim.controller_config import MODE_DELAY, SUPERVISED_PREFILL
 
 ANSWER_TIMEOUT = 3.0  # [s] For the connection and for every response of the controller.
@@ -116,10 +117,11 @@ class ProcessSupervisor:
         self.address = None
 
     def _start_controller(self) -> None:
+        maker = find_maker(self._model_name)
+        is_patient = maker is not None and maker.timing.is_patient
+        prefill = [] if is_patient else ["--prefill", str(SUPERVISED_PREFILL)]
         self._controller = VirtualController(
-            self._model_name,
-            self._plant,
-            options=["--prefill", str(SUPERVISED_PREFILL), "--mode-delay", str(MODE_DELAY)],
+            self._model_name, self._plant, options=[*prefill, "--mode-delay", str(MODE_DELAY)]
         )
 
     def _start_worker(self) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from rcilab.conformance.certificate import Certificate, require_certificate
 from rcilab.conformance.check import check
 from rcilab.conformance.speed_scaling_check import plan_start_with_override
-from rcilab.core.arrays import as_number, described
+from rcilab.core.arrays import JointVector, as_number, described
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.closeable import Closeable
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, UsageError
@@ -49,6 +49,7 @@ from rcilab.makers.driver import (
 )
 from rcilab.makers.maker import (
     capabilities_of,
+    commanded_start,
     find_missing_feature,
     require_driver,
     require_feature,
@@ -97,7 +98,8 @@ def connect(
 
     Args:
         address: `rci://HOST:PORT`; `?udp_port=N` if the robot receives commands at another UDP port,
-            `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`.
+            `?client_port=M` if it sends states to another port; `?world_port=W` for `simulation`. `fci://HOST` for a
+            Franka arm.
         model: The arm, with its tool and load; None uses the arm that the controller reports. Without `apply`, the
             session's model has the controller's tool.
         timeout: Timeout of the connection, of the first state, and of every response, [s].
@@ -108,6 +110,7 @@ def connect(
         ConnectionLostError: The robot does not respond, or states do not arrive; the message says what to check.
         ModelError: The model differs from the controller's arm, or that arm is not known.
         InvalidValueError: The address, the model or the timeout is not valid.
+        MissingExtraError: The maker's client library is not installed.
     """
     return open_session(address, model, timeout, apply=apply, record_all=record_all)
 
@@ -343,12 +346,20 @@ class RobotSession(Closeable):
         return states[-1]
 
     def power_on(self) -> None:
-        """Switches the motors on."""
+        """Switches the motors on; where the interface cannot (Franka's), checks that the arm is ready for a motion.
+
+        Raises:
+            CommandRejectedError: The controller refuses, or the arm is not ready; the message contains the reason.
+        """
         with self._lock.acquire("power_on"):
             self._driver.power(True)
 
     def power_off(self) -> None:
-        """Switches the motors off, which ends a running motion."""
+        """Switches the motors off, which ends a running motion.
+
+        Raises:
+            CommandRejectedError: The interface cannot (Franka's).
+        """
         with self._lock.acquire_unless_moving() as is_acquired:
             if is_acquired:
                 self._driver.power(False)
@@ -441,14 +452,14 @@ class RobotSession(Closeable):
         require_feature(self.model, require_mode(mode))
         require_speed_override(speed_override)
         with self._lock.begin_motion("execute"):
-            state = self.receive_state()
-            mismatch = find_start_mismatch(motion.q[0], state.q_c)
+            start = commanded_start(motion.q[0], self.receive_state().q_c, self.model)
+            mismatch = find_start_mismatch(motion.q[0], start)
             if mismatch is not None:
                 raise UsageError(mismatch)
             if certificate is None:
-                self._require_allowed(motion, state, mode)
+                self._require_allowed(motion, start, mode)
             else:
-                certificate.verify(motion, self.model, state.q_c, self.safety_box, mode=mode)
+                certificate.verify(motion, self.model, start, self.safety_box, mode=mode)
             scaled = plan_start_with_override(motion, speed_override, self.model, mode)
             planned = scaled.as_motion()
             stream = MotionStream(scaled.q, mode, self.model, report_progress(planned, progress))
@@ -574,7 +585,7 @@ class RobotSession(Closeable):
             state = self.receive_state()
             law: JointLaw = "s_profile" if self.model.n in S_PROFILE_VELOCITY else "jerk_limited"
             motion = plan_joint(self.model, state.q_c, goal, speed=speed, law=law)
-            self._require_allowed(motion, state)
+            self._require_allowed(motion, state.q_c)
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)
 
@@ -670,8 +681,8 @@ class RobotSession(Closeable):
             "is connected, then connect again"
         )
 
-    def _require_allowed(self, motion: Motion, state: RobotState, mode: Mode = "joint_position") -> None:
-        check(motion, self.model, start=state.q_c, box=self.safety_box, mode=mode).require()
+    def _require_allowed(self, motion: Motion, start: JointVector, mode: Mode = "joint_position") -> None:
+        check(motion, self.model, start=start, box=self.safety_box, mode=mode).require()
 
     def _move_along(
         self, path: Path, state: RobotState, speed: float, with_psi: bool, progress: Progress | None
@@ -683,10 +694,10 @@ class RobotSession(Closeable):
         motion = follow_path(self.model, state.q_c, path, speed)
         is_free = bool(self.model.redundancy) and not self._driver.commands_arm_angle
         if is_free or find_missing_feature(self.model, "cartesian_position") is not None:
-            self._require_allowed(motion, state)
+            self._require_allowed(motion, state.q_c)
             stream = MotionStream(motion.q, "joint_position", self.model, report_progress(motion, progress))
             return self._runner.run(stream, "joint_position", motion)
-        self._require_allowed(motion, state, "cartesian_position")
+        self._require_allowed(motion, state.q_c, "cartesian_position")
         sends_psi = with_psi or not self._driver.holds_arm_angle
         callback = follow_poses(path, schedule(path, speed), sends_psi, report_progress(motion, progress))
         return self._runner.run(callback, "cartesian_position", motion)

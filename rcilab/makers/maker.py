@@ -13,6 +13,9 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, get_args
 
+import numpy as np
+
+from rcilab.core.arrays import JointVector
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.condition import ConditionTable
 from rcilab.core.errors import ModelError
@@ -65,6 +68,8 @@ class Timing:
     """Between two states, [s]."""
     command_period: float = CYCLE_TIME
     """Between two commands of a motion, [s]."""
+    is_patient: bool = False
+    """Whether a cycle of the virtual controller waits for its command, so that commands need not be played later."""
 
     @property
     def state_cycles(self) -> int:
@@ -126,6 +131,10 @@ class Maker(Protocol):
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of its interface for a motion."""
+        ...
+
+    def state_rounding(self, model: RobotModel) -> float:
+        """Returns the largest rounding of commanded positions in the states of an arm, [rad] or [m]; 0: none."""
         ...
 
     def faults(self) -> type[FaultCode]:
@@ -199,17 +208,28 @@ def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
     return () if maker is None else maker.parameters(model)
 
 
-def client_port_of(name: str) -> int | None:
-    """Returns the TCP port that the clients of an arm's controller insist on, see `Maker.client_port`.
-
-    Args:
-        name: Name of the arm.
+def find_maker(name: str) -> Maker | None:
+    """Returns the maker of an arm by the arm's name; None for an arm without a maker.
 
     Raises:
         ModelError: There is no such arm.
     """
     maker = describe_robot(name).maker
-    return next((each.client_port for each in all_makers() if each.name == maker), None)
+    return next((each for each in all_makers() if each.name == maker), None)
+
+
+def commanded_start(start: JointVector, q_c: JointVector, model: RobotModel) -> JointVector:
+    """Returns where an arm is commanded: at the start of a motion, if a state differs from it by its rounding only.
+
+    Args:
+        start: Start of a motion, [rad].
+        q_c: Commanded joint angles of a state, shape (n,), [rad].
+        model: The arm.
+    """
+    maker = maker_of(model)
+    rounding = 0.0 if maker is None else maker.state_rounding(model)
+    is_there = len(start) == len(q_c) and float(np.abs(start - q_c).max()) <= rounding
+    return start if is_there else q_c
 
 
 def simulated_robots() -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from rcilab.makers.maker import (
     Feature,
     Maker,
     all_makers,
+    find_maker,
     find_missing_feature,
     maker_of,
     require_driver,
@@ -33,6 +34,8 @@ from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.robots import ROBOT_NAMES, describe_robot
 from rcilab.sim.controller_config import ControllerConfig
+from rcilab.sim.plants import build_plant
+from rcilab.sim.virtual_arm import VirtualArm
 
 FEATURES = [name for part in get_args(Feature) for name in (get_args(part) or (part,))]
 MAKERS = pytest.mark.parametrize("maker", all_makers(), ids=lambda maker: maker.name)
@@ -176,3 +179,13 @@ def test_loading_a_model_by_name_loads_neither_wire_nor_engine():
     code = f"import sys, rcilab; rcilab.load_model('xmate3'); print(*[n for n in {unwanted} if n in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.split() == []
+
+
+@MAKERS
+def test_a_maker_is_patient_if_its_virtual_controller_is(maker: Maker):
+    name = next(iter(maker.robots))
+    config = ControllerConfig(model=name, port=0, world_port=None)
+    model = load_model(name)
+    server = maker.build_server(VirtualArm(model, build_plant("ideal", model)), config)
+    assert maker.timing.is_patient == (server.patience > 0.0)
+    assert find_maker(name) is maker

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from functools import reduce
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from rcilab.app.planning import Plan
 from rcilab.core.arrays import JointVector
 from rcilab.i18n.translator import Message, message
+from rcilab.makers.maker import commanded_start
 from rcilab.motion.extent import MotionExtent, measure_extent
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
 
 _SAME_PLACE = 1e-9  # [rad] Tolerance of the check between the arm and the start of a motion.
 _NOT_IDLE = {
@@ -67,14 +71,14 @@ def plan_obstacle(plan: Plan | None, q_c: JointVector | None) -> Message | None:
         return message(
             "ready.violations", conditions=plan.report.violated_conditions, count=len(plan.report.violations)
         )
-    if q_c is None or not _is_at(q_c, plan.starts_at):
+    if q_c is None or not _is_at(q_c, plan.starts_at, plan.model):
         return message("ready.done" if q_c is not None and is_done(plan, q_c) else "ready.elsewhere")
     return None
 
 
 def is_done(plan: Plan, q_c: JointVector) -> bool:
     """Returns whether the arm, commanded to be at q_c, [rad], is at the end of a plan."""
-    return _is_at(q_c, plan.motion.goal)
+    return _is_at(q_c, plan.motion.goal, plan.model)
 
 
 def ask_to_move(plan: Plan, address: str) -> Message:
@@ -108,5 +112,5 @@ def is_moving(status: ArmStatus) -> bool:
     return status.phase in ("moving", "stopping")
 
 
-def _is_at(q: JointVector, place: JointVector) -> bool:
-    return float(np.abs(q - place).max()) <= _SAME_PLACE
+def _is_at(q: JointVector, place: JointVector, model: RobotModel) -> bool:
+    return float(np.abs(commanded_start(place, q, model) - place).max()) <= _SAME_PLACE

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rcilab.core.condition import ConditionTable
 from rcilab.core.state import MODES
-from rcilab.makers.franka.bounds import CLIENT_PORT, LONGEST_TOOL
+from rcilab.makers.franka.bounds import CLIENT_PORT, LONGEST_TOOL, SINGLE_PRECISION
 from rcilab.makers.franka.conditions import FCI_CONDITIONS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots import ROBOTS
@@ -41,7 +41,7 @@ class Franka:
         setup=("tool", "load", "control"),
         longest_tool=LONGEST_TOOL,
     )
-    timing = Timing()
+    timing = Timing(is_patient=True)
 
     def conditions(self) -> ConditionTable:
         """Returns the conditions of the FCI."""
@@ -68,6 +68,10 @@ class Franka:
         from rcilab.makers.franka.driver.fci_driver import open_driver
 
         return open_driver(address, timeout, expected)
+
+    def state_rounding(self, model: RobotModel) -> float:
+        """Returns that of single precision for the FR3, 0 for the Panda."""
+        return SINGLE_PRECISION if model.name == "FR3" else 0.0
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:
         """Returns the FCI server of an arm."""

@@ -51,6 +51,10 @@ class Rokae:
         """Returns the conditions of the RCI."""
         return RCI_CONDITIONS
 
+    def state_rounding(self, model: RobotModel) -> float:
+        """Returns 0: states have the commanded doubles."""
+        return 0.0
+
     def faults(self) -> type[Fault]:
         """Returns the twenty faults of the RCI."""
         return Fault

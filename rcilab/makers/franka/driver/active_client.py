@@ -12,6 +12,7 @@ from typing import Any
 from rcilab.core.command import CartesianPosition, Command, JointPosition
 from rcilab.core.errors import CommandRejectedError, InvalidValueError
 from rcilab.core.state import ControllerMode, RobotMode
+from rcilab.makers.franka.bounds import SINGLE_PRECISION
 from rcilab.makers.franka.driver.address import FciAddress
 from rcilab.makers.franka.driver.client import FciClient, columns_of
 from rcilab.makers.franka.driver.client_sockets import open_with_sockets
@@ -32,7 +33,7 @@ class ActiveClient(FciClient):
         MissingExtraError: The library is not installed.
     """
 
-    resolution = 3e-7  # Numbers of a state have single precision: half a unit in the last place of 4 is 2.4e-7.
+    resolution = SINGLE_PRECISION
     commands_elbow = False  # The binding of CartesianPose has no elbow.
 
     def __init__(self, address: FciAddress) -> None:

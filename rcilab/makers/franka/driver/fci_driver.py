@@ -132,7 +132,7 @@ class FciDriver:
         if not on:
             raise CommandRejectedError(
                 "power_off",
-                "Franka's interface cannot switch motor power",
+                "the interface cannot switch motor power",
                 "press the user stop, or lock the joints in Desk",
                 reason="no_power_off",
             )

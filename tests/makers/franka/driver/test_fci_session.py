@@ -25,8 +25,8 @@ ROUNDING = 3e-7  # [rad] Half a unit in the last place of single precision, in w
 
 
 def test_a_checked_motion_arrives_and_its_run_has_every_cycle(robot):
-    motion = plan_joint(robot.model, robot.state.q_c, robot.model.home + OFF, speed=1.0)
-    certificate = check(motion, load_model(robot.model.name), start=robot.state.q_c).require().certificate
+    motion = plan_joint(robot.model, robot.model.home, robot.model.home + OFF, speed=1.0)
+    certificate = check(motion, load_model(robot.model.name)).require().certificate
     run = robot.execute(motion, certificate)
     assert run.faults == ()
     assert run.timing.lost == 0
