@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from tests.peers.arena import Arena, arena
+from tests.peers.franka.hand import Hand
 from tests.peers.franka.robot import PATIENCE, Robot
 
 MODELS = {5: "Panda", 10: "FR3"}
@@ -45,6 +47,17 @@ class FciArena:
     def connect(self, **options: Any) -> Robot:
         """Returns a connected client of this version."""
         return Robot(self.arena.host, self.arena.port, self.version, **options)
+
+    @property
+    def hand_port(self) -> int:
+        """TCP port of the hand."""
+        found = re.search(r"hand_port=(\d+)", self.arena.server.url)
+        assert found
+        return int(found[1])
+
+    def connect_hand(self, **options: Any) -> Hand:
+        """Returns a connected client of the hand."""
+        return Hand(self.arena.host, self.hand_port, **options)
 
     def log(self, *kinds: str) -> list[str]:
         """Returns the texts of the log, of these kinds or all."""

@@ -39,6 +39,7 @@ class HandServer:
         self._is_connected = False
         self._message_id = 0
         self._pending: tuple[HandRequest, int] | None = None
+        self._ended: HandStatus | None = None  # How the command in progress has ended.
 
     def attach(self, link: ClientLink) -> None:
         """Sets the link to clients."""
@@ -50,7 +51,7 @@ class HandServer:
 
     def disconnect(self) -> None:
         """Forgets the client; the fingers end what they do."""
-        self._peer, self._is_connected, self._pending = None, False, None
+        self._peer, self._is_connected, self._pending, self._ended = None, False, None, None
 
     def receive(self, peer: Peer, frame: bytes) -> None:
         """Handles a request. A command in progress is aborted by the next one."""
@@ -81,10 +82,10 @@ class HandServer:
         """Advances the fingers by one cycle."""
         status = self.hand.step()
         if status is not None:
-            self._conclude(status)
+            self._ended = status
 
     def send_state(self) -> None:
-        """Sends the state of the hand to its client."""
+        """Sends the state of the hand to its client, then the answer to a command that has ended in it."""
         if self._peer is None or not self._is_connected:
             return
         self._message_id += 1
@@ -93,6 +94,8 @@ class HandServer:
             self._message_id, hand.width, hand.max_width, is_grasped=hand.is_grasped, temperature=TEMPERATURE
         )
         self._link.send_datagram(state, self._peer)
+        if self._ended is not None:
+            self._conclude(self._ended)
 
     def _accept(self, peer: Peer, command_id: int, request: HandConnect) -> None:
         is_known = request.version == VERSION
@@ -105,6 +108,7 @@ class HandServer:
 
     def _conclude(self, status: HandStatus) -> None:
         """Answers the command in progress, if there is one."""
+        self._ended = None
         if self._pending is not None:
             (request, command_id), self._pending = self._pending, None
             self._answer(request, command_id, status)
