@@ -76,16 +76,16 @@ class Hand:
         return status
 
     def state(self) -> HandState:
-        """Returns the newest state."""
-        data = self.udp.recv(4096)
+        """Waits for the next state; earlier ones are skipped."""
         self.udp.setblocking(False)
         try:
             while True:
-                data = self.udp.recv(4096)
+                self.udp.recv(4096)
         except BlockingIOError:
             pass
         finally:
             self.udp.settimeout(PATIENCE)
+        data = self.udp.recv(4096)
         assert len(data) == STATE_SIZE
         return HandState(*struct.unpack("<Idd?H", data))
 

@@ -69,7 +69,7 @@ class HandServer:
         self._conclude(HandStatus.ABORTED)
         if isinstance(request, StopFingers):
             self.hand.stop()
-            self._answer(request, command_id, HandStatus.SUCCESS)
+            self._pending, self._ended = (request, command_id), HandStatus.SUCCESS
             return
         refusal = self.hand.begin(request)
         if refusal is not None:
