@@ -49,6 +49,8 @@ class Wrong(NamedTuple):
 
     outputs: list[Output]
     at: int
+    rows: Rows | None = None
+    """The joint angles that these commands stand for, where one joint moves, shape (N, 7), [rad]."""
 
 
 class Case(NamedTuple):
@@ -77,10 +79,14 @@ def _first(values: Rows, bound: float) -> int:
     return int(np.argmax(np.abs(values) > bound))
 
 
-def _joints(start: State, joint: int, path: Rows) -> list[Output]:
+def _rows(start: State, joint: int, path: Rows) -> Rows:
     rows = np.tile(start.q_d, (len(path), 1))
     rows[:, joint] += path
-    return [Output(q=tuple(row)) for row in rows.tolist()]
+    return rows
+
+
+def _joints(start: State, joint: int, path: Rows) -> list[Output]:
+    return [Output(q=tuple(row)) for row in _rows(start, joint, path).tolist()]
 
 
 def _rates(joint: int, path: Rows) -> list[Output]:
@@ -163,7 +169,7 @@ def joint_start(start: State) -> Wrong:
 
 def joint_range(start: State) -> Wrong:
     path = _path(_rise(0.01, 0.2, 1200))
-    return Wrong(_joints(start, 6, path), _first(path, _bounds(start).upper - start.q_d[6]))
+    return Wrong(_joints(start, 6, path), _first(path, _bounds(start).upper - start.q_d[6]), _rows(start, 6, path))
 
 
 def joint_beyond_its_range(start: State) -> Wrong:
@@ -172,17 +178,17 @@ def joint_beyond_its_range(start: State) -> Wrong:
 
 def joint_velocity(start: State) -> Wrong:
     path, at = _too_fast(_bounds(start).velocity)
-    return Wrong(_joints(start, 0, path), at)
+    return Wrong(_joints(start, 0, path), at, _rows(start, 0, path))
 
 
 def joint_acceleration(start: State) -> Wrong:
     path, at = _too_strong(_bounds(start).acceleration)
-    return Wrong(_joints(start, 3, path), at)
+    return Wrong(_joints(start, 3, path), at, _rows(start, 3, path))
 
 
 def joint_jerk(start: State) -> Wrong:
     path, at = _jump(0.55 * _bounds(start).acceleration)
-    return Wrong(_joints(start, 3, path), at)
+    return Wrong(_joints(start, 3, path), at, _rows(start, 3, path))
 
 
 def rate_range(start: State) -> Wrong:
@@ -223,7 +229,7 @@ def turned_start(start: State) -> Wrong:
 def turn_velocity(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
     def build(start: State) -> Wrong:
         path, at = _too_fast(_bounds(start).turn[0])
-        return Wrong(make(start, 6, path), at)
+        return Wrong(make(start, 6, path), at, _rows(start, 6, path))
 
     return build
 
@@ -231,7 +237,7 @@ def turn_velocity(make: Callable[[State, int, Rows], list[Output]]) -> Callable[
 def turn_acceleration(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
     def build(start: State) -> Wrong:
         path, at = _turn_too_strong(_bounds(start))
-        return Wrong(make(start, 6, path), at)
+        return Wrong(make(start, 6, path), at, _rows(start, 6, path))
 
     return build
 
@@ -239,14 +245,14 @@ def turn_acceleration(make: Callable[[State, int, Rows], list[Output]]) -> Calla
 def turn_jerk(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
     def build(start: State) -> Wrong:
         path, at = _jump(1.02 * H * _bounds(start).turn[2])
-        return Wrong(make(start, 6, path), at)
+        return Wrong(make(start, 6, path), at, _rows(start, 6, path))
 
     return build
 
 
 def inverse_range(start: State) -> Wrong:
     path = _path(_rise(0.01, 0.2, 1200))
-    return Wrong(_poses(start, 6, path), _first(path, _bounds(start).upper - start.q_d[6]))
+    return Wrong(_poses(start, 6, path), _first(path, _bounds(start).upper - start.q_d[6]), _rows(start, 6, path))
 
 
 def inverse_velocity(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
@@ -259,7 +265,7 @@ def inverse_velocity(make: Callable[[State, int, Rows], list[Output]]) -> Callab
             q, dq = start.q_d[0] + _path(second), np.cumsum(second) * H
             before = np.concatenate(([start.q_d[0]], q[:-1]))
             at = _first(dq - (-0.30 + np.sqrt(2.0 * 6.0 * np.maximum(2.7501 - before, 0.0)) - 100.0), 100.0)
-        return Wrong(make(start, 0, path), at)
+        return Wrong(make(start, 0, path), at, _rows(start, 0, path))
 
     return build
 
@@ -267,7 +273,7 @@ def inverse_velocity(make: Callable[[State, int, Rows], list[Output]]) -> Callab
 def inverse_acceleration(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
     def build(start: State) -> Wrong:
         path, at = _too_strong(_bounds(start).acceleration)
-        return Wrong(make(start, 3, path), at)
+        return Wrong(make(start, 3, path), at, _rows(start, 3, path))
 
     return build
 
@@ -275,7 +281,7 @@ def inverse_acceleration(make: Callable[[State, int, Rows], list[Output]]) -> Ca
 def inverse_jerk(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
     def build(start: State) -> Wrong:
         path, at = _jump(0.55 * _bounds(start).acceleration)
-        return Wrong(make(start, 3, path), at)
+        return Wrong(make(start, 3, path), at, _rows(start, 3, path))
 
     return build
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rcilab.conformance.check import check
+from rcilab.model.robot_model import load_model
+from rcilab.motion import Motion
 from tests.peers.franka import programs, wire
-from tests.peers.franka.arena import FciArena
+from tests.peers.franka.arena import MODELS, FciArena, fci_arena
 from tests.peers.franka.faults import CASES, END, TORQUE, near_end
 from tests.peers.franka.robot import Output, Robot
 from tests.peers.franka.wire import ERROR_NAMES
@@ -33,9 +36,34 @@ def test_a_wrong_command_raises_its_error_and_is_not_followed(robot: Robot, plac
     assert ending.status == "reflex"
     assert ending.state.reflex_reason == ending.state.errors
     assert (ending.state.robot_mode, ending.state.generator, ending.state.controller) == (wire.ROBOT_REFLEX, 0, 3)
+    if wrong.rows is not None and generator in (wire.JOINT_POSITION, wire.CARTESIAN_POSE):
+        is_cartesian = generator == wire.CARTESIAN_POSE
+        first, faults = judged_before(robot, wrong.rows, is_cartesian=is_cartesian)
+        assert first == wrong.at
+        assert found <= faults if is_cartesian else found == faults  # A pose that is wrong needs no joint angles.
     if wrong.at >= 0:
         assert ending.sent - 1 in (wrong.at, wrong.at + 1)  # One more may be on its way.
     recover(robot, ending.state.errors)
+
+
+def judged_before(robot: Robot, rows: np.ndarray, *, is_cartesian: bool) -> tuple[int, set[str]]:
+    """Returns the first cycle in which `rcilab.check` finds a motion wrong, and the errors of that cycle."""
+    mode = "cartesian_position" if is_cartesian else "joint_position"
+    report = check(Motion.from_cycles(rows), load_model(MODELS[robot.version]), mode=mode, distance=None)
+    necessary = [violation for violation in report.violations if violation.fault is not None]
+    first = min(round(violation.time / 0.001) for violation in necessary)
+    return first, {v.fault.manual_name for v in necessary if round(v.time / 0.001) == first and v.fault is not None}
+
+
+@pytest.mark.parametrize(("version", "bound"), [(5, "2.175"), (10, "2.62")])
+def test_an_error_is_one_line_with_the_value_and_its_bound(version: int, bound: str) -> None:
+    with fci_arena(version) as place, place.connect() as robot:
+        start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+        robot.play(start, CASES["a joint too fast"].build(start).outputs)
+        place.between(lambda: None)
+        (line,) = place.log("fault")
+    assert line.startswith("joint_motion_generator_velocity_limits_violation: joint 1: commanded velocity 2.")
+    assert line.endswith(f"passes {bound} rad/s; the arm stops")
 
 
 def recover(robot: Robot, errors: tuple[str, ...]) -> None:
