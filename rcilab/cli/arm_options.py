@@ -49,7 +49,7 @@ def add_arm_options(parser: ArgumentParser | _ArgumentGroup) -> None:
 
 
 def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
-    """Returns tool, load and safety box of an arm in one line; "" without any of them."""
+    """Returns tool, load, soft limits and safety box of an arm in one line; "" without any of them."""
     from rcilab.core.spatial import IDENTITY
 
     parts: list[str] = []
@@ -60,6 +60,15 @@ def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
         parts.append(f"tool {_listed(1e3 * tool.position)} mm{turned}")
     if load.mass > 0.0:
         parts.append(f"load {load.mass:g} kg at {_listed(1e3 * load.center_of_mass)} mm")
+    limits = model.limits.joint
+    if limits.own is not None:
+        bounds = zip(limits.lower, limits.upper, limits.own.lower, limits.own.upper, strict=True)
+        changed = [
+            f"joint {number} {math.degrees(lower):g} to {math.degrees(upper):g}"
+            for number, (lower, upper, *own) in enumerate(bounds, 1)
+            if [lower, upper] != own
+        ]
+        parts.append(f"soft limits {', '.join(changed)} deg")
     if box is not None:
         edges = " x ".join(f"{1e3 * edge:g}" for edge in box.size)
         parts.append(f"safety box {edges} mm around {_listed(1e3 * box.T_base_box.position)} mm")

@@ -204,7 +204,8 @@ class Run:
     def duration(self) -> float:
         """Time from the first command to the last recorded cycle, [s].
 
-        With a recorded play-out, to the last played command, from the first.
+        With a recorded play-out, from the first played command to the last one, or to the cycle without a command for
+        which the controller stopped the arm.
         """
         if self.has_playout:
             return played_duration(self.cycles)

@@ -8,6 +8,7 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from rcilab.recording.client_motions import LAG, ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
 from rcilab.recording.run import Run, build_run, load_run
-from rcilab.recording.sent_motion import sent_motion
+from rcilab.recording.sent_motion import check_sent, sent_motion
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
@@ -171,6 +172,25 @@ def test_a_refused_command_is_recorded_with_its_fault() -> None:
     found = report_on_client(run, end)
     assert "stopped: joint 1: commanded" in found.line
     assert all(part in found.text for part in end.stopped.parts)
+
+
+def test_a_motion_that_the_controller_stopped_lasts_until_then() -> None:
+    """In the log, in the run and in its report; a gap of the client at its end is within it."""
+    with watched(lockstep=False) as (place, motions), place.connect() as robot:
+        robot.set_motor_power(1)
+        state = start_moving(robot)
+        for _ in range(100):
+            robot.answer(state, Output(q=state.q_c[:7]))
+            state = robot.next_state(state.message_id)
+        parts = collect(motions, 1)[0]
+        (ended,) = (entry for entry in place.entries if entry.kind == "motion_ended")
+    run = as_run(parts)
+    assert run.faults
+    assert run.duration == pytest.approx(ended.facts["duration"])
+    gaps = np.flatnonzero(run.cycles["missed"])
+    assert run.t[gaps[-1]] - run.begin <= run.duration
+    assert f"{run.duration:.3f} s, stopped" in report_on_client(replace(run, stopped="x"), parts[-1].end).line
+    assert not any("played them in" in note for note in check_sent(run, distance=None).motion.notes)
 
 
 def test_a_motion_right_after_another_keeps_its_first_command() -> None:
