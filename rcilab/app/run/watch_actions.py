@@ -13,6 +13,7 @@ from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watched_controller import WatchedController
+from rcilab.app.setup.configuration_state import SetupState
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import message
 from rcilab.makers.configuration import RobotConfiguration
@@ -44,9 +45,15 @@ class WatchActions:
         self._count = 0
         self._motion: ClientMotion | None = None
         self._shown = float("-inf")
+        self._setup: RobotConfiguration | None = None  # The one that is shown.
 
     def tick(self) -> None:
         """Shows what is new."""
+        world = self._store.state.world.status
+        if world is not None:
+            self._controller.follow(world)
+        if self._controller.setup is not self._setup:
+            self._show_setup()
         for part in self._controller.poll():
             self._add(part)
         if self._motion is not None and self._count >= _FEWEST and time.monotonic() - self._shown > _PERIOD:
@@ -65,6 +72,21 @@ class WatchActions:
             self._report(part)
             self._motion = None
 
+    def _show_setup(self) -> None:
+        """Shows what the controller has, also in the scene."""
+        held = self._setup = self._controller.setup
+        box, tool, load = held.box, held.tool, held.load
+        is_drawn = {
+            "box": box is not None and box.active,
+            "tool": tool is not None and not np.allclose(tool.matrix, np.eye(4)),
+            "load": load is not None and load.mass > 0.0,
+        }
+        setup = SetupState(
+            wanted=SetupState().wanted.updated(held), seen=frozenset(part for part, drawn in is_drawn.items() if drawn)
+        )
+        model = held.applied_to(self._controller.model)
+        self._store.update(model=model, setup=setup, goal=goal_at(model, self._store.state.goal.q))
+
     def _show(self, longest: int, stopped: str | None = None, *, has_ended: bool = False) -> None:
         assert self._motion is not None
         self._rows = [np.concatenate(self._rows)[-_LONGEST:].copy()]
@@ -76,13 +98,9 @@ class WatchActions:
         model, setup = self._motion.model, self._motion.setup
         run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
         plan, recording = draw_plan(run, model), whole_recording(run)
-        wanted = self._store.state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
-        setup = replace(self._store.state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
-        self._store.update(
-            model=model, setup=setup, plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0
-        )
+        self._store.update(plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0)
         if has_ended:
-            self._store.update(goal=goal_at(model, run.q_c[-1]))
+            self._store.update(goal=goal_at(self._store.state.model, run.q_c[-1]))
 
     def _report(self, part: MotionPart) -> None:
         end, motion = part.end, part.motion

@@ -16,12 +16,14 @@ from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
 from rcilab.core.state import ControllerMode, Mode, RobotMode, require_mode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.model.robot_model import RobotModel
 from rcilab.recording.client_motions import ClientMotions, MotionPart
+from rcilab.sim.setup_requests import as_setup
 
 if TYPE_CHECKING:
     from rcilab.core.fault import FaultCode
-    from rcilab.makers.configuration import RobotConfiguration
+    from rcilab.sim.api import WorldStatus
 
 _DISPLAY_LAG = 5  # [cycles] The command for a row this old has arrived, or it is drawn without.
 _SILENCE = 0.5  # [s] Without a new cycle, after which the process is looked for.
@@ -66,6 +68,10 @@ class WatchedController:
         """The arm, without tool and load."""
         self.name: str = self._facts["url"]
         """Address of the controller."""
+        self.setup = RobotConfiguration()
+        """The configuration in force; the same object until a part changes. Without a safety box it has none."""
+        self._world: WorldStatus | None = None
+        self.follow(found)
         self._lock = threading.Lock()  # Guards what `poll` writes and `status` reads.
         self._mode: Mode = "joint_position"
         self._motion_time: float | None = None
@@ -81,6 +87,13 @@ class WatchedController:
             for part in parts:
                 self._count(part)
         return parts
+
+    def follow(self, world: WorldStatus) -> None:
+        """Takes the configuration in force from a status of the simulation port; one thread calls it."""
+        before, self._world = self._world, world
+        parts = ("tool", "load", "box", "soft_limits")
+        if before is None or any(getattr(before, part) != getattr(world, part) for part in parts):
+            self.setup = _configuration(world)
 
     def status(self) -> SupervisorStatus:
         """Returns what the newest cycle shows."""
@@ -116,6 +129,7 @@ class WatchedController:
                 motion_plan_time=self._motion_time,
                 mode=self._mode,
                 controller_pid=self._pid,
+                setup=self.setup,
             )
 
     def robot(self) -> NoReturn:
@@ -194,3 +208,14 @@ class WatchedController:
 
     def _faults(self, bits: int) -> tuple[FaultCode, ...]:
         return tuple(fault for fault in self.model.description.faults if bits >> fault & 1) if bits else ()
+
+
+def _configuration(world: WorldStatus) -> RobotConfiguration:
+    """Returns the configuration that a controller reports; None for a part that it does not."""
+    limits = world.soft_limits
+    return RobotConfiguration(
+        tool=None if world.tool is None else as_setup(world.tool).T_flange_tool,
+        load=None if world.load is None else as_setup(world.load).load,
+        box=None if world.box is None else as_setup(world.box).safety_box,
+        joints=None if limits is None else SoftJointLimits(lower=tuple(limits.lower), upper=tuple(limits.upper)),
+    )
