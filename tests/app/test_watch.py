@@ -33,6 +33,7 @@ from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
 from rcilab.model.dynamics.payload import Payload
+from rcilab.recording.client_motions import ClientMotions, MotionPart
 from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.plots import Plots
@@ -40,6 +41,7 @@ from rcilab.workbench.panels.setup import SetupPanel
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import ControlException
+from tests.sim.test_cycle_capture import Bench
 from tests.waiting import wait_for
 
 NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad]
@@ -117,6 +119,44 @@ def test_a_motion_in_progress_is_drawn_without_a_violation_at_its_end(place: Are
         plan = draw_plan(cut, run.model)
         assert plan.report.ok, count
         assert len(plan.report.usage().ratio) == len(plan.motion.q)  # The scene colours the path by it.
+
+
+def test_commands_that_come_late_are_drawn_as_they_are_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the motion is in progress and after its end; a burst at its start answers old states."""
+    monkeypatch.setattr("rcilab.app.run.watch_actions._PERIOD", -1.0)
+    bench = Bench()
+    bench.end()  # A page and a recorder read the next motion.
+    controller = WatchedController(lie(status(record=bench.ring.descriptor)))
+    recorder = ClientMotions(bench.ring)
+    store = Store(UiState(model=controller.model, goal=goal_at(controller.model, controller.model.home)))
+    actions, parts = WatchActions(store, controller), list[MotionPart]()
+
+    def advance(count: int) -> list[int]:
+        """The page looks at every cycle; returns the numbers of their states."""
+        numbers: list[int] = []
+        for _ in range(count):
+            numbers.append(bench.number)
+            bench.cycles(1)
+            actions.tick()
+        parts.extend(recorder.poll())
+        return numbers
+
+    bench.start()
+    for count in (30, *(1,) * 400, 65, *(1,) * 300):
+        for number in advance(count):
+            bench.send(number)
+        assert store.state.plan is None or store.state.plan.motion.notes == ()
+    bench.end()
+    actions.tick()
+    parts.extend(recorder.poll())
+    controller.close()
+    bench.ring.close()
+    assert parts[-1].end is not None
+    assert parts[-1].end.late > 10
+    shown = store.state.recording
+    assert shown is not None
+    assert shown.run is not None
+    assert shown.run.cycles.tobytes() == np.concatenate([part.cycles for part in parts]).tobytes()
 
 
 def shown_violations(state: UiState) -> set[str]:

@@ -18,7 +18,7 @@ from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import message
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import RobotModel
-from rcilab.recording.client_motions import ClientMotion, MotionPart
+from rcilab.recording.client_motions import LAG, ClientMotion, MotionPart
 from rcilab.recording.client_report import check_client
 from rcilab.recording.run import Run, build_run
 
@@ -42,7 +42,8 @@ class WatchActions:
     def __init__(self, store: Store, controller: WatchedController) -> None:
         self._store, self._controller = store, controller
         self._rows: list[NDArray[np.void]] = []
-        self._count = 0
+        self._count = 0  # Cycles of the motion so far.
+        self._next = 0  # Number of the row after them.
         self._motion: ClientMotion | None = None
         self._shown = float("-inf")
         self._setup: RobotConfiguration | None = None  # The one that is shown.
@@ -56,18 +57,23 @@ class WatchActions:
             self._show_setup()
         for part in self._controller.poll():
             self._add(part)
-        if self._motion is not None and self._count >= _FEWEST and time.monotonic() - self._shown > _PERIOD:
+        if self._motion is not None and self._has_rows and time.monotonic() - self._shown > _PERIOD:
             self._show(_WINDOW)
             self._shown = time.monotonic()
 
+    @property
+    def _has_rows(self) -> bool:
+        return sum(map(len, self._rows)) >= _FEWEST
+
     def _add(self, part: MotionPart) -> None:
         if self._motion is not part.motion or part.skipped:
-            self._motion, self._rows, self._count = part.motion, [], 0
+            self._motion, self._rows, self._count = part.motion, [], part.skipped
         if len(part.cycles):
             self._rows.append(part.cycles)
             self._count += len(part.cycles)
+            self._next = part.next
         if part.end is not None:
-            if self._count >= _FEWEST:
+            if self._has_rows:
                 self._show(_LONGEST, part.end.stopped, has_ended=True)
             self._report(part)
             self._motion = None
@@ -90,6 +96,7 @@ class WatchActions:
     def _show(self, longest: int, stopped: str | None = None, *, has_ended: bool = False) -> None:
         assert self._motion is not None
         self._rows = [np.concatenate(self._rows)[-_LONGEST:].copy()]
+        self._controller.refresh(self._rows[0] if has_ended else self._rows[0][-LAG:], self._next)
         cycles = self._rows[0][-longest:]
         is_whole = len(cycles) == self._count
         if not is_whole:

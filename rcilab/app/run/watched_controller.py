@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rcilab.core.fault import FaultCode
     from rcilab.sim.api import WorldStatus
 
-_DISPLAY_LAG = 5  # [cycles] The command for a row this old has arrived, or it is drawn without.
+_DISPLAY_LAG = 5  # [cycles] The command for a row this old has usually arrived; `refresh` adds others.
 _SILENCE = 0.5  # [s] Without a new cycle, after which the process is looked for.
 _RATE_WINDOW = 1.0  # [s]
 _RESPONSES = 4096  # Newest ones, for the percentiles.
@@ -94,6 +94,10 @@ class WatchedController:
         parts = ("tool", "load", "box", "soft_limits")
         if before is None or any(getattr(before, part) != getattr(world, part) for part in parts):
             self.setup = _configuration(world)
+
+    def refresh(self, cycles: NDArray[np.void], next: int) -> None:
+        """Adds the commands to cycles of `poll` that have arrived since, see `ClientMotions.refresh`."""
+        self._motions.refresh(cycles, next)
 
     def status(self) -> SupervisorStatus:
         """Returns what the newest cycle shows."""
