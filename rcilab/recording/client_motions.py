@@ -70,6 +70,8 @@ class MotionPart:
     """From the state on that the first played command answers, with the time `t` since then, shape (N,)."""
     next: int
     """Number of the row after these in the record."""
+    length: int = 0
+    """With the end: cycles of the whole motion."""
     end: MotionEnd | None = None
     skipped: int = 0
     """Cycles of the motion right before these that were overwritten before they were read."""
@@ -196,7 +198,8 @@ class ClientMotions:
         if len(cycles) or end is not None:
             skipped = sum(len(range(max(gap.start, self._row), min(gap.stop, row or gap.stop))) for gap in self._gaps)
             self._gaps = []
-        return MotionPart(motion=self._motion, cycles=cycles, next=self._first, end=end, skipped=skipped)
+        length = 0 if row is None else row - self._row
+        return MotionPart(motion=self._motion, cycles=cycles, next=self._first, length=length, end=end, skipped=skipped)
 
     def _take(self, *, is_whole: bool) -> NDArray[np.void]:
         """Returns the waiting rows of the motion, with their times.
