@@ -8,7 +8,8 @@ millisecond and without sending a state; otherwise the delay of its commands wou
 
 In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
 commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
-client answers the state after the last one. Torques that are skipped have no cycle.
+client answers the state after the last one. So it is with torques; a client that answers a state again, as the vendor's
+does when the next one is late, does not receive the state of that cycle, as if it had been lost.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
+from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arrivals import (
     Arrival,
     ClientConnected,
@@ -239,6 +241,9 @@ class ArmServer:
                 self._await_recorder()
                 self._await_command()
                 self._timer.restart(self._clock.now())
+                if self._repeats_answer:
+                    self._advance_unsent()
+                    continue
             else:
                 due = self._timer.next(self._clock.now())
                 if not (self._is_idle and has_served):
@@ -327,8 +332,11 @@ class ArmServer:
     @property
     def _command_timeout(self) -> float:
         """Timeout for the next command in lock-step, [s]."""
-        if self._has_timed_out:
-            return CYCLE_TIME
+        return CYCLE_TIME if self._has_timed_out else self._patience
+
+    @property
+    def _patience(self) -> float:
+        """Timeout for a command in lock-step while the client is active, [s]."""
         if self.config.patience is not None:
             return self.config.patience
         return CORRUPTED_TIMEOUT if any(faults.corrupt for faults in self._network.faults) else COMMAND_TIMEOUT
@@ -379,9 +387,19 @@ class ArmServer:
         extra = playout.backlog if self.config.lockstep else int(playout.pop_extra_cycle())
         for _ in range(extra):
             if self.controller.wants_commands:
-                self._advance(is_sent=False)
-                if self._capture is not None:
-                    self._capture.write()
+                self._advance_unsent()
+
+    @property
+    def _repeats_answer(self) -> bool:
+        """Whether the next torque answers a state that was answered before."""
+        arm = self.controller.arm
+        return arm.mode.law is ControlLaw.TORQUE and arm.playout.is_behind(self.controller.cycle_number)
+
+    def _advance_unsent(self) -> None:
+        """Advances by a cycle whose state is not sent."""
+        self._advance(is_sent=False)
+        if self._capture is not None:
+            self._capture.write()
 
     def _log_event(self, kind: str, text: str, **facts: object) -> None:
         """Logs an event of the maker's controller, after the fault that caused it."""
@@ -424,11 +442,18 @@ class ArmServer:
             text = f"{name_faults(faults)}: {_shortened(controller.reason)}; the arm stops"
             self._log.write("fault", text, faults=names, reason=str(controller.reason), phase=controller.phase_name)
             if controller.lacks_commands and controller.arm.playout.lost:
-                text = (
-                    "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer "
-                    "needs SCHED_FIFO, or --lockstep"
-                )
-                self._log.write("advice", text)
+                self._log.write("advice", self._advise_on_pauses())
+
+    def _advise_on_pauses(self) -> str:
+        if self.config.lockstep:
+            return (
+                f"lock-step waits {self._patience:g} s for a command; a longer --patience is for a client that "
+                "pauses for longer, as in a debugger"
+            )
+        return (
+            "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer needs "
+            "SCHED_FIFO, or --lockstep"
+        )
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:

@@ -19,6 +19,7 @@
 * If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
   cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
+  In lock-step none is: the loop runs a cycle for each that answers a state that was answered before (`is_behind`).
 * A long gap, or ids that start again far behind, mean that the client has restarted its numbering: the command is
   treated as the next one.
 """
@@ -78,16 +79,18 @@ class JitterBuffer:
         self._queue: deque[ArmCommand] = deque()
         self.begin()
 
-    def begin(self, *, max_queued: int | None = None) -> None:
+    def begin(self, *, prefill: int | None = None, max_queued: int | None = None) -> None:
         """Resets everything for the first command of a motion.
 
         Args:
+            prefill: Cycles between the first command's arrival and its play-out in this motion; None: as usual.
             max_queued: Largest number of queued commands next to the one that is played: it replaces the prefill, and
                 older commands are skipped. None: as many as fit.
         """
         self._queue.clear()
         self._max_queued = max_queued
-        self._countdown = self._prefill if self._max_queued is None else self._max_queued
+        self._delay = self._prefill if prefill is None else prefill
+        self._countdown = self._delay if self._max_queued is None else self._max_queued
         self._newest: ArmCommand | None = None
         self._is_repeating = False
         self._lowest, self._observed, self._excess = CAPACITY, 0, 0
@@ -120,7 +123,16 @@ class JitterBuffer:
     @property
     def backlog(self) -> int:
         """Queued commands beyond the prefill, next to that of the coming cycle; 0 where older ones are skipped."""
-        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self._prefill, 0)
+        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self._delay, 0)
+
+    def is_behind(self, newest: int) -> bool:
+        """Whether the next command answers a state that the prefill does not explain, before the `newest` sent one.
+
+        Its client has answered a state twice, because it received the next one late.
+        """
+        if not (self.is_playing and self._queue):
+            return False
+        return 0 < newest - self._delay - self._queue[0].number <= CAPACITY
 
     @property
     def success_rate(self) -> float:

@@ -49,17 +49,21 @@ class StreamedMotion:
 
     Args:
         prefill: Cycles between the first command and its play-out.
-        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        torque_prefill: The same for torques. None: `prefill`, `TORQUE_PREFILL` at most.
+        skips_torques: Whether torques that are older are skipped.
         lost_limit: Consecutive lost commands that end the motion with a violation; None: no limit. Where commands are
             held, those that are at most `LATE_TOLERANCE` late do not count.
     """
 
-    def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
+    def __init__(
+        self, prefill: int, torque_prefill: int | None, lost_limit: int | None, *, skips_torques: bool = True
+    ) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.playback: Playback | None = None
         self.mode = MotionMode(ControlLaw.POSITION, False)
         self._torque_prefill = min(prefill, TORQUE_PREFILL) if torque_prefill is None else torque_prefill
+        self._skips_torques = skips_torques
         self._lost_limit = lost_limit
         self.on_loss: LossBehaviour = "hold"
         self._generator: MotionGenerator | None = None
@@ -84,7 +88,12 @@ class StreamedMotion:
             on_loss: What the arm does without commands; torques are held in any case.
         """
         self.mode, self.on_loss = mode, on_loss
-        self.playout.begin(max_queued=self._torque_prefill if mode.law is ControlLaw.TORQUE else None)
+        if mode.law is not ControlLaw.TORQUE:
+            self.playout.begin()
+        elif self._skips_torques:
+            self.playout.begin(max_queued=self._torque_prefill)
+        else:
+            self.playout.begin(prefill=self._torque_prefill)
 
     def begin(self, generator: MotionGenerator) -> None:
         """Plays commands from now on."""
