@@ -126,7 +126,14 @@ def parse_tool(text: str, option: str = "--tool") -> Pose:
     Raises:
         InvalidValueError: The text is not valid.
     """
-    return _pose(text, text, option, TOOL_FORM)
+    from rcilab.makers.maker import Capabilities
+
+    tool = _pose(text, text, option, TOOL_FORM)
+    distance, longest = math.hypot(*tool.position.tolist()), Capabilities().longest_tool
+    if distance > longest:
+        problem = f"is {distance:g} m from the flange, at most {longest:g} m; lengths without a unit are in m"
+        raise InvalidValueError(option, text, problem)
+    return tool
 
 
 def parse_load(text: str, option: str = "--load") -> Payload:
@@ -205,7 +212,18 @@ def _pose(text: str, part: str, option: str, form: str) -> Pose:
         raise _invalid(text, option, form)
     position = _quantities(text, numbers[:3], 3, _LENGTH, option, form)
     turns = _quantities(text, numbers[3:], 3, _ANGLE, option, form) if numbers[3:] else (0.0, 0.0, 0.0)
-    return Pose.from_rpy(position, turns)
+    return Pose.from_rpy(position, require_turns(turns, option))
+
+
+def require_turns(turns: tuple[float, ...], name: str) -> tuple[float, ...]:
+    """Returns turns about three axes, [rad], if none is more than a full one.
+
+    Raises:
+        InvalidValueError: One is: degrees without their unit.
+    """
+    if max(map(abs, turns)) > math.tau:
+        raise InvalidValueError(name, list(turns), "turns by more than 2 pi; angles without a unit are in rad")
+    return turns
 
 
 def _quantities(
