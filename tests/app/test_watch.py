@@ -34,8 +34,9 @@ from rcilab.core.state import RobotMode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
 from rcilab.model.dynamics.payload import Payload
 from rcilab.recording.client_motions import ClientMotions, MotionPart
-from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
+from rcilab.sim.api import NetworkFaults, WorldStatus, decode_world_answer, encode_world_answer
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.panels.setup import SetupPanel
 from tests.peers import programs, wire
@@ -210,6 +211,38 @@ def test_a_refused_command_is_drawn_and_reported(place: Arena, watching) -> None
         robot.automatic_error_recovery()
     assert store.state.plan is not None
     assert not store.state.plan.report.ok
+
+
+def test_health_counts_a_motion_as_notice_and_log_do() -> None:
+    network = NetworkFaults(loss=0.02, reorder=0.02)
+    with arena(is_recorded=True, world_port=0, network=network, states_network=NetworkFaults(), patience=0.02) as place:
+        assert place.server.world_address is not None
+        controller = WatchedController(place.server.world_address)
+        model = controller.model
+        store = Store(UiState(model=model, goal=goal_at(model, model.home), watched=controller.name))
+        actions = WatchActions(store, controller)
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=0.2)
+            wait_for(lambda: (actions.tick(), store.state.notice is not None)[1])
+        assert store.state.notice is not None
+        counts = store.state.notice.text.values
+        status = controller.status()
+        assert status.lost_cycles > 0
+        assert (status.lost_cycles, status.late_cycles) == (counts["lost"], counts["late"])
+        assert status.success_rate < 1.0
+        table = health_html(store.state, status, Text("en"))
+        assert f"<td>{counts['lost']} of " in table
+        assert f" without a command; {counts['late']} commands late<" in table
+        assert "100.0 %" not in table
+        assert "control process" not in table
+        assert status.answer_time is not None
+        assert status.round_trip is not None
+        assert 0.0005 < status.round_trip < 0.01
+        with world_of(place) as world:
+            world.press("estop")
+            wait_for(lambda: controller.status().is_pressed)
+        assert controller.status().powered is False
+        controller.close()
 
 
 def test_a_page_that_watches_sends_nothing(watching) -> None:

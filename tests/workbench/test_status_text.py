@@ -223,6 +223,8 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
         chips = {chip["id"]: chip["value"] for chip in status_values(state, now, Text("en"), 1.0)["chips"]}
         assert chips["success"] == bar
         assert f"<td>{table}" in health_html(state, now, Text("en"))
+    almost = status(phase="idle", code="idle", success_rate=0.9996, motion_time=1.5)
+    assert Text("en").render(describe_success(almost)) == "99.9 % in the last motion", "100.0 % is every command"
     rested = status(success_rate=1.0)
     assert Text("en").render(describe_success(rested)) == "—", "no motion yet"
 
