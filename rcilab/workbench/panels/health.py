@@ -36,7 +36,7 @@ class HealthPanel:
         with gui.add_folder(self._text("run.health"), expand_by_default=False):
             self._health = Html(gui)
             self._histogram = Html(gui)
-        gui.add_html(f'<p class="rl-note">{esc(self._text("stop.note"))}</p>')
+        gui.add_html(f'<p class="rl-note">{esc(self._text("watch.stop" if state.watched else "stop.note"))}</p>')
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the robot."""
