@@ -6,6 +6,7 @@ keys, because their buttons differ.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from rcilab.control_process.process_supervisor import ANSWER_TIMEOUT
@@ -91,7 +92,8 @@ def describe_success(status: SupervisorStatus) -> Message:
     if not is_moving and status.motion_time is None:
         return message("health.success_none")
     code = "health.success_now" if is_moving else "health.success_last"
-    return message(code, share=f"{100.0 * status.success_rate:.1f}")
+    share = math.floor(1000.0 * status.success_rate + 1e-9) / 10.0  # Rounded down: 100.0 % is all of them.
+    return message(code, share=f"{share:.1f}")
 
 
 def health_values(status: SupervisorStatus, text: Text) -> dict[str, str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from rcilab.cli.arm_options import parse_angles, parse_lengths, parse_mass
+from rcilab.cli.arm_options import parse_angles, parse_lengths, parse_mass, require_turns
 from rcilab.core.atomic_file import read_limited
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.safety_box import SafetyBox
@@ -103,7 +103,7 @@ def _lengths(value: Any, name: str) -> tuple[float, ...]:
 
 
 def _turns(value: Any, name: str) -> tuple[float, ...]:
-    return _angles(value, name) if isinstance(value, str) else as_floats(value, 3, name, "rad")
+    return require_turns(_angles(value, name) if isinstance(value, str) else as_floats(value, 3, name, "rad"), name)
 
 
 def _mass(value: Any, name: str) -> float:

@@ -50,7 +50,7 @@ def add_arm_options(parser: ArgumentParser | _ArgumentGroup) -> None:
 
 
 def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
-    """Returns tool, load and safety box of an arm in one line; "" without any of them."""
+    """Returns tool, load, soft limits and safety box of an arm in one line; "" without any of them."""
     from rcilab.core.spatial import IDENTITY
 
     parts: list[str] = []
@@ -61,6 +61,15 @@ def describe_arm(model: RobotModel, box: SafetyBox | None) -> str:
         parts.append(f"tool {_listed(1e3 * tool.position)} mm{turned}")
     if load.mass > 0.0:
         parts.append(f"load {load.mass:g} kg at {_listed(1e3 * load.center_of_mass)} mm")
+    limits = model.limits.joint
+    if limits.own is not None:
+        bounds = zip(limits.lower, limits.upper, limits.own.lower, limits.own.upper, strict=True)
+        changed = [
+            f"joint {number} {math.degrees(lower):g} to {math.degrees(upper):g}"
+            for number, (lower, upper, *own) in enumerate(bounds, 1)
+            if [lower, upper] != own
+        ]
+        parts.append(f"soft limits {', '.join(changed)} deg")
     if box is not None:
         edges = " x ".join(f"{1e3 * edge:g}" for edge in box.size)
         parts.append(f"safety box {edges} mm around {_listed(1e3 * box.T_base_box.position)} mm")
@@ -118,7 +127,14 @@ def parse_tool(text: str, option: str = "--tool") -> Pose:
     Raises:
         InvalidValueError: The text is not valid.
     """
-    return _pose(text, text, option, TOOL_FORM)
+    from rcilab.makers.maker import Capabilities
+
+    tool = _pose(text, text, option, TOOL_FORM)
+    distance, longest = math.hypot(*tool.position.tolist()), Capabilities().longest_tool
+    if distance > longest:
+        problem = f"is {distance:g} m from the flange, at most {longest:g} m; lengths without a unit are in m"
+        raise InvalidValueError(option, text, problem)
+    return tool
 
 
 def parse_tool_and_load(tool: str | None, load: str | None, model: str | None) -> tuple[Pose | None, Payload | None]:
@@ -223,7 +239,18 @@ def _pose(text: str, part: str, option: str, form: str) -> Pose:
         raise _invalid(text, option, form)
     position = _quantities(text, numbers[:3], 3, _LENGTH, option, form)
     turns = _quantities(text, numbers[3:], 3, _ANGLE, option, form) if numbers[3:] else (0.0, 0.0, 0.0)
-    return Pose.from_rpy(position, turns)
+    return Pose.from_rpy(position, require_turns(turns, option))
+
+
+def require_turns(turns: tuple[float, ...], name: str) -> tuple[float, ...]:
+    """Returns turns about three axes, [rad], if none is more than a full one.
+
+    Raises:
+        InvalidValueError: One is: degrees without their unit.
+    """
+    if max(map(abs, turns)) > math.tau:
+        raise InvalidValueError(name, list(turns), "turns by more than 2 pi; angles without a unit are in rad")
+    return turns
 
 
 def _quantities(

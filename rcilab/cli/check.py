@@ -118,7 +118,7 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     """Returns the report and that on the motion to slow down, which must end at standstill; shows its notes."""
     from rcilab.conformance.check import check
     from rcilab.recording.run import Run
-    from rcilab.recording.sent_motion import check_sent, recorded_mode, start_of, with_stop
+    from rcilab.recording.sent_motion import check_sent, recorded_mode, with_stop
 
     found, model, box, mode = subject.found, subject.model, subject.box, subject.mode
     if not isinstance(found, Run):
@@ -135,7 +135,8 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     if len(motion) > len(report.motion) and not (report.ok and args.slow_down is None):
         before = report.motion.duration
         show_note(f"note: to slow it down, a stop of {motion.duration - before:.3f} s is added to the {before:.3f} s")
-    return report, check(motion, model, start=start_of(found, motion, model), box=box, mode=mode)
+    start = None if found.truncated else report.start
+    return report, check(motion, model, start=start, box=box, mode=mode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -179,7 +180,7 @@ def _read_motion(args: Namespace) -> _Subject:
 def _read_run(args: Namespace) -> _Subject:
     from rcilab.model.robot_model import load_model
     from rcilab.recording.run import load_run
-    from rcilab.recording.sent_motion import recorded_mode
+    from rcilab.recording.sent_motion import recorded_mode, with_soft_limits
 
     run = load_run(args.file, max_rows=args.max_rows)
     named = args.model or (None if run.model is None else run.model.name)
@@ -190,6 +191,7 @@ def _read_run(args: Namespace) -> _Subject:
     if model is None or args.model is not None:
         own = {} if model is None else {"tool": model.T_flange_tool, "load": model.load}
         model = load_model(args.model, **own)
+    model = with_soft_limits(model, run)
     model = model if tool is None else model.with_tool(tool)
     model = model if load is None else model.with_load(load)
     notes: list[str] = []

@@ -120,7 +120,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--prefill",
         type=int,
         metavar="N",
-        help="delay commands by N cycles, which absorbs jitter (10, torques 2; lock-step: 0)",
+        help="delay commands by N cycles, which absorbs jitter (10, lock-step: 0; torques 2 in both)",
     )
     parser.add_argument(
         "--patience",

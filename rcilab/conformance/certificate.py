@@ -17,6 +17,7 @@ from rcilab.core.arrays import Unquoted
 from rcilab.core.clearance import ClearanceLimit
 from rcilab.core.errors import CertificateError, InvalidValueError
 from rcilab.core.safety_box import SafetyBox, active_box
+from rcilab.core.spatial import Pose
 from rcilab.core.state import Mode
 from rcilab.model.robot_model import RobotModel, require_model
 from rcilab.motion.motion import Motion, require_motion
@@ -27,6 +28,8 @@ NOT_CHECKED = "not judged"  # The text is part of certificates in saved runs.
 """Certificate part of a motion whose distances were not checked; such a motion cannot be executed."""
 
 MODEL_PARTS = ("model", "limits", "tool", "load")
+_CONTROLLERS = ("tool", "load")
+"""Parts that a controller may have otherwise than the model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ class Certificate:
         if self.parts.get("safety distance") == NOT_CHECKED and "safety distance" not in changed:
             changed.append("safety distance")
         if changed:
-            raise CertificateError(self._reason(changed, start, mode), changed)
+            raise CertificateError(self._reason(changed, start, mode, model), changed)
 
     def __repr__(self) -> str:
         return f"<Certificate {self.digest[:8]} for motion {self.parts['motion'][:8]}>"
@@ -99,7 +102,7 @@ class Certificate:
         moved = StartState(np.array(self.start_q), start.dq, start.ddq)
         return bool(is_near) and self.parts["start state"] == _start_fingerprint(moved)
 
-    def _reason(self, changed: list[str], start: StartState | None, mode: Mode) -> str:
+    def _reason(self, changed: list[str], start: StartState | None, mode: Mode, model: RobotModel) -> str:
         if changed == ["start state"] and start is not None:
             offset = start.q - np.array(self.start_q)
             i = int(np.abs(offset).argmax())
@@ -129,9 +132,25 @@ class Certificate:
                 "the certificate is stale: it does not cover the required safety distance; check the motion "
                 "again with that distance=..."
             )
+        if changed[0] in _CONTROLLERS and changed[-1] in _CONTROLLERS:
+            return _describe_other_setup(changed, model)
         what = " and ".join(filter(None, (", ".join(changed[:-1]), changed[-1])))
         verb = "has" if len(changed) == 1 else "have"
         return f"the certificate is stale: {what} {verb} changed since the motion was checked; check it again"
+
+
+def _describe_other_setup(changed: list[str], model: RobotModel) -> str:
+    tool, load = model.T_flange_tool.position, model.load
+    has = {
+        "tool": f"tool at {', '.join(f'{1e3 * x:.6g}' for x in tool.tolist())} mm from the flange",
+        "load": f"load of {load.mass:g} kg",
+    }
+    has_turn = "tool" in changed and not model.T_flange_tool.is_close(Pose(tool))
+    return (
+        f"the motion was checked with another {' and '.join(changed)} than the arm has: a "
+        f"{' and a '.join(has[name] for name in changed)}{', turned' if has_turn else ''}; check it with robot.model, "
+        "or send what your model has: connect(..., apply=True)"
+    )
 
 
 def issue_certificate(

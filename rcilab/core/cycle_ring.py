@@ -204,6 +204,14 @@ class RingReader:
         end = self.count
         return self._copy(max(end - count, 0), end)
 
+    def read(self, first: int, end: int) -> NDArray[np.void]:
+        """Returns a copy of the rows from `first` to `end`, without those that are overwritten, the oldest.
+
+        It does not move the reader.
+        """
+        rows = self._copy(first, end)
+        return rows[max(0, self.count + 1 - len(self._rows) - first) :]  # Also without those of during the copy.
+
     def skip(self) -> None:
         """Moves the reader behind the newest row."""
         self._next = self.count

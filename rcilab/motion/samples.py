@@ -132,6 +132,8 @@ def _by_header(table: Table, header: list[str], name: str, unit: AngleUnit) -> t
     if sorted(joints) != list(range(1, len(joints) + 1)) or not joints:
         found = ", ".join(str(number) for number in sorted(joints)) or "none"
         problem = f"names the joints {found}; needs q1, q2, ... without a gap (t [s] for times, q1 [deg] for degrees)"
+        if all(title.strip().lstrip("+-").isdecimal() for title in header):
+            problem = "names no joints; begin with a line of names, q1, q2, ..., and use a point for decimals"
         raise InvalidValueError(where, ",".join(header), problem).coded("table_titles")
     return times, np.stack([joints[number] for number in sorted(joints)], axis=1)
 

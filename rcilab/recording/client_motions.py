@@ -21,6 +21,7 @@ from rcilab.recording.run_setup import Setup
 LAG = 1100
 """[cycles] Rows this young are left for the next poll: their commands may still arrive."""
 _SETTLED = 300  # [cycles] After the first played command: all that came in one burst with it have been played.
+_ANSWER = ("sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau")
 _BEFORE = LAG  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
 
 
@@ -67,6 +68,10 @@ class MotionPart:
     motion: ClientMotion
     cycles: NDArray[np.void]
     """From the state on that the first played command answers, with the time `t` since then, shape (N,)."""
+    next: int
+    """Number of the row after these in the record."""
+    length: int = 0
+    """With the end: cycles of the whole motion."""
     end: MotionEnd | None = None
     skipped: int = 0
     """Cycles of the motion right before these that were overwritten before they were read."""
@@ -97,7 +102,7 @@ class ClientMotions:
 
     Args:
         ring: The record.
-        lag: Rows that are left for the next poll, see `LAG`; fewer for a display.
+        lag: Rows that are left for the next poll, see `LAG`; fewer for a display, which reads them again: `refresh`.
 
     Raises:
         UsageError: The record is not that of a known arm.
@@ -151,6 +156,17 @@ class ClientMotions:
             self._drop(len(self._waiting) - _BEFORE)
         return parts
 
+    def refresh(self, cycles: NDArray[np.void], next: int) -> None:
+        """Reads the commands of some cycles again, which may have arrived since, up to those that are overwritten.
+
+        Args:
+            cycles: Cycles of a motion, in order, shape (N,); changed in place.
+            next: Number of the row after them, `MotionPart.next`.
+        """
+        rows = self._reader.read(next - len(cycles), next)
+        for name in _ANSWER:
+            cycles[name][len(cycles) - len(rows) :] = rows[name]
+
     def _read(self, events: list[dict[str, Any]], lag: int, parts: list[MotionPart]) -> None:
         """Reads new rows. After a gap the waiting ones are a part of their own."""
         ended = max((event["row"] for event in events if event["event"] == "end"), default=0)
@@ -182,7 +198,8 @@ class ClientMotions:
         if len(cycles) or end is not None:
             skipped = sum(len(range(max(gap.start, self._row), min(gap.stop, row or gap.stop))) for gap in self._gaps)
             self._gaps = []
-        return MotionPart(motion=self._motion, cycles=cycles, end=end, skipped=skipped)
+        length = 0 if row is None else row - self._row
+        return MotionPart(motion=self._motion, cycles=cycles, next=self._first, length=length, end=end, skipped=skipped)
 
     def _take(self, *, is_whole: bool) -> NDArray[np.void]:
         """Returns the waiting rows of the motion, with their times.
@@ -200,7 +217,7 @@ class ClientMotions:
             played = start + np.flatnonzero(rows["played"][start:end])
             sources = played - rows["age"][played].astype(np.intp)
             is_there = (sources >= 0) & (sources <= played)
-            if not is_whole and (not is_there.any() or end - played[0] < min(self._lag, _SETTLED)):
+            if not is_whole and (not is_there.any() or end - played[0] < _SETTLED):
                 return rows[:0]
             if is_there.any():
                 start = int(sources[is_there].min())

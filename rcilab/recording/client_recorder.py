@@ -92,6 +92,9 @@ class ClientRecorder:
         if len(part.cycles):
             where = f"before {part.cycles['t'][0]:.3f} s"
         number = part.motion.number
+        if not (self._part or len(part.cycles) or part.skipped == part.length):
+            unread = f"{part.skipped} of its {part.length} cycles were {_OVERWRITTEN}"
+            return f"motion {number} is not recorded: in what was read no command was played; {unread}"
         return f"motion {number}: {part.skipped} cycles {where} are not recorded; they were {_OVERWRITTEN}"
 
     def _begin(self, motion: ClientMotion) -> None:

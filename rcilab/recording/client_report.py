@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from rcilab.recording.client_motions import MotionEnd
 from rcilab.recording.playout import played_commands
 from rcilab.recording.run import Run
 from rcilab.recording.sent_motion import check_sent
+
+if TYPE_CHECKING:
+    from rcilab.model.robot_model import RobotModel
 
 _EDGES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # [ms] Between the bars of the histogram.
 _BAR = 40  # Characters of the longest bar.
@@ -55,7 +58,8 @@ def report_on_client(run: Run, end: MotionEnd | None = None, name: str = "motion
         lines += [*(f"Note: {note}" for note in report.motion.notes), str(report), ""]
     lines += _describe_commands(run, end, counts)
     lines += ["", "Settings in force (SI units):"]
-    lines += [f"  {name}: {_format(value)}" for name, value in run.setup.settings.items()]
+    settings = {**({} if run.model is None else _describe_tool(run.model)), **run.setup.settings}
+    lines += [f"  {name}: {_format(value)}" for name, value in settings.items()]
     return ClientReport(line=line, text="\n".join(lines) + "\n")
 
 
@@ -119,6 +123,17 @@ def _format(value: object) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_format, cast("list[object]", value))) + "]"
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _describe_tool(model: RobotModel) -> dict[str, object]:
+    """Returns tool and load of an arm, as the settings of its controller."""
+    load = model.load
+    return {
+        "tool": list(model.T_flange_tool.as_row_major()),
+        "load_mass": load.mass,
+        "load_center_of_mass": load.center_of_mass.tolist(),
+        "load_inertia": load.inertia.tolist(),
+    }
 
 
 def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str]:

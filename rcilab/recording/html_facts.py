@@ -71,4 +71,5 @@ def _health(run: Run, text: Text) -> str:
     timing = run.timing
     if not run.realtime:
         return text("facts.lockstep", lost=timing.lost)
-    return text("facts.timing", lost=timing.lost, late=timing.late, p99=timing.lateness_p99 * 1e6)
+    health = text("facts.timing", lost=timing.lost, late=timing.late)
+    return health if timing.lateness_p99 is None else health + text("facts.p99", p99=timing.lateness_p99 * 1e6)

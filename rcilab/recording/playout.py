@@ -19,7 +19,7 @@ def playout_delay(cycles: NDArray[np.void]) -> int:
     return max(int(np.median(rows - sources)), 1) if rows.size else 1
 
 
-def played_duration(cycles: NDArray[np.void]) -> float:
+def played_span(cycles: NDArray[np.void]) -> float:
     """Returns the time from the first played command to the last one, [s].
 
     Args:
@@ -27,6 +27,18 @@ def played_duration(cycles: NDArray[np.void]) -> float:
     """
     played = np.flatnonzero(cycles["played"])
     return CYCLE_TIME * int(played[-1] - played[0]) if played.size else 0.0
+
+
+def played_duration(cycles: NDArray[np.void]) -> float:
+    """Returns the time from the first played command to the last one, or to the stop for a fault, [s].
+
+    Args:
+        cycles: Rows with `PLAYOUT_FIELDS`, shape (N,).
+    """
+    faulty = np.flatnonzero(cycles["faults"])[:1]
+    ends = np.flatnonzero(cycles["missed"][: faulty[0] + 1])[-1:] if faulty.size else faulty
+    played = np.flatnonzero(cycles["played"])
+    return CYCLE_TIME * int(max([played[-1], *ends]) - played[0]) if played.size else 0.0
 
 
 def played_joints(cycles: NDArray[np.void]) -> JointPath:

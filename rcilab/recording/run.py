@@ -67,14 +67,14 @@ class Timing:
     """From a state's arrival to its command, [s]."""
     response_max: float
     """[s]."""
-    lateness_median: float
-    """[s]."""
-    lateness_p99: float
-    """[s]."""
-    lateness_max: float
-    """[s]."""
+    lateness_median: float | None
+    """[s]; None if it is not known for any command, such as those that a client counts on its own."""
+    lateness_p99: float | None
+    """[s]; None as `lateness_median`."""
+    lateness_max: float | None
+    """[s]; None as `lateness_median`."""
     late: int
-    """Cycles answered more than 1 ms late."""
+    """Cycles answered more than 1 ms late; with a recorded play-out, commands that came after their cycle."""
 
 
 GOAL_TOLERANCE = 5e-4
@@ -204,7 +204,8 @@ class Run:
     def duration(self) -> float:
         """Time from the first command to the last recorded cycle, [s].
 
-        With a recorded play-out, to the last played command, from the first.
+        With a recorded play-out, from the first played command to the last one, or to the cycle without a command for
+        which the controller stopped the arm.
         """
         if self.has_playout:
             return played_duration(self.cycles)
@@ -353,7 +354,7 @@ class Run:
         if len(sent) < 2:
             return Timing(
                 cycles=len(sent), lost=0, period_median=0.0, period_max=0.0, response_median=0.0, response_max=0.0,
-                lateness_median=0.0, lateness_p99=0.0, lateness_max=0.0, late=0,
+                lateness_median=None, lateness_p99=None, lateness_max=None, late=0,
             )  # fmt: skip
         steps = np.diff(sent["message_id"].astype(np.int64))
         if self.has_playout:  # There a number may have several commands.
@@ -362,7 +363,8 @@ class Run:
             lost = (steps // state_cycles(self.cycles) - 1).sum()
         period = np.diff(sent["received_ns"]) * 1e-9
         response = (sent["sent_ns"] - sent["received_ns"]) * 1e-9
-        lateness = sent["lateness"]
+        lateness = sent["lateness"][np.isfinite(sent["lateness"])]
+        late = self.cycles["late"].max() if self.has_playout else (lateness > CYCLE_TIME).sum()
         return Timing(
             cycles=len(sent),
             lost=int(lost),
@@ -370,10 +372,10 @@ class Run:
             period_max=float(period.max()),
             response_median=float(np.median(response)),
             response_max=float(response.max()),
-            lateness_median=float(np.median(lateness)),
-            lateness_p99=float(np.quantile(lateness, 0.99)),
-            lateness_max=float(lateness.max()),
-            late=int((lateness > CYCLE_TIME).sum()),
+            lateness_median=float(np.median(lateness)) if len(lateness) else None,
+            lateness_p99=float(np.quantile(lateness, 0.99)) if len(lateness) else None,
+            lateness_max=float(lateness.max()) if len(lateness) else None,
+            late=int(late),
         )
 
     def save(

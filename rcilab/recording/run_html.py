@@ -46,12 +46,11 @@ def run_html(run: Run, language: str = "en") -> str:
         ("success", f"{float(run.success_rate[-1]):.3f}" if len(run.cycles) else "-"),
         ("lost", f"{timing.lost}"),
     ]
-    if run.realtime:
-        median, p99, largest = (
-            1e6 * time for time in (timing.lateness_median, timing.lateness_p99, timing.lateness_max)
-        )
+    times = [1e6 * t for t in (timing.lateness_median, timing.lateness_p99, timing.lateness_max) if t is not None]
+    if run.realtime and times:
+        median, p99, largest = times
         rows.append(("late", words["card.lateness"].format(median=median, p99=p99, max=largest)))
-    else:
+    elif not run.realtime:
         rows.append(("timing", words["card.lockstep"]))
     cells = "".join(
         f"<tr><th style='text-align:left'>{words[f'card.{name}']}</th><td>{escape(plain_text(value))}</td></tr>"

@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
-from rcilab.core.arrays import described
+import numpy as np
+
+from rcilab.core.arrays import Array, as_vector, described
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 
@@ -46,6 +48,18 @@ class Setup:
             return None
         return SafetyBox(size=tuple(box["size"]), T_base_box=Pose.from_row_major(box["pose"]), active=box["active"])
 
+    @property
+    def joint_limits(self) -> Array | None:
+        """Lower and upper bounds of the joint angles in the controller, where it recorded the run, shape (2, n), [rad].
+
+        Raises:
+            InvalidValueError: They are not numbers.
+        """
+        lower, upper = self.settings.get("joint_lower"), self.settings.get("joint_upper")
+        if lower is None or upper is None:
+            return None
+        return np.stack([as_vector(bound, len(lower), "soft limits of the run", "rad") for bound in (lower, upper)])
+
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields as JSON data."""
         return asdict(self)
@@ -56,12 +70,12 @@ class Setup:
 
         Raises:
             TypeError: A value has another type.
-            LookupError: The safety box is not complete; also an InvalidValueError where it is not valid.
+            LookupError: The safety box is not complete; also an InvalidValueError where it or a limit is not valid.
         """
         found = {item.name: values[item.name] for item in fields(cls) if item.name in values}
         for name, value in found.items():
             if not isinstance(value, {"started_ns": int, "settings": Mapping}.get(name, str)):
                 raise TypeError(f"{name} in its setup is {described(value)}")
         setup = cls(**found)
-        _ = setup.safety_box
+        _ = setup.safety_box, setup.joint_limits
         return setup

@@ -27,7 +27,7 @@ from rcilab.motion.differences import derivatives_from_differences
 from rcilab.motion.inverse_path import inverse_path
 from rcilab.motion.motion import Motion
 from rcilab.motion.stop import plan_stop
-from rcilab.recording.playout import played_commands
+from rcilab.recording.playout import played_commands, played_span
 
 if TYPE_CHECKING:
     from rcilab.conformance.report import Report
@@ -92,8 +92,7 @@ def read_sent(run: Run) -> SentCommands:
     index = _without_pauses(index[: len(q)], q) if is_played else index[: len(q)]
     motion = Motion.from_cycles(_fill_gaps(index, q), period)
     lost = int(index[-1]) + 1 - len(index)
-    notes = (f"{lost} commands did not arrive and are interpolated",) if lost else ()
-    return SentCommands(motion=replace(motion, notes=notes), was_refused=was_refused)
+    return SentCommands(motion=replace(motion, notes=_note_missing(lost)), was_refused=was_refused)
 
 
 def check_sent(
@@ -108,7 +107,7 @@ def check_sent(
 
     Args:
         run: The run.
-        model: The arm; None: that of the run.
+        model: The arm; None: that of the run, with the soft limits that were in force.
         box: The safety box; None: that of the run.
         distance: Required distances of the links; None does not check them.
         mode: The mode; None: that of the run.
@@ -117,7 +116,7 @@ def check_sent(
         InvalidValueError: The run does not name its arm, or an argument is not valid for it.
         UsageError: Nothing was commanded.
     """
-    model = require_model(run.model if model is None else model)
+    model = with_soft_limits(require_model(run.model), run) if model is None else require_model(model)
     box = run.setup.safety_box if box is None else box
     recorded = recorded_mode(run)
     if recorded == "torque":
@@ -125,21 +124,40 @@ def check_sent(
         motion, start = _in_progress(motion) if run.truncated else (_with_duration(motion, run), None)
         return check_torques(motion, torques[-len(motion) :], model, start=start, box=box, distance=distance)
     sent = read_sent(run)
-    motion, reference = sent.motion, None
+    motion = sent.motion
+    record = Record(was_stopped=bool(run.stopped or run.faults or not run.is_complete), refused_pose=sent.was_refused)
+
+    def check_from(
+        motion: Motion, record: Record, start: JointVector | StartState | None, note: tuple[str, ...] = ()
+    ) -> Report:
+        motion = replace(motion, notes=(*motion.notes, *note))
+        return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
+
     if run.truncated:
-        motion, start = _in_progress(motion)
-    else:
-        motion = _with_duration(motion, run)
-        start = start_of(run, motion, model)
-        if start is None and run.has_playout:
-            motion = _with_offset(motion, run, model)
-            reference = None if recorded in COMPLIANT_MODES else run.q_c[0]
-    record = Record(
-        was_stopped=bool(run.stopped or run.faults or not run.is_complete),
-        refused_pose=sent.was_refused,
-        reference=reference,
-    )
-    return check_commands(motion, model, record, start=start, box=box, distance=distance, mode=mode or recorded)
+        motion, state = _in_progress(motion)
+        return check_from(motion, record, state)
+    motion = _with_duration(motion, run)
+    is_compliant = recorded in COMPLIANT_MODES
+    if not run.has_playout:
+        return check_from(motion, record, None if is_compliant else run.q_c[0])
+    if _is_first_refused(run):
+        return check_from(motion, record, run.q_c[0])
+    is_step = _is_step(run, motion, model)
+    as_step = check_from(motion, record, run.q_c[0]) if is_step and not is_compliant else None
+    if as_step is not None and as_step.ok:
+        return as_step
+    absorbed = replace(record, reference=None if is_compliant else run.q_c[0])
+    as_start = check_from(motion, absorbed, None, () if is_compliant and is_step else _note_offset(run, motion))
+    return as_start if as_step is None or _count_violations(as_start) < _count_violations(as_step) else as_step
+
+
+def with_soft_limits(model: RobotModel, run: Run) -> RobotModel:
+    """Returns an arm with the soft limits that were in force in a run; as it is where the run does not name any."""
+    limits = run.setup.joint_limits
+    own = (model if run.model is None else run.model).limits.joint
+    if limits is None or limits.shape[1] != model.n or np.array_equal(limits, (own.lower, own.upper)):
+        return model
+    return model.with_joint_limits(*limits)
 
 
 def recorded_mode(run: Run) -> Mode:
@@ -151,7 +169,8 @@ def recorded_mode(run: Run) -> Mode:
 def sent_torques(run: Run) -> tuple[Motion, Array]:
     """Returns the motion of the arm under the torques that a client commanded, and these torques, shape (N, n), [N m].
 
-    It has the joint angles that the controller reports as commanded, which are the measured ones under torques. A
+    It ends with the last torque, or with the state for which the controller stopped it, until which that is held. It
+    has the joint angles that the controller reports as commanded, which are the measured ones under torques. A
     command that did not arrive is interpolated, so that its change counts over the cycles in which it was held.
 
     Raises:
@@ -161,32 +180,22 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     sent = rows[np.isfinite(rows["command_tau"]).all(axis=1)]
     if not len(sent):
         raise UsageError("in this run no torques were sent")
-    grid = sent["t"][0] + CYCLE_TIME * np.arange(round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1)
+    last = max(sent["t"][-1:].tolist() + rows["t"][rows["faults"] != 0][:1].tolist())
+    grid = sent["t"][0] + CYCLE_TIME * np.arange(round((last - sent["t"][0]) / CYCLE_TIME) + 1)
     q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q_c"].T], axis=1)
     return Motion.from_cycles(q), np.stack(
         [np.interp(grid, sent["t"], column) for column in sent["command_tau"].T], axis=1
     )
 
 
-def start_of(run: Run, motion: Motion, model: RobotModel) -> JointVector | None:
-    """Returns the commanded joint angles before the first command, shape (n,), [rad]; None where they do not bind it.
-
-    A compliant arm stands off its last command, and a controller absorbs the offset of the next first one, as the
-    virtual one does for any arm within its tolerance. They bind a first command that it refused.
-
-    Args:
-        run: The run.
-        motion: Its commands.
-        model: The arm.
-    """
-    if run.truncated or run.setup.mode == "torque":
-        return None
-    is_compliant = run.setup.mode in COMPLIANT_MODES
-    if not run.has_playout:
-        return None if is_compliant else run.q_c[0]
+def _is_first_refused(run: Run) -> bool:
+    """Returns whether the controller refused the first command: otherwise it may have absorbed its offset."""
     first = np.flatnonzero(run.cycles["played"])[:1]
-    is_refused = bool(run.cycles["faults"][first].any())
-    return run.q_c[0] if is_refused or (not is_compliant and _is_step(run, motion, model)) else None
+    return bool(run.cycles["faults"][first].any())
+
+
+def _count_violations(report: Report) -> int:
+    return sum(violation.count for violation in report.violations)
 
 
 def _is_step(run: Run, motion: Motion, model: RobotModel) -> bool:
@@ -195,24 +204,34 @@ def _is_step(run: Run, motion: Motion, model: RobotModel) -> bool:
     return bool((np.abs(motion.start - run.q_c[0]) <= step).all())
 
 
-def _with_offset(motion: Motion, run: Run, model: RobotModel) -> Motion:
-    """Returns a motion with a note on the distance of its start from the arm, if it is more than a first step."""
-    if _is_step(run, motion, model):
-        return motion
+def _note_offset(run: Run, motion: Motion) -> tuple[str, ...]:
+    """Returns a note on the distance of the start of a motion from the arm, if there is one."""
     off = np.abs(motion.start - run.q_c[0])
     joint = int(off.argmax())
+    if not off[joint]:
+        return ()
     note = (
         f"the first command is {with_degrees(float(off[joint]), f'{off[joint]:.3g}')} of joint {joint + 1} from the "
         "arm's commanded position; the virtual controller accepted and absorbed this, so it is not differentiated"
     )
-    return replace(motion, notes=(*motion.notes, note))
+    return (note,)
+
+
+def _note_missing(count: int) -> tuple[str, ...]:
+    """Returns a note on the number of interpolated commands."""
+    if not count:
+        return ()
+    if count == 1:
+        return ("1 command is missing in the record and interpolated: it never came, or came too late",)
+    return (f"{count} commands are missing in the record and interpolated: they never came, or came too late",)
 
 
 def _with_duration(motion: Motion, run: Run) -> Motion:
     """Returns a motion with a note where the controller took another time to play its commands."""
-    if not run.has_playout or abs(motion.duration - run.duration) < CYCLE_TIME / 2.0:
+    span = played_span(run.cycles) if run.has_playout else motion.duration
+    if abs(motion.duration - span) < CYCLE_TIME / 2.0:
         return motion
-    note = f"the commands last {motion.duration:.3f} s, one a cycle; the controller played them in {run.duration:.3f} s"
+    note = f"the commands last {motion.duration:.3f} s, one a cycle; the controller played them in {span:.3f} s"
     return replace(motion, notes=(*motion.notes, note))
 
 

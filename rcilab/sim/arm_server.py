@@ -11,7 +11,8 @@ on, a cycle waits that long for its command before it counts as lost, and the gr
 
 In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
 commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
-client answers the state after the last one. Torques that are skipped have no cycle.
+client answers the state after the last one. So it is with torques; a client that answers a state again, as the vendor's
+does when the next one is late, does not receive the state of that cycle, as if it had been lost.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
+from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arrivals import (
     Arrival,
     ClientConnected,
@@ -243,6 +245,9 @@ class ArmServer:
                 self._await_recorder()
                 self._await_command()
                 self._timer.restart(self._clock.now())
+                if self._repeats_answer:
+                    self._advance_unsent()
+                    continue
             elif self.config.lockstep and self.controller.awaits_start:
                 self._await_start()
                 self._timer.restart(self._clock.now())
@@ -365,8 +370,11 @@ class ArmServer:
     @property
     def _command_timeout(self) -> float:
         """Timeout for the next command in lock-step, [s]."""
-        if self._has_timed_out:
-            return CYCLE_TIME
+        return CYCLE_TIME if self._has_timed_out else self._lockstep_patience
+
+    @property
+    def _lockstep_patience(self) -> float:
+        """Timeout for a command in lock-step while the client is active, [s]."""
         if self.config.patience is not None:
             return self.config.patience
         return CORRUPTED_TIMEOUT if any(faults.corrupt for faults in self._network.faults) else COMMAND_TIMEOUT
@@ -423,10 +431,17 @@ class ArmServer:
             if playout.pop_extra_cycle():
                 self._advance_unsent()
             return
-        while self.controller.wants_commands and (playout.backlog > 0 or (playout.prefill == 0 and arm.is_behind)):
+        while self.controller.wants_commands and (playout.backlog > 0 or (playout.delay == 0 and arm.is_behind)):
             self._advance_unsent()
 
+    @property
+    def _repeats_answer(self) -> bool:
+        """Whether the next torque answers a state that was answered before."""
+        arm = self.controller.arm
+        return arm.mode.law is ControlLaw.TORQUE and arm.playout.answers_again(self.controller.cycle_number)
+
     def _advance_unsent(self) -> None:
+        """Advances by a cycle whose state is not sent."""
         self._advance(is_sent=False)
         if self._capture is not None:
             self._capture.write()
@@ -472,11 +487,18 @@ class ArmServer:
             text = f"{name_faults(faults)}: {_shortened(controller.reason)}; the arm stops"
             self._log.write("fault", text, faults=names, reason=str(controller.reason), phase=controller.phase_name)
             if controller.lacks_commands and controller.arm.playout.lost:
-                text = (
-                    "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer "
-                    "needs SCHED_FIFO, or --lockstep"
-                )
-                self._log.write("advice", text)
+                self._log.write("advice", self._advise_on_pauses())
+
+    def _advise_on_pauses(self) -> str:
+        if self.config.lockstep:
+            return (
+                f"lock-step waits {self._lockstep_patience:g} s for a command; a longer --patience is for a client that "
+                "pauses for longer, as in a debugger"
+            )
+        return (
+            "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer needs "
+            "SCHED_FIFO, or --lockstep"
+        )
 
     def _handle_arrivals(self, arrivals: list[Arrival]) -> None:
         for arrival in arrivals:

@@ -15,7 +15,7 @@ from rcilab.sim.arm_parameters import Floats
 from rcilab.sim.arm_setup import ArmSetup
 from rcilab.sim.log_entry import LOG_FORMATS, LogFormat
 from rcilab.sim.plants import REALISMS, Realism
-from rcilab.sim.streamed_motion import PREFILL, LossBehaviour, require_loss_behaviour
+from rcilab.sim.streamed_motion import PREFILL, TORQUE_PREFILL, LossBehaviour, require_loss_behaviour
 
 PlantKind: TypeAlias = Literal["ideal", "mujoco"]
 PLANT_KINDS: tuple[PlantKind, ...] = get_args(PlantKind)
@@ -83,8 +83,8 @@ class ControllerConfig:
     mode_delay: float | None = None
     """From StartMove to the requested modes, [s]; None: 0.2, or 0.02 in lock-step."""
     prefill: int | None = None
-    """Cycles by which the playback of commands is delayed, to absorb jitter; None: 10, and 2 for torques, or 0 in
-    lock-step."""
+    """Cycles by which the playback of commands is delayed, to absorb jitter; None: 10, or 0 in lock-step, and
+    2 for torques."""
     patience: float | None = None
     """Timeout for a command before it counts as lost, [s]. None: in lock-step 60, so that a client may be paused in a
     debugger, or 0.05 while corruption is simulated; by the clock that of the maker; 0: none."""
@@ -188,3 +188,8 @@ class ControllerConfig:
     def prefill_cycles(self) -> int:
         """Cycles by which the playback of commands is delayed."""
         return self.prefill if self.prefill is not None else 0 if self.lockstep else PREFILL
+
+    @property
+    def torque_prefill_cycles(self) -> int:
+        """Cycles by which the playback of torques is delayed, in lock-step as by the clock."""
+        return TORQUE_PREFILL if self.prefill is None else self.prefill

@@ -135,6 +135,8 @@ class Environment:
                 self._controller.guide(on)
             case SetInput(signal, level):
                 self._controller.set_input(signal, level)
+                what = f"digital input {signal} set {'high' if level else 'low'}, by the simulation port"
+                self._log_change(request, what)
             case LoopBack(on):
                 self._controller.loop_back = on
             case AutoLimit(on):
@@ -169,7 +171,7 @@ class Environment:
             case GetStatus():
                 pass  # Answered before; it changes nothing.
 
-    def _log_change(self, request: SetupRequest | OnLoss, text: str) -> None:
+    def _log_change(self, request: SetupRequest | OnLoss | SetInput, text: str) -> None:
         if self._log is not None:
             self._log("set_up", text, request=request.name, **asdict(request))
 

@@ -19,6 +19,7 @@
 * If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
   cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
+  In lock-step none is: the loop runs a cycle for each that answers a state that was answered before (`answers_again`).
 * Commands that come now and then (goals of a planned motion) are played when they arrive; no cycle is lost.
 * A long gap, or ids that start again far behind, mean that the client has restarted its numbering: the command is
   treated as the next one.
@@ -70,6 +71,7 @@ class JitterBuffer:
         dropped: Commands dropped, oldest first, because the queue was full.
         duplicates: Datagrams dropped as duplicates.
         prefill: Cycles between the first command's arrival and its play-out, from the next motion on.
+        delay: The same of this motion.
         window: Cycles that the success rate covers, from the next motion on.
 
     Args:
@@ -83,10 +85,11 @@ class JitterBuffer:
         self._queue: deque[ArmCommand] = deque()
         self.begin()
 
-    def begin(self, *, max_queued: int | None = None, is_streamed: bool = True) -> None:
+    def begin(self, *, prefill: int | None = None, max_queued: int | None = None, is_streamed: bool = True) -> None:
         """Resets everything for the first command of a motion.
 
         Args:
+            prefill: Cycles between the first command's arrival and its play-out in this motion; None: as usual.
             max_queued: Largest number of queued commands next to the one that is played: it replaces the prefill, and
                 older commands are skipped. None: as many as fit.
             is_streamed: Whether every cycle needs a command.
@@ -94,7 +97,8 @@ class JitterBuffer:
         self._queue.clear()
         self._max_queued = max_queued
         self._is_streamed = is_streamed
-        self._countdown = self.prefill if self._max_queued is None else self._max_queued
+        self.delay = self.prefill if prefill is None else prefill
+        self._countdown = self.delay if self._max_queued is None else self._max_queued
         self._newest: ArmCommand | None = None
         self._is_repeating = False
         self._lowest, self._observed, self._excess = CAPACITY, 0, 0
@@ -127,7 +131,16 @@ class JitterBuffer:
     @property
     def backlog(self) -> int:
         """Queued commands beyond the prefill, next to that of the coming cycle; 0 where older ones are skipped."""
-        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self.prefill, 0)
+        return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self.delay, 0)
+
+    def answers_again(self, newest: int) -> bool:
+        """Whether the next command answers a state that the delay does not explain, before the `newest` sent one.
+
+        Its client has answered a state twice, because it received the next one late.
+        """
+        if not (self.is_playing and self._queue):
+            return False
+        return 0 < newest - self.delay - self._queue[0].number <= CAPACITY
 
     @property
     def success_rate(self) -> float:

@@ -121,6 +121,9 @@ class ReferenceTrajectory:
         if self._can_stop_at_once():
             return iter(())
         dq, ddq = derivatives_from_differences(self.dq, self.ddq)
+        # The response to a pause may accelerate far beyond the limits: within that of the jerk it would run away.
+        dq = np.clip(dq, -self._max_velocity, self._max_velocity)
+        ddq = np.clip(ddq, -self._max_acceleration, self._max_acceleration)
         return iter(plan_stop(self._limits, self.q, dq, ddq).q[1:].tolist())
 
     def _can_stop_at_once(self) -> bool:

@@ -49,17 +49,21 @@ class StreamedMotion:
 
     Args:
         prefill: Cycles between the first command and its play-out.
-        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        torque_prefill: The same for torques. None: `prefill`, `TORQUE_PREFILL` at most.
+        skips_torques: Whether torques that are older are skipped.
         lost_limit: Consecutive lost commands that end the motion with a violation; None: no limit. Where commands are
             held, those that are at most `LATE_TOLERANCE` late do not count.
     """
 
-    def __init__(self, prefill: int, torque_prefill: int | None, lost_limit: int | None) -> None:
+    def __init__(
+        self, prefill: int, torque_prefill: int | None, lost_limit: int | None, *, skips_torques: bool = True
+    ) -> None:
         self.playout = JitterBuffer(prefill)
         self.is_followed = False
         self.playback: Playback | None = None
         self.mode = MotionMode(ControlLaw.POSITION, CommandKind.JOINT_ANGLES)
         self._torque_prefill = torque_prefill
+        self._skips_torques = skips_torques
         self._lost_limit = lost_limit
         self.on_loss: LossBehaviour = "hold"
         self._generator: MotionGenerator | None = None
@@ -81,6 +85,10 @@ class StreamedMotion:
         """Whether the next cycle is lost although the command of a later one is queued."""
         return self.is_followed and self._generator is not None and self.playout.is_behind(self._generator.is_next)
 
+    def set_prefill(self, cycles: int) -> None:
+        """Sets the cycles between the first command and its play-out, of torques too, from the next motion on."""
+        self.playout.prefill = self._torque_prefill = cycles
+
     def prepare(self, mode: MotionMode, on_loss: LossBehaviour) -> None:
         """Resets everything for a motion in this mode.
 
@@ -90,7 +98,14 @@ class StreamedMotion:
                 velocities bridged.
         """
         self.mode, self.on_loss = mode, on_loss if mode.can_hold else "bridge"
-        self.playout.begin(max_queued=self._find_max_queued(mode), is_streamed=mode.is_streamed)
+        if not mode.is_streamed:
+            self.playout.begin(max_queued=0, is_streamed=False)  # Of goals the newest one counts.
+        elif mode.law is not ControlLaw.TORQUE:
+            self.playout.begin()
+        else:
+            usual = min(self.playout.prefill, TORQUE_PREFILL)
+            prefill = usual if self._torque_prefill is None else self._torque_prefill
+            self.playout.begin(prefill=prefill, max_queued=prefill if self._skips_torques else None)
 
     def begin(self, generator: MotionGenerator) -> None:
         """Plays commands from now on."""
@@ -137,13 +152,6 @@ class StreamedMotion:
     def _tolerance(self) -> int:
         """Cycles by which a command may be late before it is lost."""
         return LATE_TOLERANCE if self.on_loss == "hold" else 0
-
-    def _find_max_queued(self, mode: MotionMode) -> int | None:
-        if not mode.is_streamed:
-            return 0  # Of goals the newest one counts.
-        if mode.law is not ControlLaw.TORQUE:
-            return None
-        return min(self.playout.prefill, TORQUE_PREFILL) if self._torque_prefill is None else self._torque_prefill
 
     def _describe_loss(self) -> Remark:
         if not self.playout.is_playing:

@@ -93,7 +93,8 @@ class VirtualArm:
         plant: The plant.
         parameters: The configuration; None: that after power-up.
         prefill: Cycles between the first command of a motion and its play-out.
-        torque_prefill: The same for torques; what is older is skipped. None: `prefill`, `TORQUE_PREFILL` at most.
+        torque_prefill: The same for torques. None: `prefill`, `TORQUE_PREFILL` at most.
+        skips_torques: Whether torques that are older are skipped.
         lost_limit: Consecutive lost commands that end a motion; None: no limit. See `StreamedMotion`.
         on_loss: What the arm does while commands are missing.
         friction_watch: Observes the effect of friction; None: nothing does.
@@ -107,6 +108,7 @@ class VirtualArm:
         *,
         prefill: int = PREFILL,
         torque_prefill: int | None = None,
+        skips_torques: bool = True,
         lost_limit: int | None = LOST_LIMIT,
         on_loss: LossBehaviour = "hold",
         friction_watch: FrictionWatch | None = None,
@@ -123,7 +125,7 @@ class VirtualArm:
         self.playback: Playback | None = None
         self.on_command: Callable[[ArmCommand], None] = lambda command: None
         self._parameters = parameters = ArmParameters.of(model.description) if parameters is None else parameters
-        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit)
+        self._motion = StreamedMotion(prefill, torque_prefill, lost_limit, skips_torques=skips_torques)
         self.warnings: list[str] = []
         self._has_warned = False  # Of the present pause.
         self._friction_watch = friction_watch
@@ -151,6 +153,10 @@ class VirtualArm:
     def parameters(self) -> ArmParameters:
         """The configuration."""
         return self._parameters
+
+    def set_prefill(self, cycles: int) -> None:
+        """Sets the cycles between the first command and its play-out, of torques too, from the next motion on."""
+        self._motion.set_prefill(cycles)
 
     @property
     def is_following(self) -> bool:

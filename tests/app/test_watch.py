@@ -14,22 +14,35 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rcilab.app.check.freshness import outdated
 from rcilab.app.goal.goal import goal_at
+from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.replay import replayed
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watch_actions import WatchActions, draw_plan
 from rcilab.app.run.watched_controller import WatchedController
+from rcilab.app.run.world_state import WorldState
+from rcilab.app.setup.configuration_state import pending_parts
+from rcilab.app.setup.setup_actions import SetupActions
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ProtocolError, UsageError
+from rcilab.core.safety_box import SafetyBox
+from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
-from rcilab.sim.api import WorldStatus, decode_world_answer, encode_world_answer
+from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
+from rcilab.model.dynamics.payload import Payload
+from rcilab.recording.client_motions import ClientMotions, MotionPart
+from rcilab.sim.api import NetworkFaults, WorldStatus, decode_world_answer, encode_world_answer
 from rcilab.workbench.app import Workbench, WorkbenchConfig
+from rcilab.workbench.panels.health import health_html
 from rcilab.workbench.panels.plots import Plots
+from rcilab.workbench.panels.setup import SetupPanel
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import ControlException
+from tests.sim.test_cycle_capture import Bench
 from tests.waiting import wait_for
 
 NEAR = tuple(angle + 0.02 for angle in programs.START[7])  # [rad]
@@ -109,6 +122,44 @@ def test_a_motion_in_progress_is_drawn_without_a_violation_at_its_end(place: Are
         assert len(plan.report.usage().ratio) == len(plan.motion.q)  # The scene colours the path by it.
 
 
+def test_commands_that_come_late_are_drawn_as_they_are_recorded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While the motion is in progress and after its end; a burst at its start answers old states."""
+    monkeypatch.setattr("rcilab.app.run.watch_actions._PERIOD", -1.0)
+    bench = Bench()
+    bench.end()  # A page and a recorder read the next motion.
+    controller = WatchedController(lie(status(record=bench.ring.descriptor)))
+    recorder = ClientMotions(bench.ring)
+    store = Store(UiState(model=controller.model, goal=goal_at(controller.model, controller.model.home)))
+    actions, parts = WatchActions(store, controller), list[MotionPart]()
+
+    def advance(count: int) -> list[int]:
+        """The page looks at every cycle; returns the numbers of their states."""
+        numbers: list[int] = []
+        for _ in range(count):
+            numbers.append(bench.number)
+            bench.cycles(1)
+            actions.tick()
+        parts.extend(recorder.poll())
+        return numbers
+
+    bench.start()
+    for count in (30, *(1,) * 400, 65, *(1,) * 300):
+        for number in advance(count):
+            bench.send(number)
+        assert store.state.plan is None or store.state.plan.motion.notes == ()
+    bench.end()
+    actions.tick()
+    parts.extend(recorder.poll())
+    controller.close()
+    bench.ring.close()
+    assert parts[-1].end is not None
+    shown = store.state.recording
+    assert shown is not None
+    assert shown.run is not None
+    assert shown.run.timing.late == parts[-1].end.late > 10
+    assert shown.run.cycles.tobytes() == np.concatenate([part.cycles for part in parts]).tobytes()
+
+
 def shown_violations(state: UiState) -> set[str]:
     """The curves in which the page marks a violation."""
     plots = Plots(Text("en"))
@@ -162,6 +213,38 @@ def test_a_refused_command_is_drawn_and_reported(place: Arena, watching) -> None
     assert not store.state.plan.report.ok
 
 
+def test_health_counts_a_motion_as_notice_and_log_do() -> None:
+    network = NetworkFaults(loss=0.02, reorder=0.02)
+    with arena(is_recorded=True, world_port=0, network=network, states_network=NetworkFaults(), patience=0.02) as place:
+        assert place.server.world_address is not None
+        controller = WatchedController(place.server.world_address)
+        model = controller.model
+        store = Store(UiState(model=model, goal=goal_at(model, model.home), watched=controller.name))
+        actions = WatchActions(store, controller)
+        with place.connect() as robot:
+            programs.prepare(robot, NEAR, factor=0.2)
+            wait_for(lambda: (actions.tick(), store.state.notice is not None)[1])
+        assert store.state.notice is not None
+        counts = store.state.notice.text.values
+        status = controller.status()
+        assert status.lost_cycles > 0
+        assert (status.lost_cycles, status.late_cycles) == (counts["lost"], counts["late"])
+        assert status.success_rate < 1.0
+        table = health_html(store.state, status, Text("en"))
+        assert f"<td>{counts['lost']} of " in table
+        assert f" without a command; {counts['late']} commands late<" in table
+        assert "100.0 %" not in table
+        assert "control process" not in table
+        assert status.answer_time is not None
+        assert status.round_trip is not None
+        assert 0.0005 < status.round_trip < 0.01
+        with world_of(place) as world:
+            world.press("estop")
+            wait_for(lambda: controller.status().is_pressed)
+        assert controller.status().powered is False
+        controller.close()
+
+
 def test_a_page_that_watches_sends_nothing(watching) -> None:
     store, _, controller = watching
     with pytest.raises(UsageError, match="only watches"):
@@ -172,7 +255,77 @@ def test_a_page_that_watches_sends_nothing(watching) -> None:
     assert reason.code == "ready.watched"
 
 
-def test_what_a_page_that_watches_cannot_do_is_off_on_its_run_tab(place: Arena) -> None:
+def world_of(place: Arena) -> SimulationControl:
+    assert place.server.world_address is not None
+    return SimulationControl(*parse_simulation_port(place.server.world_address))
+
+
+def follow(place: Arena, store: Store, actions: WatchActions) -> None:
+    """Lets the page read the status of the simulation port once."""
+    with world_of(place) as world:
+        store.update(world=WorldState(status=world.status()))
+    actions.tick()
+
+
+def setup_table(store: Store, controller: WatchedController) -> str:
+    panel = SetupPanel(Text("en"), lambda request: None)
+    return panel._verdict_html(store.state, controller.status()) + panel._table_html(store.state, controller.status())
+
+
+def test_a_page_shows_the_setup_of_its_controller_from_the_beginning_and_follows_it() -> None:
+    box = SafetyBox(size=(2.0, 2.0, 2.0), T_base_box=Pose((0.0, 0.0, 0.9)))
+    with arena(is_recorded=True, world_port=0) as place, world_of(place) as world:
+        own = place.cycle.model.limits.joint
+        world.set_tool(Pose((0.0, 0.0, 0.12)))
+        world.set_load(Payload(mass=1.5))
+        world.set_box(box)
+        world.set_soft_limits([-2.0, *own.lower[1:]], [2.0, *own.upper[1:]])
+        assert place.server.world_address is not None
+        controller = WatchedController(place.server.world_address)
+        store = Store(UiState(model=controller.model, goal=goal_at(controller.model, np.zeros(7)), watched="rci://it"))
+        actions = WatchActions(store, controller)
+        actions.tick()
+        state = store.state
+        assert state.setup.seen == {"box", "tool", "load"}
+        assert state.setup.touched == frozenset()
+        assert state.setup.wanted.box is not None
+        assert state.setup.wanted.box.active
+        assert state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.12]
+        assert state.model.load.mass == 1.5
+        assert state.model.limits.joint.upper.tolist() == [2.0, *own.upper[1:]]
+        table = setup_table(store, controller)
+        for value in ("0, 0, 120 mm", "1.50 kg", "on, 2000 × 2000 × 2000 mm", "-115…115"):
+            assert value in table, value
+        before = state.setup
+        follow(place, store, actions)
+        assert store.state.setup is before  # Nothing has changed.
+        world.set_tool(Pose((0.0, 0.0, 0.2)))
+        world.set_box(dataclasses.replace(box, active=False))
+        follow(place, store, actions)
+        assert store.state.setup.seen == {"tool", "load"}
+        assert store.state.model.T_flange_tool.position.tolist() == [0.0, 0.0, 0.2]
+        assert "0, 0, 200 mm" in setup_table(store, controller)
+        controller.close()
+
+
+def test_a_page_that_watches_offers_no_change_of_the_setup(place: Arena, watching) -> None:
+    """Also after a motion, whose tool and load are those of the controller."""
+    store, actions, controller = watching
+    with place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        wait_for(lambda: (actions.tick(), store.state.recording is not None)[1])
+    setup, table = store.state.setup, setup_table(store, controller)
+    assert pending_parts(store.state, controller.status()) == ()
+    assert outdated(store.state) is None
+    assert "Not sent" not in table
+    assert "Send" not in table
+    SetupActions(store, controller).type_field(TypeField(page=None, field="setup.tool.x", text="50"))
+    assert store.state.setup is setup
+    assert store.state.notice is not None
+    assert store.state.notice.text.code == "ready.watched"
+
+
+def test_what_a_page_that_watches_cannot_do_is_off(place: Arena) -> None:
     address, text = place.server.world_address, Text("en")
     with (
         place.connect() as robot,
@@ -183,6 +336,7 @@ def test_what_a_page_that_watches_cannot_do_is_off_on_its_run_tab(place: Arena) 
         handles = bench.server.gui._gui_input_handle_from_uuid.values()
         names = ("connect", "recover", "power_on", "power_off", "plan")
         labels = {text("destination.leave"), *(text(f"run.{name}") for name in names)}
+        labels |= {text("setup.edit"), text("softlimits.lower", joint=1), text("softlimits.upper", joint=7)}
         buttons = [handle for handle in handles if getattr(handle, "label", "") in labels]
         assert len(buttons) == len(labels)
         wait_for(lambda: all(button.disabled for button in buttons))

@@ -71,3 +71,17 @@ def test_bad_text_is_explained_in_one_sentence(parse, text: str, expected: str) 
     message = str(raised.value)
     assert expected in message
     assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        pytest.param(
+            "0,0,120", "120 m from the flange, at most 2 m; lengths without a unit are in m", id="millimetres"
+        ),
+        pytest.param("0,0,0.12,0,0,90", "more than 2 pi; angles without a unit are in rad", id="degrees"),
+    ],
+)
+def test_a_tool_without_its_units_is_refused(text: str, expected: str) -> None:
+    with pytest.raises(InvalidValueError, match=expected):
+        parse_tool(text)

@@ -45,6 +45,19 @@ def test_a_run_is_checked_with_its_own_arm_tool_and_load(tmp_path, capsys):
     assert "xMatePro7" in said
 
 
+def test_a_run_is_checked_with_the_soft_limits_that_were_in_force(tmp_path, capsys):
+    lower, upper = MODEL.limits.joint.lower.tolist(), MODEL.limits.joint.upper.tolist()
+    upper[1] = PLAN.q[:, 1].max() - 0.01
+    settings = {"joint_lower": lower, "joint_upper": upper}
+    cycles = some_cycles()
+    build_run(cycles, plan=None, model=MODEL, setup=replace(SETUP, settings=settings)).save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 1
+    assert (report["violations"][0]["id"], report["violations"][0]["place"]) == ("joint.position", "joint 2")
+    assert "soft limits joint 2 " in report["arm"]
+    assert "joint 1 " not in report["arm"]
+
+
 def test_what_was_sent_is_checked_not_the_plan_and_not_what_the_controller_made_of_it(tmp_path, capsys):
     cycles = some_cycles().copy()
     cycles["command"][200, 3] += 5e-4
@@ -61,7 +74,7 @@ def test_lost_commands_are_interpolated_without_a_step(tmp_path):
     cycles["command"][150:153] = cycles["command"][300] = np.nan
     motion = sent_motion(run_of(cycles))
     np.testing.assert_allclose(motion.q, PLAN.q, atol=2e-8)  # 0.1 of the step that 100 rad/s^3 makes in 3 ms.
-    assert motion.notes == ("4 commands did not arrive and are interpolated",)
+    assert motion.notes == ("4 commands are missing in the record and interpolated: they never came, or came too late",)
     assert sent_motion(run_of(some_cycles())).notes == ()
 
 

@@ -85,6 +85,14 @@ def test_a_stale_certificate_is_refused(robot):
         robot.execute(motion, check(other, MODEL).certificate)
 
 
+def test_a_certificate_for_another_tool_is_refused_with_that_of_the_arm(robot):
+    motion = plan_joint(MODEL, robot.state.q_c, GOAL)
+    certificate = check(motion, MODEL.with_tool(Pose((0.0, 0.0, 0.12)))).certificate
+    with pytest.raises(CertificateError, match=r"another tool than the arm has: a tool at 0, 0, 0 mm") as caught:
+        robot.execute(motion, certificate)
+    assert "check it with robot.model, or send what your model has: connect(..., apply=True)" in str(caught.value)
+
+
 def test_a_motion_that_starts_elsewhere_names_joint_angles_and_remedy(robot):
     elsewhere = np.array(MODEL.home)
     elsewhere[3] += math.radians(2.0)

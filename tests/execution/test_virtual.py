@@ -308,12 +308,12 @@ def readme():
 @pytest.mark.parametrize("plant", ["ideal", "mujoco"])
 @pytest.mark.parametrize("wrong", [{}, {7: 15.0}, {3: 50.0}], ids=["as published", "joint 7", "joint 3"])
 def test_the_joint_gains_of_the_readme_are_stable_and_others_get_advice_on_gains(plant, wrong):
-    """In lock-step with the play-out of a controller that runs free, so that the delay is what the README says."""
+    """In lock-step, where torques are delayed as by the clock: the delay is what the README says."""
     model = load_model("xMatePro7")
     stiffness, damping = (np.array(numbers.split(), dtype=float) for numbers in GAINS.search(readme()).groups())
     for joint, value in wrong.items():
         damping[joint - 1] = value
-    controller = start_controller("xMatePro7", plant, True, options=("--prefill", "2"))
+    controller = start_controller("xMatePro7", plant, True)
     try:
         with connect(str(controller.address), model) as robot:
             robot.power_on()

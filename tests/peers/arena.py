@@ -37,6 +37,7 @@ class Arena:
         settings = {"model": "xMatePro7", "port": 0, "realtime": False, "lockstep": True, "mode_delay": 0.005}
         if options.get("lockstep", True):
             settings["patience"] = 1.0  # A client that falls silent is given up.
+            settings["prefill"] = 0  # Torques, too, act in the next cycle.
         config = ControllerConfig(**{**settings, **options})
         plant = build_plant(config.plant, load_model(config.model))
         self.plant = plant if wrap_plant is None else wrap_plant(plant)

@@ -8,6 +8,7 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,15 @@ from rcilab.conformance.check import check
 from rcilab.core.cycle_log import cycle_dtype
 from rcilab.core.cycle_ring import CAPACITY, CycleRing, RingCounter
 from rcilab.core.errors import UsageError, VersionMismatchError
+from rcilab.i18n.translator import Text
 from rcilab.model.robot_model import load_model
 from rcilab.recording.client_motions import LAG, ClientMotions, MotionPart
 from rcilab.recording.client_recorder import ClientRecorder
 from rcilab.recording.client_report import report_on_client
+from rcilab.recording.columns import facts_text
+from rcilab.recording.html_facts import fact_rows
 from rcilab.recording.run import Run, build_run, load_run
-from rcilab.recording.sent_motion import sent_motion
+from rcilab.recording.sent_motion import check_sent, sent_motion
 from tests.peers import programs, wire
 from tests.peers.arena import Arena, arena
 from tests.peers.robot import UNFILTERED, ControlException, Output, Robot
@@ -173,6 +177,25 @@ def test_a_refused_command_is_recorded_with_its_fault() -> None:
     assert all(part in found.text for part in end.stopped.parts)
 
 
+def test_a_motion_that_the_controller_stopped_lasts_until_then() -> None:
+    """In the log, in the run and in its report; a gap of the client at its end is within it."""
+    with watched(lockstep=False) as (place, motions), place.connect() as robot:
+        robot.set_motor_power(1)
+        state = start_moving(robot)
+        for _ in range(100):
+            robot.answer(state, Output(q=state.q_c[:7]))
+            state = robot.next_state(state.message_id)
+        parts = collect(motions, 1)[0]
+        (ended,) = (entry for entry in place.entries if entry.kind == "motion_ended")
+    run = as_run(parts)
+    assert run.faults
+    assert run.duration == pytest.approx(ended.facts["duration"])
+    gaps = np.flatnonzero(run.cycles["missed"])
+    assert run.t[gaps[-1]] - run.begin <= run.duration
+    assert f"{run.duration:.3f} s, stopped" in report_on_client(replace(run, stopped="x"), parts[-1].end).line
+    assert not any("played them in" in note for note in check_sent(run, distance=None).motion.notes)
+
+
 def test_a_motion_right_after_another_keeps_its_first_command() -> None:
     """The end of a motion is read before the client has answered the first state of the next one."""
     with watched() as (place, motions), place.connect() as robot:
@@ -274,11 +297,30 @@ def test_commands_with_other_numbers_than_those_of_the_states_are_recorded_as_pl
     assert f"{count} commands, 0 late; 0 cycles without one" in found.line
 
 
-def synthetic_rows(ring: CycleRing, first: int, count: int, motion: int = 1) -> None:
+def test_a_run_whose_commands_have_no_lateness_is_exported_without_one() -> None:
+    """A client that counts on its own answers no state."""
+    with watched() as (place, motions), place.connect() as robot:
+        robot.set_motor_power(1)
+        robot.start_move(wire.JOINT_POSITION, wire.JOINT)
+        state = robot.receive_fresh_state()
+        for step in range(400):
+            robot.send_raw(wire.pack_command(0x7F000000 + step, sine(step, 400)))
+            state = robot.next_state(state.message_id)
+        robot.stop_move()
+        run = replace(as_run(collect(motions, 1)[0]), realtime=True)
+    assert np.isnan(run.cycles["lateness"]).all()
+    assert (run.timing.late, run.timing.lateness_p99, run.timing.lateness_max) == (0, None, None)
+    assert "NaN" not in facts_text(run)
+    facts = dict(fact_rows(run, Text("en", "rcilab.recording")))
+    assert facts["Timing"] == "0 cycles without a command, 0 late"
+    assert "nan" not in run._repr_html_()
+
+
+def synthetic_rows(ring: CycleRing, first: int, count: int, motion: int = 1, *, played: bool = True) -> None:
     """Writes cycles in which the command of the one before is played."""
     rows = np.zeros(count, cycle_dtype(ring.n, complete=True, playout=True))
     rows["message_id"] = rows["sent_ns"] = np.arange(first, first + count) + 1
-    rows["motion"], rows["played"], rows["age"] = motion, 1, 1
+    rows["motion"], rows["played"], rows["age"] = motion, played, 1
     for row, data in zip(rows, range(first, first + count), strict=True):
         start = data % CAPACITY * rows.itemsize
         ring.memory[start : start + rows.itemsize] = row.tobytes()
@@ -335,6 +377,20 @@ def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: 
     assert first.stopped == "this file ends here, the motion went on"
     assert second.t[0] > first.t[-1] + 0.5
     assert sum("cycles before" in line and "are not recorded" in line for line in lines) == 1
+
+
+def test_a_motion_of_which_only_cycles_without_a_command_were_read_is_named(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 1000)
+    recorder.poll()
+    synthetic_rows(ring, 1000, CAPACITY + 1500, played=False)
+    ring.add_event(end_event(1, 2500 + CAPACITY))
+    recorder.poll()
+    recorder.close()
+    (line,) = lines
+    assert line.startswith("motion 1 is not recorded: in what was read no command was played; 2501 of its 18884 cycles")
 
 
 def test_motions_whose_events_were_overwritten_are_named(ring: CycleRing, tmp_path: Path) -> None:
@@ -425,7 +481,12 @@ def test_tool_load_and_settings_in_force_are_recorded() -> None:
         robot.set_load(1.5, (0.0, 0.0, 0.05), (0.01, 0, 0, 0, 0.01, 0, 0, 0, 0.01))
         robot.set_collision_behavior((20.0,) * 7)
         programs.joint_sine(robot, SECONDS, period=SECONDS)
-        motion = collect(motions, 2)[1][0].motion
+        parts = collect(motions, 2)[1]
+    motion = parts[0].motion
+    settings = report_on_client(as_run(parts)).text.split("Settings in force")[1]
+    assert "tool: [1, 0, 0, 0.1, 0, 1," in settings
+    assert "load_mass: 1.5\n" in settings
+    assert "load_center_of_mass: [0, 0, 0.05]\n" in settings
     assert motion.model.load.mass == 1.5
     assert motion.model.T_flange_tool.as_row_major() == pytest.approx(tool)
     assert motion.setup.settings["collision_thresholds"] == [20.0] * 7

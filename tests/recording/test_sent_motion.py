@@ -129,7 +129,9 @@ def test_late_commands_count_at_their_place(sine: Run) -> None:
 
 def test_commands_that_never_arrived_are_interpolated(sine: Run) -> None:
     motion = sent_motion(without(sine, slice(300, 320), arrived=False))
-    assert motion.notes == ("20 commands did not arrive and are interpolated",)
+    assert motion.notes == (
+        "20 commands are missing in the record and interpolated: they never came, or came too late",
+    )
     np.testing.assert_allclose(motion.q, sent_motion(sine).q, rtol=0, atol=1e-6)
 
 
@@ -140,7 +142,7 @@ def test_a_late_command_that_has_no_row_is_interpolated(sine: Run) -> None:
     cycles["command"][sent[320:-1]] = sine.command[sent[321:]]
     cycles["late"][np.flatnonzero(sine.cycles["played"])[320] :] = 21
     motion = sent_motion(replace(sine, cycles=cycles))
-    assert motion.notes == ("1 commands did not arrive and are interpolated",)
+    assert motion.notes == ("1 command is missing in the record and interpolated: it never came, or came too late",)
     np.testing.assert_allclose(motion.q[:1000], sent_motion(sine).q[:1000], rtol=0, atol=1e-6)
 
 
@@ -244,6 +246,67 @@ def test_a_start_that_the_controller_absorbed_is_not_a_jerk(sine: Run, off: floa
     cycles["faults"][first:] = 1
     refused = check_sent(replace(sine, cycles=cycles[: first + 1]), distance=None)
     assert "joint.jerk" in {violation.condition.id for violation in refused.violations}
+
+
+@pytest.mark.parametrize(("off", "is_absorbed"), [(1e-6, False), (4e-6, True), (8e-6, True)])
+def test_a_start_that_is_a_step_or_absorbed_is_what_conforms(sine: Run, off: float, is_absorbed: bool) -> None:
+    """Within one cycle's jerk a controller accepts either; the jerk of a step of 2.5 urad is its bound."""
+    cycles = sine.cycles.copy()
+    cycles["q_c"][0, 0] -= off
+    report = check_sent(replace(sine, cycles=cycles), distance=None)
+    assert report.ok
+    assert any("absorbed this" in note for note in report.motion.notes) is is_absorbed
+    cycles["faults"][np.flatnonzero(cycles["played"])[0] :] = 1
+    assert check_sent(replace(sine, cycles=cycles), distance=None).ok is not is_absorbed
+
+
+def test_a_pose_next_to_the_arm_that_the_controller_accepted_conforms() -> None:
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        robot.start_move(wire.CARTESIAN_POSITION, wire.CARTESIAN)
+        count = 0
+
+        def callback(state: wire.State) -> Output:
+            nonlocal count, pose
+            if not count:
+                pose = kinematics.matrix(state.pos_m)
+                pose[1, 3] += 1e-6  # [m]
+            count += 1
+            return Output(pose=tuple(pose.ravel().tolist()), psi=state.psi_m[0], finished=count == 100)
+
+        pose = np.eye(4)
+        robot.control(callback)
+        run = as_run(collect(motions, 2)[1])
+    assert not run.faults
+    assert check_sent(run, distance=None).ok
+
+
+def recorded_torques(torques: list[float]) -> Run:
+    """Commands torques of joint 7, [N m], until the controller stops the arm."""
+    with watched() as (place, motions), place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        robot.start_move(wire.TORQUE, wire.JOINT)
+        left = iter(torques)
+        with pytest.raises(ControlException):
+            robot.control(lambda state: Output(tau=(0.0,) * 6 + (next(left),)))
+        return as_run(collect(motions, 2)[1])
+
+
+def test_torques_are_checked_up_to_the_state_for_which_the_controller_stopped_the_arm() -> None:
+    run = recorded_torques([min(0.002 * step, 0.4) for step in range(600)])
+    assert [fault.name for fault in run.faults] == ["ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION"]
+    (violation,) = check_sent(run, distance=None).violations
+    assert (violation.condition.id, violation.joint) == ("measured.joint.velocity", 7)
+
+
+def test_the_soft_limits_in_force_are_checked(sine: Run) -> None:
+    upper = MODEL.limits.joint.upper.copy()
+    upper[1] = sent_motion(sine).q[:, 1].max() - 0.01
+    settings = {**sine.setup.settings, "joint_upper": upper.tolist()}
+    report = check_sent(replace(sine, setup=replace(sine.setup, settings=settings)), distance=None)
+    (violation,) = report.violations
+    assert (violation.condition.id, violation.joint) == ("joint.position", 2)
+    assert check_sent(sine, distance=None).ok
 
 
 def test_a_compliant_start_that_the_controller_refused_does_not_conform() -> None:

@@ -29,12 +29,16 @@ class Bench:
     def __init__(self, controller_mode: int = 0, motion_mode: int = 1) -> None:
         arm = VirtualArm(MODEL, build_plant("ideal", MODEL), prefill=0, lost_limit=None)
         self.controller = RciController(arm, mode_delay=0)
-        self.ring = CycleRing.create(7, {})
+        facts = {"model": "xMatePro7", "plant": "ideal", "url": "rci://127.0.0.1", "realtime": False}
+        self.ring = CycleRing.create(7, facts)
         self.capture = CycleCapture(self.ring, self.controller)
         self.reader = self.ring.open_reader()
         self.sent: list[float] = []
         self.controller.handle(rci.SetMotorPower(1))
         self.cycles(1500)
+        self.start(controller_mode, motion_mode)
+
+    def start(self, controller_mode: int = 0, motion_mode: int = 1) -> None:
         self.controller.handle(rci.StartMove(controller_mode, motion_mode))
         while self.controller.state.controller_mode is ControllerMode.OTHER:
             self.cycles(1)

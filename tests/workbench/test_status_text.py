@@ -210,7 +210,9 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
 )
 def test_a_page_that_watches_does_not_claim_to_move_the_arm(language: str, holder: str, note: str):
     state = replace(initial_state(), watched="rci://127.0.0.2:1337", control_lock=ControlLock((1,), 1))
-    chips = {chip["id"]: chip for chip in status_values(state, status(), Text(language), 1.0)["chips"]}
+    bar = status_values(state, status(), Text(language), 1.0)
+    assert bar["stopHint"] == Text(language)("watch.stop")
+    chips = {chip["id"]: chip for chip in bar["chips"]}
     assert chips["controls"]["value"] == holder
     assert "of" not in chips["controls"]
     assert note in note_html(state, Text(language))
@@ -223,6 +225,8 @@ def test_the_share_of_commands_in_time_is_that_of_a_motion_and_marked_as_past_af
         chips = {chip["id"]: chip["value"] for chip in status_values(state, now, Text("en"), 1.0)["chips"]}
         assert chips["success"] == bar
         assert f"<td>{table}" in health_html(state, now, Text("en"))
+    almost = status(phase="idle", code="idle", success_rate=0.9996, motion_time=1.5)
+    assert Text("en").render(describe_success(almost)) == "99.9 % in the last motion", "100.0 % is every command"
     rested = status(success_rate=1.0)
     assert Text("en").render(describe_success(rested)) == "—", "no motion yet"
 

@@ -23,7 +23,7 @@ def beside_program(state: UiState) -> Message | None:
 def outdated(state: UiState) -> Message | None:
     """Returns why the plan is out of date, or None: its program, tool, load, joint limits or safety box changed."""
     plan, program = state.plan, state.program
-    if plan is None:
+    if plan is None or (state.watched and plan.is_recorded):  # What a client commanded stays what it is.
         return None
     stale = plan.stale_parts(state.model, state.setup.wanted.box)
     if plan.program is not None and program.planned is not program.draft:

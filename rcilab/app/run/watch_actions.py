@@ -13,11 +13,12 @@ from rcilab.app.goal.goal import goal_at
 from rcilab.app.planning import Plan, build_plan_view
 from rcilab.app.run.run_recorder import whole_recording
 from rcilab.app.run.watched_controller import WatchedController
+from rcilab.app.setup.configuration_state import SetupState
 from rcilab.i18n.error_messages import describe_note
 from rcilab.i18n.translator import message
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.model.robot_model import RobotModel
-from rcilab.recording.client_motions import ClientMotion, MotionPart
+from rcilab.recording.client_motions import LAG, ClientMotion, MotionPart
 from rcilab.recording.client_report import check_client
 from rcilab.recording.run import Run, build_run
 
@@ -41,33 +42,61 @@ class WatchActions:
     def __init__(self, store: Store, controller: WatchedController) -> None:
         self._store, self._controller = store, controller
         self._rows: list[NDArray[np.void]] = []
-        self._count = 0
+        self._count = 0  # Cycles of the motion so far.
+        self._next = 0  # Number of the row after them.
         self._motion: ClientMotion | None = None
         self._shown = float("-inf")
+        self._setup: RobotConfiguration | None = None  # The one that is shown.
 
     def tick(self) -> None:
         """Shows what is new."""
+        world = self._store.state.world.status
+        if world is not None:
+            self._controller.follow(world)
+        if self._controller.setup is not self._setup:
+            self._show_setup()
         for part in self._controller.poll():
             self._add(part)
-        if self._motion is not None and self._count >= _FEWEST and time.monotonic() - self._shown > _PERIOD:
+        if self._motion is not None and self._has_rows and time.monotonic() - self._shown > _PERIOD:
             self._show(_WINDOW)
             self._shown = time.monotonic()
 
+    @property
+    def _has_rows(self) -> bool:
+        return sum(map(len, self._rows)) >= _FEWEST
+
     def _add(self, part: MotionPart) -> None:
         if self._motion is not part.motion or part.skipped:
-            self._motion, self._rows, self._count = part.motion, [], 0
+            self._motion, self._rows, self._count = part.motion, [], part.skipped
         if len(part.cycles):
             self._rows.append(part.cycles)
             self._count += len(part.cycles)
+            self._next = part.next
         if part.end is not None:
-            if self._count >= _FEWEST:
+            if self._has_rows:
                 self._show(_LONGEST, part.end.stopped, has_ended=True)
             self._report(part)
             self._motion = None
 
+    def _show_setup(self) -> None:
+        """Shows what the controller has, also in the scene."""
+        held = self._setup = self._controller.setup
+        box, tool, load = held.box, held.tool, held.load
+        is_drawn = {
+            "box": box is not None and box.active,
+            "tool": tool is not None and not np.allclose(tool.matrix, np.eye(4)),
+            "load": load is not None and load.mass > 0.0,
+        }
+        setup = SetupState(
+            wanted=SetupState().wanted.updated(held), seen=frozenset(part for part, drawn in is_drawn.items() if drawn)
+        )
+        model = held.applied_to(self._controller.model)
+        self._store.update(model=model, setup=setup, goal=goal_at(model, self._store.state.goal.q))
+
     def _show(self, longest: int, stopped: str | None = None, *, has_ended: bool = False) -> None:
         assert self._motion is not None
         self._rows = [np.concatenate(self._rows)[-_LONGEST:].copy()]
+        self._controller.refresh(self._rows[0] if has_ended else self._rows[0][-LAG:], self._next)
         cycles = self._rows[0][-longest:]
         is_whole = len(cycles) == self._count
         if not is_whole:
@@ -76,13 +105,9 @@ class WatchActions:
         model, setup = self._motion.model, self._motion.setup
         run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
         plan, recording = draw_plan(run, model), whole_recording(run)
-        wanted = self._store.state.setup.wanted.updated(RobotConfiguration(tool=model.T_flange_tool, load=model.load))
-        setup = replace(self._store.state.setup, wanted=wanted, touched=frozenset({"tool", "load"}))
-        self._store.update(
-            model=model, setup=setup, plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0
-        )
+        self._store.update(plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0)
         if has_ended:
-            self._store.update(goal=goal_at(model, run.q_c[-1]))
+            self._store.update(goal=goal_at(self._store.state.model, run.q_c[-1]))
 
     def _report(self, part: MotionPart) -> None:
         end, motion = part.end, part.motion

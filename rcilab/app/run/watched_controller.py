@@ -12,21 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.control_process.status import Lateness, Phase, SupervisorStatus
+from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import NOT_RECORDED
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
 from rcilab.core.state import ControllerMode, Mode, RobotMode, require_mode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
+from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.model.robot_model import RobotModel
-from rcilab.recording.client_motions import ClientMotions, MotionPart
+from rcilab.recording.client_motions import ClientMotion, ClientMotions, MotionPart
+from rcilab.sim.setup_requests import as_setup
 
 if TYPE_CHECKING:
     from rcilab.core.fault import FaultCode
-    from rcilab.makers.configuration import RobotConfiguration
+    from rcilab.sim.api import WorldStatus
 
-_DISPLAY_LAG = 5  # [cycles] The command for a row this old has arrived, or it is drawn without.
+_DISPLAY_LAG = 5  # [cycles] The command for a row this old has usually arrived; `refresh` adds others.
 _SILENCE = 0.5  # [s] Without a new cycle, after which the process is looked for.
 _RATE_WINDOW = 1.0  # [s]
-_RESPONSES = 4096  # Newest ones, for the percentiles.
+_RESPONSES = 4096  # Newest ones of the motion, for the percentiles.
+_MEDIAN = 1000  # [cycles] For the median of a time.
 
 
 class WatchedController:
@@ -66,11 +71,17 @@ class WatchedController:
         """The arm, without tool and load."""
         self.name: str = self._facts["url"]
         """Address of the controller."""
+        self.setup = RobotConfiguration()
+        """The configuration in force; the same object until a part changes. Without a safety box it has none."""
+        self._world: WorldStatus | None = None
+        self.follow(found)
         self._lock = threading.Lock()  # Guards what `poll` writes and `status` reads.
         self._mode: Mode = "joint_position"
         self._motion_time: float | None = None
         self._responses: deque[float] = deque(maxlen=_RESPONSES)
-        self._late = self._lost = 0
+        self._ages: deque[int] = deque(maxlen=_MEDIAN)  # [cycles] From a command until it was played.
+        self._motion: ClientMotion | None = None  # The present or last one, of which all of these are.
+        self._cycles = self._late = self._lost = 0
         self._seen = (0, time.monotonic())  # Rows written, and when that number was new.
         self._rate: deque[tuple[float, int]] = deque()
 
@@ -81,6 +92,17 @@ class WatchedController:
             for part in parts:
                 self._count(part)
         return parts
+
+    def follow(self, world: WorldStatus) -> None:
+        """Takes the configuration in force from a status of the simulation port; one thread calls it."""
+        before, self._world = self._world, world
+        parts = ("tool", "load", "box", "soft_limits")
+        if before is None or any(getattr(before, part) != getattr(world, part) for part in parts):
+            self.setup = _configuration(world)
+
+    def refresh(self, cycles: NDArray[np.void], next: int) -> None:
+        """Adds the commands to cycles of `poll` that have arrived since, see `ClientMotions.refresh`."""
+        self._motions.refresh(cycles, next)
 
     def status(self) -> SupervisorStatus:
         """Returns what the newest cycle shows."""
@@ -104,18 +126,21 @@ class WatchedController:
                 robot_mode=RobotMode(int(state["robot_mode"])),
                 controller_mode=ControllerMode(int(state["controller_mode"])),
                 faults=self._faults(int(state["faults"])),
-                powered=int(state["robot_mode"]) != RobotMode.OTHER,
-                success_rate=float(state["success_rate"]),
+                powered=int(state["robot_mode"]) not in (RobotMode.OTHER, RobotMode.USER_STOPPED),
+                success_rate=self._success_rate(state, phase),
                 rate_hz=self._measure_rate(),
                 message_id=int(state["message_id"]),
                 late_cycles=self._late,
                 lost_cycles=self._lost,
+                answer_time=_median(tuple(self._responses)[-_MEDIAN:]),
+                round_trip=_median(tuple(CYCLE_TIME * age for age in self._ages)),
                 lateness=self._lateness(),
                 motion_time=self._motion_time,
                 motion_duration=self._motion_time,
                 motion_plan_time=self._motion_time,
                 mode=self._mode,
                 controller_pid=self._pid,
+                setup=self.setup,
             )
 
     def robot(self) -> NoReturn:
@@ -163,15 +188,28 @@ class WatchedController:
         return "moving" if int(row["motion"][0]) else "idle"
 
     def _count(self, part: MotionPart) -> None:
-        self._mode = require_mode(part.motion.setup.mode)
-        if not len(part.cycles):
-            return
-        self._motion_time = float(part.cycles["t"][-1])
-        times = part.cycles["lateness"]
-        times = times[np.isfinite(times)]
-        self._responses.extend(times.tolist())
-        self._late += int((times > 1e-3).sum())
-        self._lost += int(part.cycles["missed"].sum())
+        rows = part.cycles
+        if part.motion is not self._motion:
+            self._motion, self._mode = part.motion, require_mode(part.motion.setup.mode)
+            self._cycles = self._late = self._lost = 0
+            self._responses.clear()
+            self._ages.clear()
+        if len(rows):
+            self._motion_time = float(rows["t"][-1])
+            times = rows["lateness"]
+            self._responses.extend(times[np.isfinite(times)].tolist())
+            ages = rows["age"][rows["played"] == 1]
+            self._ages.extend(ages[ages != NOT_RECORDED].tolist())
+            self._cycles += len(rows)
+            self._late, self._lost = int(rows["late"][-1]), self._lost + int(rows["missed"].sum())
+        if part.end is not None:
+            self._late, self._lost = part.end.late, part.end.lost
+
+    def _success_rate(self, state: np.void, phase: Phase) -> float:
+        """Returns the controller's share of the last second; after a motion, that of the motion."""
+        if phase == "moving" or not self._cycles:
+            return float(state["success_rate"])
+        return max(1.0 - self._lost / self._cycles, 0.0)
 
     def _lateness(self) -> Lateness:
         if not self._responses:
@@ -194,3 +232,18 @@ class WatchedController:
 
     def _faults(self, bits: int) -> tuple[FaultCode, ...]:
         return tuple(fault for fault in self.model.description.faults if bits >> fault & 1) if bits else ()
+
+
+def _configuration(world: WorldStatus) -> RobotConfiguration:
+    """Returns the configuration that a controller reports; None for a part that it does not."""
+    limits = world.soft_limits
+    return RobotConfiguration(
+        tool=None if world.tool is None else as_setup(world.tool).T_flange_tool,
+        load=None if world.load is None else as_setup(world.load).load,
+        box=None if world.box is None else as_setup(world.box).safety_box,
+        joints=None if limits is None else SoftJointLimits(lower=tuple(limits.lower), upper=tuple(limits.upper)),
+    )
+
+
+def _median(times: tuple[float, ...]) -> float | None:
+    return float(np.median(times)) if times else None

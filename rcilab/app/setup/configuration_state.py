@@ -160,6 +160,13 @@ def describe_held(status: SupervisorStatus, part: str) -> Message:
     return message("setup.own") if getattr(status.setup, part) is None else describe_part(status.setup, part)
 
 
+def describe_watched(status: SupervisorStatus, part: str) -> Message:
+    """Returns the value of a controller that is watched; it reports all but the force-control frame."""
+    if part == "box" and status.setup.box is None:
+        return message("setup.box_none")
+    return describe_held(status, part)
+
+
 def differing_tool(state: UiState, status: SupervisorStatus) -> Message | None:
     """Returns the tool that the controller reports, if it differs from the one of plans and checks."""
     held = status.T_flange_tool

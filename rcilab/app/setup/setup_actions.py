@@ -336,7 +336,10 @@ class SetupActions:
             self._drag = None
 
     def _edit(self, changed: SetupState, part: SetupPart, *, drag: tuple[int | None, str] | None = None) -> None:
-        """Applies an edit, unless the arm lacks the part; a drag is one step for undo."""
+        """Applies an edit, unless the arm lacks the part or is only watched; a drag is one step for undo."""
+        if self._store.state.watched:
+            self._store.notify("warn", message("ready.watched", address=self._store.state.watched))
+            return
         missing = explain_missing_part(self._store.state.model, part)
         if missing is not None:
             self._store.notify("warn", missing)

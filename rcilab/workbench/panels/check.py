@@ -100,8 +100,9 @@ class CheckPanel:
             code = "check.passed_unheeded" if unheeded else "check.passed_long"
             headline = ("good", "", "check.passed", text(code, count=unheeded))
         else:
-            sentence = text("check.failed_long", conditions=report.violated_conditions, count=len(report.violations))
-            headline = ("bad", "", "check.failed", sentence)
+            made = "check.recorded" if plan.is_recorded else "check.failed"
+            sentence = text(f"{made}_long", conditions=report.violated_conditions, count=len(report.violations))
+            headline = ("bad", "", made, sentence)
         tone, sign, word, rest = headline
         note = text("check.note") if plan.complete else text("check.incomplete")
         if aside is not None:

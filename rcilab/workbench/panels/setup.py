@@ -11,6 +11,7 @@ from rcilab.app.setup.configuration_state import (
     LISTED,
     describe_held,
     describe_part,
+    describe_watched,
     differing_tool,
     name_parts,
     pending_parts,
@@ -74,12 +75,15 @@ class SetupPanel:
         self._agree.visible = self._cancel.visible = question
         self._undo.disabled = not setup.can_undo
         self._edited.show(self._choices[setup.edited])
+        self._edited.handle.disabled = bool(state.watched)
         self._again.disabled = outdated(state) is None
         self._planned.show(planned_html(state, status, text))
         self._table.show(self._table_html(state, status))
 
     def _verdict_html(self, state: UiState, status: SupervisorStatus) -> str:
         text, setup = self._text, state.setup
+        if state.watched:
+            return f'<p class="rl-note">{esc(text("setup.watched"))}</p>'
         pending = pending_parts(state, status)
         obstacle = setup_obstacle(state, status)
         differing = differing_tool(state, status)
@@ -114,6 +118,10 @@ class SetupPanel:
         rows = []
         for part in LISTED:
             missing = explain_missing_part(state.model, part)
+            if state.watched:
+                held = text.render(describe_watched(status, part))
+                rows.append(f"<tr><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(held)}</td></tr>")
+                continue
             here = self._said(state.setup.wanted, part) if missing is None else "—"
             held = (
                 text("setup.held", held=text.render(describe_held(status, part)))

@@ -52,12 +52,13 @@ class SoftLimitsPanel:
         """Follows the configuration."""
         limits = soft_limits(state)
         missing = explain_missing_part(state.model, "joints")
+        is_fixed = missing is not None or bool(state.watched)
         for end, joint, field in self._fields:
-            field.disable(missing is not None)
+            field.disable(is_fixed)
             number = shown(math.degrees(getattr(limits, end)[joint]))
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
         self._missing.show(why_html(self._text, missing))
-        self._whole.disabled = limits == own_limits(state) or missing is not None
+        self._whole.disabled = limits == own_limits(state) or is_fixed
         self._auto.show(state.world.auto_limit)
         self._auto.handle.disabled = not is_ours(status) or missing is not None

@@ -35,7 +35,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
     values: dict[str, Any] = {
         "language": state.language,
         "stop": text("stop.label"),
-        "stopHint": text("stop.note"),
+        "stopHint": text("watch.stop" if state.watched else "stop.note"),
         "home": text("bar.home"),
         "homeHint": text("bar.home_hint"),
         "lost": text("bar.lost"),

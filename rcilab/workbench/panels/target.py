@@ -78,7 +78,8 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     if changed is not None:
         return f'<p class="rl-verdict rl-warn"><b>▲ {esc(text("check.outdated"))}</b> {esc(text.render(changed))}</p>'
     plan, report = state.plan, state.plan.report
-    tone, word = ("good", "check.passed") if report.ok else ("bad", "check.failed")
+    failed = "check.recorded" if plan.is_recorded else "check.failed"
+    tone, word = ("good", "check.passed") if report.ok else ("bad", failed)
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
     code = code if plan.program is None else "program.planned"
     sentence = text(code, duration=f"{plan.motion.duration:.3f}")

@@ -52,7 +52,7 @@ def build_fci_server(arm: VirtualArm, config: ControllerConfig) -> FciServer:
     """Returns the FCI server of an arm with a configuration."""
     version = _VERSIONS[arm.model.name]
     # Its clients filter and limit their commands against q_d of the state, which a delay would make unstable.
-    arm.playout.prefill = 0 if config.prefill is None else config.prefill
+    arm.set_prefill(0 if config.prefill is None else config.prefill)
     controller = FciController(arm, version)
     if config.limit_table is not None:
         controller.limit_table = config.limit_table

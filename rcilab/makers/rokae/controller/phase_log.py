@@ -48,8 +48,9 @@ class PhaseLog:
             self._log_end(before, after)
 
     def _log_end(self, before: Situation, after: Situation) -> None:
-        playout, duration = self._playout, CYCLE_TIME * self._playout.span
-        is_fault = after.faults != before.faults or after.phase is not Phase.IDLE
+        playout, is_new = self._playout, after.faults != before.faults
+        duration = CYCLE_TIME * (max(playout.cycles - 1, 0) if is_new else playout.span)  # Up to the stop.
+        is_fault = is_new or after.phase is not Phase.IDLE
         figures = f"{playout.cycles} cycles, {playout.lost} without a command; {playout.late} commands late"
         self._log(
             "motion_ended",

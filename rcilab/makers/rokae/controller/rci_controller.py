@@ -11,7 +11,7 @@ and velocity. `fault_stop` lists the reaction to each fault.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from rcilab.core.arrays import JointVector, readonly_copy
@@ -45,7 +45,7 @@ from rcilab.sim.arm_setup import ArmSetup, require_stand
 from rcilab.sim.controller_config import MODE_DELAY, ForceSign
 from rcilab.sim.jitter_buffer import JitterBuffer
 from rcilab.sim.plant import Plant
-from rcilab.sim.violations import Violations, describe_violations
+from rcilab.sim.violations import ArmCondition, Violations, describe_violations
 from rcilab.sim.virtual_arm import VirtualArm
 
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
@@ -94,6 +94,7 @@ class RciController:
         mode_delay: Cycles from StartMove to the requested modes in the state.
         recovery_time: Shortest duration of an error recovery, [cycles].
         force_sign: Sign of the reported external forces.
+        coulomb: Coulomb friction of the joints that LoadRobotModel serves, n numbers, [N m]; None: none.
     """
 
     def __init__(
@@ -103,6 +104,7 @@ class RciController:
         mode_delay: int = round(MODE_DELAY / CYCLE_TIME),
         recovery_time: int = RECOVERY_TIME,
         force_sign: ForceSign = "on-arm",
+        coulomb: Sequence[float] | None = None,
     ) -> None:
         model = arm.model
         self._limit_table = "manual"
@@ -111,11 +113,13 @@ class RciController:
         self.phase = Phase.OFF
         self.faults: tuple[Fault, ...] = ()
         self.reason = Remark("")
+        self._lack: Remark | None = None  # The last reason that was missing commands.
         self.ignored = 0
         self.on_transition: Callable[[Situation, Situation], None] | None = None
         self._mode_delay = mode_delay
         self._recovery_time = recovery_time
-        self._model_response = model_response(model.description)  # Computed here: it takes longer than a cycle.
+        # Computed here: it takes longer than a cycle.
+        self._model_response = model_response(model.description, coulomb)
         self.arm = arm
         arm.configure(self.settings)
         self._reporter = StateReporter(model, self.settings, force_sign)
@@ -200,7 +204,7 @@ class RciController:
     @property
     def lacks_commands(self) -> bool:
         """Whether a fault is set that is caused by missing commands."""
-        return Fault.INSTABILITY_DETECTION in self.faults
+        return bool(self.faults) and self._lack is not None and self.reason is self._lack
 
     @property
     def loop_back(self) -> bool:
@@ -384,6 +388,8 @@ class RciController:
 
     def _raise(self, violations: Violations) -> None:
         self.reason = describe_violations(violations)
+        if any(violation.condition is ArmCondition.COMMANDS_ARRIVE for violation in violations):
+            self._lack = self.reason
         is_limit = not self.settings.auto_limit and any(map(is_beyond_range, violations))
         self.on_event(Event.JOINT_LIMIT if is_limit else Event.FAULT, *faults_of(violations))
 

@@ -38,7 +38,13 @@ _ACTIVE = (Phase.MOVING, Phase.GUIDING)
 
 def build_rci_server(arm: VirtualArm, config: ControllerConfig) -> RciServer:
     """Returns the RCI server of an arm with a configuration."""
-    controller = RciController(arm, mode_delay=config.mode_delay_cycles, force_sign=config.force_sign)
+    joints = arm.model.description.imperfections
+    controller = RciController(
+        arm,
+        mode_delay=config.mode_delay_cycles,
+        force_sign=config.force_sign,
+        coulomb=[joint.friction for joint in joints] if joints and config.realism == "real" else None,
+    )
     controller.auto_limit = config.auto_limit
     controller.loop_back = config.loop_back
     if config.limit_table is not None:

@@ -72,10 +72,27 @@ def test_a_client_that_vanishes_while_the_arm_moves_is_reported(how: str) -> Non
 
 def test_the_advice_after_missing_commands_names_the_pauses_that_a_prefill_absorbs() -> None:
     """At the fault it is not known how long the client will pause."""
+    with running() as found, Peer(found) as peer:
+        peer.send(peer.start().message_id, MODEL.home)
+        advice = wait_for_kind(found, "advice")
+        assert advice.text.startswith("--prefill N absorbs pauses of the client of N ms, 100 at most; ")
+
+
+def test_in_lock_step_the_advice_after_missing_commands_is_on_its_patience() -> None:
     with running(lockstep=True, patience=0.05) as found, Peer(found) as peer:
         peer.run(MOTION.q[:150])
         advice = wait_for_kind(found, "advice")
-        assert advice.text.startswith("--prefill N absorbs pauses of the client of N ms, 100 at most; ")
+        assert advice.text.startswith("lock-step waits 0.05 s for a command; a longer --patience is for a client")
+
+
+def test_after_an_emergency_stop_there_is_no_advice_on_missing_commands() -> None:
+    with running(lockstep=True, patience=0.05) as found, Peer(found) as peer:
+        peer.run(MOTION.q[:150])
+        wait_for(lambda: found.server.controller.playout.lost > 0, 30.0, "a cycle without a command")
+        found.server.controller.press_button("estop")
+        wait_for_kind(found, "motion_ended")
+    assert found.server.controller.faults
+    assert "advice" not in kinds(found)
 
 
 def test_a_long_wait_of_lock_step_names_the_state_whose_answer_is_missing() -> None:

@@ -46,6 +46,17 @@ def test_the_blocks_are_laid_out_as_the_vendors_library_reads_them() -> None:
     assert len(response.dynamics_with_friction) == 66
 
 
+def test_the_coulomb_friction_of_the_joints_is_served_with_each_block() -> None:
+    arm, levels = describe_robot("xMatePro7"), [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+    served, bare = (model_response(arm, friction) for friction in (levels, None))
+    assert served.dynamics == bare.dynamics
+    numbers = list(served.dynamics_with_friction)
+    assert [numbers[end - 3 : end] for end in range(6, 67, 10)] == [[0.0, level, 0.0] for level in levels]
+    assert [numbers[end - 10 : end - 3] for end in range(16, 67, 10)] == [
+        list(bare.dynamics_with_friction[end - 10 : end - 3]) for end in range(16, 67, 10)
+    ]
+
+
 def test_lengths_are_served_in_millimetres() -> None:
     dh = model_response(describe_robot("xMatePro7")).dh
     assert [dh[4 * row + 2] for row in (0, 2, 4, 6)] == pytest.approx([404.0, 437.5, 412.5, 275.5])

@@ -214,3 +214,30 @@ def test_a_pause_in_which_the_arm_begins_to_brake_breaks_nothing_with_a_filter_o
         if not begins <= k < begins + 22:
             hand.cycle.receive(rci.CommandPacket(hand.state.message_id, **fields))
         assert hand.step().faults == (), (k - begins, hand.cycle.reason)
+
+
+def test_an_arm_whose_response_to_a_pause_breaks_a_limit_stops_nearby(hand) -> None:
+    """It accelerates far beyond its limits when the fault comes: it must not keep within the limit of the jerk."""
+    hand.start()
+    t = np.arange(1, 1001) / 1000.0
+    rows = hand.state.q_c + np.outer(
+        np.where(t < 0.5, 0.5 * (t - 0.5 / np.pi * np.sin(np.pi * t / 0.5)), t - 0.25), 3.8 * SPEED
+    )
+    waiting, accelerations = [], []
+    for k, row in enumerate(rows):
+        waiting.append(rci.CommandPacket(hand.state.message_id, tuple(row)))
+        if not 600 <= k < 640:
+            for packet in waiting:
+                hand.cycle.receive(packet)
+            waiting.clear()
+        if hand.step().faults:
+            break
+        accelerations.append(np.abs(hand.state.ddq_c).max())
+    assert hand.state.faults == (F.INSTABILITY_DETECTION,), hand.cycle.reason
+    assert max(accelerations) > 100.0
+    q, speeds = hand.state.q, []
+    for _ in range(1000):
+        speeds.append(np.abs(hand.step().dq).max())
+    assert max(speeds) < 1.05 * speeds[0]
+    assert speeds[-1] < 0.01
+    assert np.abs(hand.state.q - q).max() < 1.0

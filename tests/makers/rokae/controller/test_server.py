@@ -28,6 +28,7 @@ from rcilab.motion.joint import plan_joint
 from rcilab.sim.api import Stall
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.log_entry import LogEntry
+from rcilab.sim.streamed_motion import TORQUE_PREFILL
 
 PATIENCE = 10.0  # [s] A peer that waits longer than this has found a bug, or the machine has stopped.
 MODEL = load_model("xMatePro7")
@@ -253,24 +254,58 @@ def test_commands_that_answer_the_same_state_again_are_the_next_ones(lockstep: R
         assert np.array_equal(last.q, MOTION.goal)
 
 
-def test_torques_that_answer_the_same_state_again_stop_no_motion(lockstep: Running) -> None:
+def start_torque(peer: Peer) -> RobotState:
+    assert peer.ask(rci.SetMotorPower(1)) == 0
+    assert peer.ask(rci.StartMove(4, 0)) in (0, 1)
+    while (state := peer.receive_state()).controller_mode != ControllerMode.TORQUE:
+        pass
+    return state
+
+
+def send_torque(peer: Peer, message_id: int, tau: float) -> None:
+    packet = rci.CommandPacket(message_id, tau_c=(tau,) + (0.0,) * 6)
+    peer.udp.sendto(rci.encode_command(packet), peer.controller)
+
+
+def receive_next_state(peer: Peer, answered: RobotState) -> RobotState:
+    """One after the other, as the vendor's client does; a state is repeated until the first command arrives."""
+    while (state := peer.receive_state()).message_id == answered.message_id:
+        pass
+    assert not state.faults
+    return state
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_torques_that_answer_the_same_state_again_are_the_next_ones(lockstep: Running, every: int) -> None:
     """The vendor's client sends a second command for a state when the next one takes more than 5 ms."""
+    taken: list[float] = []
+    lockstep.server.controller.arm.on_command = lambda command: taken.append(command.tau[0])
     with Peer(lockstep) as peer:
-        assert peer.ask(rci.SetMotorPower(1)) == 0
-        assert peer.ask(rci.StartMove(4, 0)) in (0, 1)
-        while (state := peer.receive_state()).controller_mode != ControllerMode.TORQUE:
-            pass
-        for k in range(300):
-            for again in range(2):
-                packet = rci.CommandPacket(state.message_id, tau_c=(1e-3 * (k + again),) + (0.0,) * 6)
-                peer.udp.sendto(rci.encode_command(packet), peer.controller)
-            answered = state.message_id
-            while state.message_id == answered:
-                state = peer.receive_newest_state()
-                assert not state.faults
+        state = start_torque(peer)
+        sent: list[float] = []
+        for k in range(210):
+            for _ in range(1 + (k % every == 0)):
+                sent.append(1e-4 * (1 + len(sent)))
+                send_torque(peer, state.message_id, sent[-1])
+            state = receive_next_state(peer, state)
         assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
     playout = lockstep.server.controller.playout
-    assert (playout.late, playout.lost) == (0, 0)
+    assert taken == sent
+    assert (playout.late, playout.lost, playout.cycles) == (0, 0, len(sent))
+
+
+def test_in_lock_step_a_torque_acts_as_late_as_by_the_clock(lockstep: Running) -> None:
+    """Two cycles later than without a delay: the step of a torque is in the third state after the one it answers."""
+    with Peer(lockstep) as peer:
+        state = start_torque(peer)
+        for k in range(20):
+            send_torque(peer, state.message_id, 1e-4 * (k + 1) if k < 10 else 0.5)
+            state = receive_next_state(peer, state)
+            if k == 10:
+                step = state.message_id - 1
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+        first = next(state for state in peer.seen if state.tau_c[0] == 0.5)
+    assert first.message_id == step + 1 + TORQUE_PREFILL
 
 
 def test_garbage_in_unused_fields_changes_nothing(lockstep: Running) -> None:

@@ -220,6 +220,7 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
             with pytest.raises(UsageError):
                 world.set_load(Payload(mass=50.0))
             world.set_on_loss("bridge")
+            world.set_input(3, False)
             status = world.status()
     finally:
         server.request_stop()
@@ -246,6 +247,7 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
         "soft limits of the joints set from -28.65, 1.352, -28.65, 31.35, -28.65, 61.35, -28.65 deg "
         "to 28.65, 58.65, 28.65, 88.65, 28.65, 118.6, 28.65 deg, by the simulation port",
         "on_loss set to bridge from the next motion on, by the simulation port",
+        "digital input 3 set low, by the simulation port",
     ]
     placed = next(entry for entry in entries if entry.kind == "set_up")
     assert placed.facts == {"request": "place_arm", "q": Q}

@@ -179,6 +179,15 @@ def test_a_session_saves_its_arm_and_the_file_is_a_model_by_name(tmp_path: Path)
         assert robot.execute(motion).stopped is None
 
 
+def test_the_friction_of_a_simulated_real_arm_is_what_it_serves() -> None:
+    assert TABLE.imperfections is not None
+    with rcilab.simulate(MODEL, plant="mujoco", realism="real") as robot:
+        loaded = robot.rci.load_robot_model()
+    assert loaded.model.friction.coulomb.tolist() == [joint.friction for joint in TABLE.imperfections]
+    assert {entry.parameter for entry in loaded.differences} == {"Coulomb friction"}
+    assert "0.33 N m" in str(loaded)
+
+
 def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path) -> None:
     response = calibrated_rows(with_friction(model_response(heavier(TABLE))))
     loaded = build_loaded_arm(response, TABLE, "rci://192.168.0.160", MODEL)
