@@ -413,8 +413,7 @@ class FciController:
         if self.phase is not Phase.MOVING or not (torque or force):
             return
         found = ((FrankaError.JOINT_REFLEX,) if torque else ()) + ((FrankaError.CARTESIAN_REFLEX,) if force else ())
-        kind = "torque" if torque else "force"
-        self.reason = Remark(f"an external {kind} is above its threshold of setCollisionBehavior", "collision")
+        self.reason = Remark.all(self._reporter.describe_collisions())
         self._set_errors(found)
         self.state = self._report()
 

@@ -40,4 +40,4 @@ class SelfCollisionWatch:
             q: Measured joint angles, shape (7,), [rad].
         """
         distance, links = self._query.links(q)
-        return Remark(f"{links} touch") if distance < self._smallest else None
+        return Remark(f"{links} touch", "links_touch") if distance < self._smallest else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -53,6 +54,26 @@ def test_what_a_force_does_to_the_arm_ends_its_motion(toucher: Robot, felt: FciA
     assert toucher.ask("set_collision_behavior", thresholds(HIGH, HIGH)).status in ("success", "not possible")
     toucher.skip(300)
     recover(toucher, ending.state.errors)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "expected"),
+    [
+        (
+            (HIGH, 10.0),
+            r"cartesian_reflex: external force along z of K: \S+ N is above its threshold 10 N; .*",
+        ),
+        ((3.0, HIGH), r"joint_reflex: joint \d: external torque \S+ N m is above its threshold 3 N m.*"),
+    ],
+)
+def test_a_reflex_is_one_line_with_the_force_and_its_threshold(bounds: tuple[float, float], expected: str) -> None:
+    with fci_arena(5, plant="mujoco") as place, place.connect() as robot:
+        robot.ask("set_collision_behavior", thresholds(*bounds))
+        place.simulate("push", wrench=[0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
+        stay(robot, wire.JOINT_IMPEDANCE)
+        place.between(lambda: None)
+        (line,) = place.log("fault")
+    assert re.fullmatch(expected, line), line
 
 
 def test_deviations_within_their_bounds_end_nothing(toucher: Robot, felt: FciArena) -> None:
