@@ -23,7 +23,7 @@ from rcilab.core.fault import FaultCode
 from rcilab.core.state import Mode
 from rcilab.makers.configuration import RobotConfiguration, SetupPart, require_setup
 from rcilab.model.robot_model import RobotModel
-from rcilab.robots import ROBOTS_BY_MAKER, describe_robot
+from rcilab.robots import ROBOTS_BY_MAKER
 
 if TYPE_CHECKING:
     from rcilab.makers.driver import ExpectedArm, RobotAddress, StreamingDriver
@@ -209,13 +209,8 @@ def parameters_of(model: RobotModel) -> tuple[ParameterGroup, ...]:
 
 
 def find_maker(name: str) -> Maker | None:
-    """Returns the maker of an arm by the arm's name; None for an arm without a maker.
-
-    Raises:
-        ModelError: There is no such arm.
-    """
-    maker = describe_robot(name).maker
-    return next((each for each in all_makers() if each.name == maker), None)
+    """Returns the maker of an arm by the arm's name; None for another name."""
+    return next((maker for maker in all_makers() if name in maker.robots), None)
 
 
 def commanded_start(start: JointVector, q_c: JointVector, model: RobotModel) -> JointVector:

@@ -174,8 +174,9 @@ def test_neither_the_engine_nor_the_robot_format_names_a_maker(folder: str):
         assert not words & set(re.findall(r"[a-z]+", path.read_text(encoding="utf-8").lower())), path
 
 
-def test_loading_a_model_by_name_loads_neither_wire_nor_engine():
+def test_loading_a_model_by_name_loads_neither_wire_nor_engine_nor_client_library():
     unwanted = ["rcilab.makers.rokae.wire", "rcilab.makers.rokae.controller", "rcilab.conformance.check", "ruckig"]
+    unwanted += ["pylibfranka", "panda_py", "rcilab.makers.franka.driver"]
     code = f"import sys, rcilab; rcilab.load_model('xmate3'); print(*[n for n in {unwanted} if n in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.split() == []

@@ -10,6 +10,8 @@ from tests.peers.franka import faults
 from tests.peers.franka.wire import ERROR_NAMES
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "franka.md"
+OTHERS = ("self_collision_avoidance_violation", "communication_constraints_violation")
+"""Raised by tests of their own in `test_fci_reflexes`."""
 ROWS = re.findall(r"^\| (\d+) \| (\w+) \| (.+) \|$", DOCUMENT.read_text(encoding="utf-8"), re.MULTILINE)
 
 
@@ -17,7 +19,7 @@ def raised_by_tests() -> set[int]:
     texts = [case.errors for case in faults.CASES.values()]
     texts += [numbers for numbers, *_ in test_fci_reflexes.CASES.values()]
     words = " ".join(" ".join(text.values()) if isinstance(text, dict) else text for text in texts).split()
-    return {int(word) for word in words if word != "..."} | {ERROR_NAMES.index("communication_constraints_violation")}
+    return {int(word) for word in words if word != "..."} | {ERROR_NAMES.index(name) for name in OTHERS}
 
 
 def test_the_table_has_every_error_at_its_place() -> None:

@@ -31,6 +31,7 @@ from rcilab.makers.franka.controller.phases import (
 )
 from rcilab.makers.franka.controller.pose_deviation import PoseDeviations, find_deviation
 from rcilab.makers.franka.controller.reporter import StateReporter
+from rcilab.makers.franka.controller.self_collision import SelfCollisionWatch
 from rcilab.makers.franka.controller.settings import Settings, apply_request, apply_setup
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.limit_tables import DEFAULT_TABLE, cartesian_limits, require_table
@@ -108,6 +109,7 @@ class FciController:
         self._table = conditions()
         self._motion: MotionKind | None = None
         self._deviations = PoseDeviations()
+        self._links = SelfCollisionWatch(arm.model)
         self._final: Status | None = None  # Outcome of a motion whose commands have ended, once the arm has stopped.
         self._countdown = 0
         self._shown_cycles = 0  # Since Move.
@@ -288,6 +290,7 @@ class FciController:
         self.reflex_reason, self.outcome, self._motion = (), None, motion
         self._shown_cycles = 0
         self._deviations, self._final = deviations, None
+        self._links.begin(self.arm.signals.measured.q)
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
@@ -363,6 +366,7 @@ class FciController:
             self._recover()
         self.state = self._report()
         self._check_deviation()
+        self._check_links()
         self._check_reflex()
         return self.state
 
@@ -390,6 +394,13 @@ class FciController:
             self._set_errors((FrankaError.MAX_PATH_POSE_DEVIATION_VIOLATION,))
             self.state = self._report()
 
+    def _check_links(self) -> None:
+        touching = None if self.phase is not Phase.MOVING else self._links.step(self.arm.signals.measured.q)
+        if touching is not None:
+            self.reason = touching
+            self._set_errors((FrankaError.SELF_COLLISION_AVOIDANCE_VIOLATION,))
+            self.state = self._report()
+
     def _recover(self) -> None:
         self._countdown -= 1
         if self._countdown <= 0 and self.arm.has_stopped:
@@ -402,8 +413,7 @@ class FciController:
         if self.phase is not Phase.MOVING or not (torque or force):
             return
         found = ((FrankaError.JOINT_REFLEX,) if torque else ()) + ((FrankaError.CARTESIAN_REFLEX,) if force else ())
-        kind = "torque" if torque else "force"
-        self.reason = Remark(f"an external {kind} is above its threshold of setCollisionBehavior", "collision")
+        self.reason = Remark.all(self._reporter.describe_collisions())
         self._set_errors(found)
         self.state = self._report()
 

@@ -49,7 +49,6 @@ def find_deviation(signals: CycleSignals, bounds: Numbers) -> Remark | None:
     found = dist(p, p_c), hypot(*rotation_between(R, R_c)), abs(remainder(tool.psi - tool_c.psi, tau))
     for value, bound, (name, unit) in zip(found, bounds, _QUANTITIES, strict=True):
         if value > bound:
-            return Remark(
-                f"the {name} deviates from the commanded one by {value:.4g} {unit}, more than {bound:g} {unit}"
-            )
+            sentence = f"the {name} deviates from the commanded one by {value:.4g} {unit}, more than {bound:g} {unit}"
+            return Remark(sentence, f"deviation_{name}", value=value, bound=bound, unit=unit)
     return None

@@ -16,6 +16,7 @@ filter lies between them that this arm would not follow. While torques move the 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import chain
 from math import cos, sin
 
@@ -27,6 +28,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.reported_pose import ReportedPose
 from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotMode, RobotState, build_state
+from rcilab.i18n.translator import Remark
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots.arm import CRAIG
@@ -41,6 +43,7 @@ from rcilab.sim.wrench import wrench_at, wrench_in
 GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
 _SENSED_JOINTS = 6
+_AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 _O_T_EE, _O_T_EE_D = PLACES["O_T_EE"], PLACES["O_T_EE_d"]
 _FROM_ELBOW = slice(PLACES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
 _ELBOWS, _FLAGS, _MOTION = slice(0, 4), slice(4, 30), slice(30, None)
@@ -160,6 +163,22 @@ class StateReporter:
             x, y = c * x + s * y, c * y - s * x
             readings += (x, y, z)
         return np.array(readings * 2)
+
+    def describe_collisions(self) -> Iterator[Remark]:
+        """Yields each external torque and force of the last state that is above its upper threshold."""
+        assert self._signals is not None  # `report` has set it.
+        is_accelerating, t = self._signals.commanded.is_accelerating, self._settings.thresholds
+        torques = t.collision_torque_accelerating if is_accelerating else t.collision_torque
+        forces = t.collision_force_accelerating if is_accelerating else t.collision_force
+        for joint, (value, bound) in enumerate(zip(self._signals.tau_ext.tolist(), torques, strict=True), 1):
+            if abs(value) > bound:
+                sentence = f"joint {joint}: external torque {value:.3g} N m is above its threshold {bound:g} N m"
+                yield Remark(sentence, "collision", joint=joint, value=value, bound=bound, unit="N m")
+        for axis, value, bound in zip(_AXES, self._wrench_in_K.tolist(), forces, strict=True):
+            if abs(value) > bound:
+                unit = "N m" if axis.startswith("about") else "N"
+                sentence = f"external force {axis} of K: {value:.3g} {unit} is above its threshold {bound:g} {unit}"
+                yield Remark(sentence, "external_force", axis=axis[-1], value=value, bound=bound, unit=unit)
 
     def reset_collisions(self) -> None:
         """Clears the flags of collisions, as an error recovery does."""

@@ -30,13 +30,13 @@ def find_version(address: FciAddress, version: int, timeout: float) -> int:
     Raises:
         ConnectionLostError: No controller answers, or it has another client.
     """
-    host = find_route(address).host
+    route = find_route(address)
     start = time.monotonic()
     with socket.socket() as tcp, socket.socket(type=socket.SOCK_DGRAM) as udp:
         tcp.settimeout(timeout)
-        udp.bind(("", 0))
+        udp.bind((route.local, 0))
         try:
-            tcp.connect((host, address.port))
+            tcp.connect((route.host, address.port))
         except OSError as error:
             spent = time.monotonic() - start
             reason = (

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
 
 from rcilab.core.state import RobotState
+from rcilab.motion import plan_joint
 from tests.makers.franka.controller.test_fci_errors import recover
 from tests.peers.franka import programs, wire
-from tests.peers.franka.arena import FciArena
+from tests.peers.franka.arena import FciArena, fci_arena
 from tests.peers.franka.robot import Ending, Output, Robot
 from tests.peers.franka.wire import ERROR_NAMES
 
@@ -54,6 +56,26 @@ def test_what_a_force_does_to_the_arm_ends_its_motion(toucher: Robot, felt: FciA
     recover(toucher, ending.state.errors)
 
 
+@pytest.mark.parametrize(
+    ("bounds", "expected"),
+    [
+        (
+            (HIGH, 10.0),
+            r"cartesian_reflex: external force along z of K: \S+ N is above its threshold 10 N; .*",
+        ),
+        ((3.0, HIGH), r"joint_reflex: joint \d: external torque \S+ N m is above its threshold 3 N m.*"),
+    ],
+)
+def test_a_reflex_is_one_line_with_the_force_and_its_threshold(bounds: tuple[float, float], expected: str) -> None:
+    with fci_arena(5, plant="mujoco") as place, place.connect() as robot:
+        robot.ask("set_collision_behavior", thresholds(*bounds))
+        place.simulate("push", wrench=[0.0, 0.0, -20.0, 0.0, 0.0, 0.0])
+        stay(robot, wire.JOINT_IMPEDANCE)
+        place.between(lambda: None)
+        (line,) = place.log("fault")
+    assert re.fullmatch(expected, line), line
+
+
 def test_deviations_within_their_bounds_end_nothing(toucher: Robot, felt: FciArena) -> None:
     assert toucher.ask("set_cartesian_impedance", SOFT).status == "success"
     felt.simulate("push", wrench=[0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
@@ -61,6 +83,25 @@ def test_deviations_within_their_bounds_end_nothing(toucher: Robot, felt: FciAre
     ending = stay(toucher, wire.CARTESIAN_IMPEDANCE, 600, path=bounds, goal=bounds)
     assert ending.status == "success"
     assert ending.state.errors == ()
+
+
+@pytest.mark.parametrize("version", [5, 10])
+def test_links_that_touch_end_a_motion_and_may_be_moved_apart(version: int) -> None:
+    folded = {5: (0.0, 1.616, 0.0, -2.606, 0.0, 1.801, 0.785), 10: (0.0, 1.174, 0.0, -2.849, 0.0, 3.813, 0.785)}
+    with fci_arena(version) as place, place.connect() as robot:
+        start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+        rows = plan_joint(place.controller.model, place.controller.model.home, folded[version], speed=0.3).q
+        ending = robot.play(start, [Output(q=tuple(row)) for row in rows.tolist()])
+        assert ending.state.errors == ("self_collision_avoidance_violation",)
+        assert ending.status == "reflex"
+        assert place.log("fault") == [
+            "self_collision_avoidance_violation: base and link 6 touch; the arm stops",
+        ]
+        assert robot.ask("automatic_error_recovery").status == "success"
+        start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+        rows = plan_joint(place.controller.model, start.q_d, place.controller.model.home, speed=0.3).q
+        ending = robot.play(start, [Output(q=tuple(row)) for row in rows.tolist()])
+        assert (ending.status, ending.state.errors) == ("success", ())
 
 
 def lose(place: FciArena, cycles: int) -> list[RobotState]:

@@ -197,9 +197,7 @@ def test_an_error_of_the_arm_is_named_explained_and_recorded_and_recovery_clears
     robot.move_j(robot.model.home + 0.05)
 
 
-def test_a_joint_that_poses_make_too_fast_is_found(robot):
-    start, model = robot.state.T_base_tool_c, robot.model
-    robot.move_j(model.home + [0.0, 0.0, 0.0, 0.0, 0.0, -0.05, 0.0])
+def test_a_pose_that_is_too_far_is_found(robot):
     start = robot.state.T_base_tool_c
 
     def leap(state, t):
@@ -210,6 +208,26 @@ def test_a_joint_that_poses_make_too_fast_is_found(robot):
     with pytest.raises(ControlError, match=r"tool: commanded.*translation") as caught:
         robot.control(leap, "cartesian_position")
     assert FrankaError.CARTESIAN_MOTION_GENERATOR_VELOCITY_LIMITS_VIOLATION in caught.value.faults
+
+
+def test_a_joint_that_poses_make_too_fast_is_found(robot):
+    joint, angle, axis, found = {
+        "Panda": (6, 0.05, 1, "joint 5: resulting velocity"),  # The wrist is almost singular,
+        "FR3": (4, -0.3, 0, "joint 4: resulting acceleration"),  # the arm almost stretched.
+    }[robot.model.name]
+    q = robot.model.home.copy()
+    q[joint - 1] = angle
+    robot.move_j(q, 1.0)
+    start, psi = robot.state.T_base_tool_c, robot.state.psi_c if robot.model.name == "Panda" else None
+
+    def sweep(state, t):
+        T = start.matrix.copy()
+        T[axis, 3] += 0.2 * (1.0 - np.cos(2.5 * t))
+        return CartesianPosition(T, psi, finished=t >= 1.25)
+
+    with pytest.raises(ControlError, match="poses inside the tool's limits are not enough") as caught:
+        robot.control(sweep, "cartesian_position")
+    assert found in str(caught.value)
 
 
 def test_the_user_stop_ends_a_motion_and_is_named(robot):
