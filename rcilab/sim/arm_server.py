@@ -492,8 +492,8 @@ class ArmServer:
     def _advise_on_pauses(self) -> str:
         if self.config.lockstep:
             return (
-                f"lock-step waits {self._lockstep_patience:g} s for a command; a longer --patience is for a client that "
-                "pauses for longer, as in a debugger"
+                f"lock-step waits {self._lockstep_patience:g} s for a command; a longer --patience is for a client "
+                "that pauses for longer, as in a debugger"
             )
         return (
             "--prefill N absorbs pauses of the client of N ms, 100 at most; a client that pauses for longer needs "
