@@ -51,6 +51,8 @@ FENCES = {
     "pink": ("diagnostics/bench/compare/",),
     "ssik": ("diagnostics/bench/compare/",),
     "toppra": ("diagnostics/bench/compare/",),
+    "pylibfranka": ("makers/franka/driver/",),
+    "panda_py": ("makers/franka/driver/",),
 }
 
 LATE_TARGETS = {  # What a function may import, and why not the module.
@@ -68,7 +70,7 @@ LATE_FILES = re.compile(r"rcilab\.makers\.\w+\.maker")
 """A maker is cheap to import: its codec, controller and driver are loaded by the methods that need them."""
 NAMES_A_MAKER = {
     "rcilab.diagnostics.bench.controller": "measures codec and controller of the RCI",
-    "rcilab.diagnostics.bench.franka": "measures the controller of the FR3",
+    "rcilab.diagnostics.bench.franka": "measures the controller of the FCI",
     "rcilab.diagnostics.bench.record": "measures the record of the RCI controller",
 }
 """Modules outside `makers` that import a maker's folder, and why."""

@@ -187,7 +187,7 @@ def test_what_is_wrong_in_a_file_is_one_sentence_with_file_and_key(tmp_path: Pat
         ([], ("prefill = 20", "prefill = 200"), "my_arm.toml: [controller] prefill needs 0 to 100 cycles, got 200"),
         (["--prefill", "200"], ("", ""), "--prefill needs 0 to 100 cycles, got 200"),
         ([], ("10,30,0", "10,130,0"), "my_arm.toml: [arm] start: [10.0, 130.0, "),
-        (["--patience", "3"], ("", ""), "--patience needs --lockstep, without which it has no effect, got 3.0"),
+        (["--patience", "0.001"], ("", ""), "--patience needs 0.01 to 3600 s, or 0 without lock-step, got 0.001"),
         ([], ("lost_limit = 0", "lost_limit = 9"), "lost_limit needs 10 to 20 cycles, got 9; 0 on the command line or"),
         (
             [],

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from rcilab.app.text import Text
 from rcilab.conformance.check import check
+from rcilab.i18n.error_messages import describe_note
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion
 from tests.peers.franka import programs, wire
@@ -43,7 +47,15 @@ def test_a_wrong_command_raises_its_error_and_is_not_followed(robot: Robot, plac
         assert found <= faults if is_cartesian else found == faults  # A pose that is wrong needs no joint angles.
     if wrong.at >= 0:
         assert ending.sent - 1 in (wrong.at, wrong.at + 1)  # One more may be on its way.
+    require_chinese(place)
     recover(robot, ending.state.errors)
+
+
+def require_chinese(place: FciArena) -> None:
+    """Requires that the reason for an error exists in both languages."""
+    note = describe_note(place.controller.reason)
+    assert "remark." not in Text("en").render(note)
+    assert re.search("[一-鿿]", Text("zh").render(note))
 
 
 def judged_before(robot: Robot, rows: np.ndarray, *, is_cartesian: bool) -> tuple[int, set[str]]:

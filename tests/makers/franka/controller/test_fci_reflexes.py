@@ -9,7 +9,7 @@ import pytest
 
 from rcilab.core.state import RobotState
 from rcilab.motion import plan_joint
-from tests.makers.franka.controller.test_fci_errors import recover
+from tests.makers.franka.controller.test_fci_errors import recover, require_chinese
 from tests.peers.franka import programs, wire
 from tests.peers.franka.arena import FciArena, fci_arena
 from tests.peers.franka.robot import Ending, Output, Robot
@@ -51,6 +51,7 @@ def test_what_a_force_does_to_the_arm_ends_its_motion(toucher: Robot, felt: FciA
     assert ending.state.errors == tuple(ERROR_NAMES[int(number)] for number in numbers.split())
     assert ending.status == "reflex"
     assert ending.state.reflex_reason == ending.state.errors
+    require_chinese(felt)
     assert toucher.ask("set_collision_behavior", thresholds(HIGH, HIGH)).status in ("success", "not possible")
     toucher.skip(300)
     recover(toucher, ending.state.errors)
@@ -97,6 +98,7 @@ def test_links_that_touch_end_a_motion_and_may_be_moved_apart(version: int) -> N
         assert place.log("fault") == [
             "self_collision_avoidance_violation: base and link 6 touch; the arm stops",
         ]
+        require_chinese(place)
         assert robot.ask("automatic_error_recovery").status == "success"
         start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
         rows = plan_joint(place.controller.model, start.q_d, place.controller.model.home, speed=0.3).q
