@@ -12,7 +12,7 @@ from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import require_simulator
 from rcilab.model.robot_model import RobotModel, load_model, require_model
-from rcilab.sim.controller_config import require_plant
+from rcilab.sim.controller_config import ControllerConfig, require_plant
 from rcilab.sim.streamed_motion import require_loss_behaviour
 
 ANSWER_TIMEOUT = 10.0  # [s] The controller is on this machine: if it is slow, the machine is busy.
@@ -27,6 +27,7 @@ def simulate(
     record_all: bool = False,
     realism: str = "off",
     on_loss: str = "hold",
+    prefill: int | None = None,
 ) -> RobotSession:
     """Returns a session with a simulated arm; the simulation ends when the session is closed or garbage-collected.
 
@@ -38,6 +39,7 @@ def simulate(
         record_all: Whether runs store every field of the state, three times as much; see `Run.cycles`.
         realism: "real": the joints of the MuJoCo plant have the friction and torque sensors of real ones; or "off".
         on_loss: What the arm does while commands are missing: "hold" the last one, or "bridge" the gap.
+        prefill: Cycles by which commands are played later; None: none in lock-step, else 10; torques 2 in both.
 
     Raises:
         InvalidValueError: `model` is not a robot model, or another value is unknown.
@@ -47,7 +49,10 @@ def simulate(
     require_simulator(require_model(model))
     require_plant(plant, realism)
     require_loss_behaviour(on_loss)
-    controller = start_controller(model.name, plant, lockstep, ["--realism", realism, "--on-loss", on_loss])
+    options = ["--realism", realism, "--on-loss", on_loss]
+    if prefill is not None:
+        options += ["--prefill", str(ControllerConfig(model=model.name, prefill=prefill).prefill)]
+    controller = start_controller(model.name, plant, lockstep, options)
     try:
         assert controller.address is not None  # Set by start_controller.
         session = open_session(

@@ -99,7 +99,7 @@ class FaultLab(Closeable):
     def _provoke(self, scenario: FaultScenario, progress: Tell) -> FaultDemo:
         progress(0.02)
         if self._robot is None:
-            self._robot = simulate(self.model)
+            self._robot = simulate(self.model, prefill=0)  # A fault is that of the last command.
             self._robot.power_on()
         robot = self._robot
         progress(_OPENED)
