@@ -14,7 +14,7 @@ _NAME = re.compile(r"(?=.{1,253}$)[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?(\.[a-z0-
 
 
 class AddressParts(NamedTuple):
-    """What an address says."""
+    """The parts of an address."""
 
     host: str
     port: int | None
@@ -32,7 +32,7 @@ def split_address(text: str, scheme: str, example: str, known: tuple[str, ...]) 
         known: Names of the options; each is a port.
 
     Raises:
-        InvalidValueError: It is not such an address; the message says which part is wrong.
+        InvalidValueError: It is not such an address; the message names the wrong part.
     """
     if not isinstance(text, str) or not text.strip():
         raise InvalidValueError("address", text, f"is not a valid address; write it like {example}")

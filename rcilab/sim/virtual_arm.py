@@ -424,7 +424,7 @@ class VirtualArm:
         self.measured_state.observe(measured, commanded, self.tool_c)
 
     def _is_reference_measured(self, law: ControlLaw) -> bool:
-        """Returns whether forces move the arm and no motion is commanded beside them."""
+        """Returns whether forces move the arm and no motion is commanded along with them."""
         return law.is_force_driven and not (self._motion.is_followed and self._motion.mode.has_reference)
 
     def _is_slow(self) -> bool:

@@ -35,8 +35,8 @@ class CommandKind(Enum):
 class MotionMode(NamedTuple):
     """Type of command and control law of a motion.
 
-    Under the law TORQUE, torques move the arm. With a kind other than TORQUES the client commands a motion beside them,
-    which is checked and is the arm's reference; its torques may use it.
+    Under the law TORQUE, torques move the arm. With a kind other than TORQUES the client commands a motion
+    along with them, which is checked and is the arm's reference; its torques may use it.
     """
 
     law: ControlLaw
@@ -63,7 +63,7 @@ class MotionMode(NamedTuple):
 
     @property
     def has_reference(self) -> bool:
-        """Whether the client commands a motion, alone or beside torques."""
+        """Whether the client commands a motion, alone or along with torques."""
         return self.kind is not CommandKind.TORQUES
 
 

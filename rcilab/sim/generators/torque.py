@@ -81,7 +81,7 @@ class TorqueGenerator:
 
 
 class TorqueAndMotionGenerator:
-    """Follows commanded joint torques; a motion that is commanded beside them is checked and becomes the reference.
+    """Follows commanded joint torques; a motion that is commanded along with them is checked and becomes the reference.
 
     Args:
         torques: Of the torques, which move the arm.
@@ -104,7 +104,7 @@ class TorqueAndMotionGenerator:
 
     @property
     def is_off_commands(self) -> bool:
-        """Returns False: a motion beside torques is bridged, not held."""
+        """Returns False: a motion along with torques is bridged, not held."""
         return False
 
     def settle(self) -> GeneratorOutput | None:

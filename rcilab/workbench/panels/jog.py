@@ -42,7 +42,7 @@ class JogPanel:
     def _build_settings(self, gui: Any, state: UiState) -> None:
         text, ask, jog = self._text, self._ask, state.jog
         gui.add_html('<i class="rl-jogset"></i>')
-        robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"), visible=not state.watched)
+        robot = gui.add_checkbox(text("jog.robot"), jog.robot, hint=text("jog.robot_hint"))
         self._robot = BoundControl(robot, ask, lambda v, p: SetJog(page=p, robot=bool(v)))
         steps = {
             text("jog.step_of", length=1e-3 * step, angle=math.radians(step)) if step else text("jog.held"): step

@@ -10,7 +10,7 @@ from rcilab.core.errors import InvalidValueError
 from rcilab.core.spatial import Pose
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.wire.requests import SetLoad
-from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.state_packet import SLICES
 from rcilab.makers.franka.wire.versions import VERSION_10, Status
 from rcilab.model.robot_model import load_model
 from rcilab.sim.arm_setup import ArmSetup
@@ -68,7 +68,7 @@ def test_a_virtual_arm_with_the_hand_reports_it_as_end_effector_beside_the_load_
     controller.step()
 
     def shown(name: str) -> list[float]:
-        return controller.packet.numbers[PLACES[name]].tolist()
+        return controller.packet.numbers[SLICES[name]].tolist()
 
     s = float(np.sqrt(0.5))
     hand = [s, -s, 0.0, 0.0, s, s, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.1034, 1.0]

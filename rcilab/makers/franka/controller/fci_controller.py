@@ -57,8 +57,8 @@ STATES_BEFORE_START = 2  # That a client reads after Move: one that shows the mo
 RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that it is visible to a client.
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _RESTING_LAWS = {Phase.USER_STOPPED: ControlLaw.BRAKED, Phase.GUIDING: ControlLaw.GUIDE}
-_PLACES_THE_ARM = (SetNEToEE, SetLoad)
-"""Settings of tool and load, with which the arm begins anew at its present angles."""
+_MOVES_THE_TOOL = (SetNEToEE, SetLoad)
+"""Settings of tool and load, with which the arm begins again at its present angles."""
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
 _START = StartTolerance(
     joint=(START_TOLERANCE,) * 7,
@@ -80,7 +80,7 @@ class FciController:
         faults: The errors that are set.
         reflex_reason: The errors that ended the last motion.
         reason: Reason for the last error, as a sentence with numbers.
-        outcome: How the last motion ended, for the second answer to its Move; None while there is nothing to say.
+        outcome: How the last motion ended, for the second answer to its Move; None while there is no answer due.
         state: The last reported state.
         ignored: Number of commands that arrived outside of a motion.
         on_phase: Called with the phases before and after every transition.
@@ -328,7 +328,7 @@ class FciController:
         """Applies a setter; returns the status of the answer, and why it is refused."""
         if self.phase not in SETTABLE:
             return Status.NOT_POSSIBLE, f"not possible in phase {self.phase_name}"
-        if isinstance(request, _PLACES_THE_ARM) and not self.arm.has_stopped:
+        if isinstance(request, _MOVES_THE_TOOL) and not self.arm.has_stopped:
             return Status.NOT_POSSIBLE, "not possible while the arm moves"
         try:
             settings = apply_request(self.settings, request)
@@ -380,7 +380,7 @@ class FciController:
         self._enter(Phase.STOPPING)
 
     def _exceeds(self, bounds: Numbers) -> bool:
-        """Returns whether the tool of a commanded motion is farther from it than these bounds of Move, and says so."""
+        """Returns whether the tool of a commanded motion is farther from it than Move allows, and sets the reason."""
         motion = self._motion
         if motion is None or motion.mode.law is ControlLaw.TORQUE:
             return False

@@ -1,4 +1,4 @@
-"""The server of the hand, beside that of the arm: its own TCP port, and its own state datagrams."""
+"""The server of the hand, next to that of the arm: its own TCP port, and its own state datagrams."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def build_model_library(description: RobotDescription, cache: Path | None = None
             written it is compiled every time.
 
     Raises:
-        ModelError: There is no compiler, or it failed; the message says what to do.
+        ModelError: There is no compiler, or it failed; the message has the remedy.
     """
     source = library_source(description)
     folder = _cache_folder() if cache is None else cache

@@ -32,7 +32,7 @@ from rcilab.i18n.translator import Remark
 from rcilab.makers.franka.controller.settings import Settings
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.robots.arm import CRAIG
-from rcilab.makers.franka.wire.state_packet import NUMBERS, PLACES
+from rcilab.makers.franka.wire.state_packet import NUMBERS, SLICES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.contact_detector import ContactDetector
@@ -44,8 +44,8 @@ GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
 _SENSED_JOINTS = 6
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
-_O_T_EE, _O_T_EE_D = PLACES["O_T_EE"], PLACES["O_T_EE_d"]
-_FROM_ELBOW = slice(PLACES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
+_O_T_EE, _O_T_EE_D = SLICES["O_T_EE"], SLICES["O_T_EE_d"]
+_FROM_ELBOW = slice(SLICES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
 _ELBOWS, _FLAGS, _MOTION = slice(0, 4), slice(4, 30), slice(30, None)
 
 
@@ -83,7 +83,7 @@ class StateReporter:
             ("F_T_NE", settings.F_T_NE),
             ("NE_T_EE", settings.NE_T_EE),
         ):
-            numbers[PLACES[name]] = columns_of(pose)
+            numbers[SLICES[name]] = columns_of(pose)
         _write_body(numbers, "m_ee", "I_ee", "F_x_Cee", settings.end_effector)
         _write_body(numbers, "m_load", "I_load", "F_x_Cload", settings.client_load)
         self._signals: CycleSignals | None = None
@@ -230,6 +230,6 @@ def columns_of(pose: Pose) -> tuple[float, ...]:
 
 
 def _write_body(numbers: NDArray[np.float64], mass: str, inertia: str, center: str, body: Payload) -> None:
-    numbers[PLACES[mass]] = body.mass
-    numbers[PLACES[inertia]] = body.inertia.ravel()
-    numbers[PLACES[center]] = body.center_of_mass
+    numbers[SLICES[mass]] = body.mass
+    numbers[SLICES[inertia]] = body.inertia.ravel()
+    numbers[SLICES[center]] = body.center_of_mass

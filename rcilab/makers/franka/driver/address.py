@@ -43,7 +43,7 @@ def parse_address(text: str) -> FciAddress:
         text: `fci://HOST`; the port may be given, but clients only connect to 1337.
 
     Raises:
-        InvalidValueError: It is not such an address; the message says which part is wrong.
+        InvalidValueError: It is not such an address; the message names the wrong part.
     """
     host, port, options = split_address(text, "fci", _EXAMPLE, _KNOWN_OPTIONS)
     if port not in (None, CLIENT_PORT):

@@ -39,7 +39,7 @@ def load_client_library(version: int) -> Any:
     """Returns the client library of a version.
 
     Raises:
-        MissingExtraError: It is not installed; the message says how to install it.
+        MissingExtraError: It is not installed; the message has the command that installs it.
     """
     name, arm = _LIBRARIES[version]
     purpose = f"driving the {arm}"

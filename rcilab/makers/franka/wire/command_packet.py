@@ -34,7 +34,7 @@ class CommandPacket(NamedTuple):
     tau_c: tuple[float, ...]
     """Joint torques without gravity, 7 numbers, [N m]."""
     has_ended_torques: bool
-    """Whether the torques have ended; in version 5 `is_finished` says it."""
+    """Whether the torques have ended; in version 5 `is_finished` indicates it."""
 
 
 def command_size(version: FciVersion) -> int:

@@ -57,13 +57,13 @@ FIELDS = (
 )
 """The numbers of a state in their order, with their units; `_d` are desired values, `_c` commanded ones."""
 
-PLACES = MappingProxyType(
+SLICES = MappingProxyType(
     {
         name: slice(end - count, end)
         for (name, count, _), end in zip(FIELDS, accumulate(count for _, count, _ in FIELDS), strict=True)
     }
 )
-"""The place of each field in `StatePacket.numbers`."""
+"""The slice of each field in `StatePacket.numbers`."""
 NUMBERS = sum(count for _, count, _ in FIELDS)
 ACCELEROMETERS = 36
 """Readings of the acceleration sensors in version 10: top and bottom, 6 joints, 3 axes each, [m/s^2]."""

@@ -79,7 +79,7 @@ class FciVersion:
     has_floats: bool
     """Whether the state has single precision, and the acceleration sensors."""
     finishes_torques: bool
-    """Whether a command says by itself that the torques have ended."""
+    """Whether a command indicates by itself that the torques have ended."""
     generators: tuple[MoveGenerator, ...]
     """The motion generators of Move."""
 

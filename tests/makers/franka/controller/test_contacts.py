@@ -14,7 +14,7 @@ from rcilab.makers.franka.controller.settings import DEFAULT_THRESHOLDS
 from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.franka.wire.command_packet import CommandPacket
 from rcilab.makers.franka.wire.requests import Move
-from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.state_packet import SLICES
 from rcilab.makers.franka.wire.versions import VERSION_5, Status
 from rcilab.model.robot_model import load_model
 from rcilab.sim.plants import build_plant
@@ -32,7 +32,7 @@ def controller() -> FciController:
 
 
 def field(controller: FciController, name: str) -> np.ndarray:
-    return controller.packet.numbers[PLACES[name]].copy()
+    return controller.packet.numbers[SLICES[name]].copy()
 
 
 def push(controller: FciController, wrench: tuple[float, ...], cycles: int = SETTLED) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.wire.requests import SetLoad
-from rcilab.makers.franka.wire.state_packet import PLACES
+from rcilab.makers.franka.wire.state_packet import SLICES
 from rcilab.makers.franka.wire.versions import VERSION_10, Status
 from rcilab.model.robot_model import load_model
 from rcilab.sim.plants import build_plant
@@ -22,5 +22,5 @@ def test_a_state_after_a_setter_has_its_values_and_the_readings_of_the_last_cycl
     status, _ = controller.set(SetLoad(1.0, (0.0, 0.0, 0.05), (0.0,) * 9))
     after = controller.packet
     assert status is Status.SUCCESS
-    assert after.numbers[PLACES["m_load"]] == 1.0
+    assert after.numbers[SLICES["m_load"]] == 1.0
     assert np.array_equal(after.accelerometers, before)

@@ -47,7 +47,7 @@ from rcilab.makers.franka.wire.state_packet import (
     FIELDS,
     NO_ERRORS,
     NUMBERS,
-    PLACES,
+    SLICES,
     StatePacket,
     encode_state,
     flags_of,
@@ -91,8 +91,8 @@ def test_every_number_of_a_state_is_at_the_offset_of_the_contract(version: FciVe
     assert [name for name, *_ in FIELDS] == list(OFFSETS)
     for name, count, _ in FIELDS:
         offset = OFFSETS[name][column]
-        assert offset == 8 + size * PLACES[name].start
-        assert list(struct.unpack_from(f"<{count}{code}", data, offset)) == PACKET.numbers[PLACES[name]].tolist()
+        assert offset == 8 + size * SLICES[name].start
+        assert list(struct.unpack_from(f"<{count}{code}", data, offset)) == PACKET.numbers[SLICES[name]].tolist()
 
 
 @BOTH
