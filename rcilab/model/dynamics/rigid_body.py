@@ -252,6 +252,11 @@ class RigidBody:
         T = self._data.oMi[link]
         return Pose.from_matrix((T if self._link_frames is None else T * self._link_frames[link - 1]).homogeneous)
 
+    def tool_pose(self, q: JointVector) -> Pose:
+        """Returns the pose of the tool in base, for joint angles of shape (n,), [rad]."""
+        pin.forwardKinematics(self._model, self._data, q)
+        return _pose(pin.updateFramePlacement(self._model, self._data, self._tool).homogeneous)
+
     def tool_jacobian(self, q: JointVector) -> Matrix:
         """Returns the Jacobian at the tool, linear rows first, base axes, shape (6, n)."""
         return pin.computeFrameJacobian(self._model, self._data, q, self._tool, pin.LOCAL_WORLD_ALIGNED)

@@ -9,9 +9,11 @@ import numpy as np
 from rcilab.core.arrays import Array
 from rcilab.core.errors import SingularError, UnreachableError
 from rcilab.core.spatial import IDENTITY, Pose, rotation_between
+from rcilab.model.dynamics.rigid_body import Twist
 from rcilab.model.robot_model import RobotModel
 
 _CONVERGING = 1e-8  # [m], [rad] The next step reduces a smaller error to rounding, as each squares it.
+_NEAR = 1e-3  # [m], [rad] The Jacobian of a smaller error serves for the following steps, too.
 _MOST_STEPS = 10
 _LARGEST_STEP = 0.1  # [rad] A larger one leaves the last angles.
 _SMALLEST = 1e-8  # Determinant of J J^T, in metres and radians: about 1e-3 in a usual pose.
@@ -71,15 +73,21 @@ class IkTracker:
             UnreachableError: The pose is out of reach, or too far from the last one.
             SingularError: The tool would lose a direction of motion.
         """
-        q = np.array(near)
-        for number in range(_MOST_STEPS):
-            J, error = self._differential(q, T_base_tool)
-            square = J.dot(J.T)
-            if number == 0 and np.linalg.det(square) < _SMALLEST:
-                raise SingularError("the tool cannot move in every direction there")
-            q = q + J.T.dot(self._body.tool_solver.solve(square, error))
-            if np.abs(error).max() < _CONVERGING:
+        body, q = self._body, np.array(near)
+        J, error = self._differential(q, T_base_tool)
+        square = J.dot(J.T)
+        if np.linalg.det(square) < _SMALLEST:
+            raise SingularError("the tool cannot move in every direction there")
+        for _ in range(_MOST_STEPS):
+            q = q + J.T.dot(body.tool_solver.solve(square, np.array(error)))
+            size = max(map(abs, error))
+            if size < _CONVERGING:
                 return q.tolist()
+            if size < _NEAR:
+                error = _error(body.tool_pose(q), T_base_tool)
+            else:
+                J, error = self._differential(q, T_base_tool)
+                square = J.dot(J.T)
         raise UnreachableError("no joint angles near the last ones put the tool there")
 
     def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:
@@ -89,20 +97,24 @@ class IkTracker:
         for _ in range(_MOST_STEPS):
             J, error = self._differential(q, T_base_tool)
             try:
-                step = np.linalg.solve(J[:, moving], error)
+                step = np.linalg.solve(J[:, moving], np.array(error))
             except np.linalg.LinAlgError:
                 return None
             if not np.abs(step).max() < _LARGEST_STEP:
                 return None
             q = q.copy()
             q[moving] += step
-            if np.abs(error).max() < _CONVERGING:
+            if max(map(abs, error)) < _CONVERGING:
                 return q.tolist()
         return None
 
-    def _differential(self, q: Array, T_base_tool: Pose) -> tuple[Array, Array]:
-        """Returns the Jacobian at joint angles, and the twist from their pose to another, shape (6,), [m, rad]."""
+    def _differential(self, q: Array, T_base_tool: Pose) -> tuple[Array, Twist]:
+        """Returns the Jacobian at joint angles, and the twist from their pose to another, [m, rad]."""
         here = self._body.tool_motion(q, self._still)
-        (rotation, position), (R, p) = T_base_tool.parts, here.pose.parts
-        away = [a - b for a, b in zip(position, p, strict=True)]
-        return here.jacobian, np.array([*away, *rotation_between(R, rotation)])
+        return here.jacobian, _error(here.pose, T_base_tool)
+
+
+def _error(here: Pose, there: Pose) -> Twist:
+    """Returns the twist from a pose to another, [m, rad]."""
+    (rotation, (x, y, z)), (R, (px, py, pz)) = here.parts, there.parts
+    return px - x, py - y, pz - z, *rotation_between(rotation, R)

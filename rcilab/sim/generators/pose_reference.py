@@ -60,6 +60,7 @@ class PoseReference:
         self.has_psi = bool(model.redundancy)
         self.pose = model.forward(q)
         self.psi = model.arm_angle(q) if self.has_psi else 0.0
+        self._flip = model.description.elbow_flip
         self._side = self._find_side(q)
         self._jump: ArmViolation | None = None
         self._tracker = IkTracker(model)
@@ -155,8 +156,10 @@ class PoseReference:
 
     def _find_side(self, q: Sequence[float]) -> int:
         """Returns the side of the elbow, +1 or -1, or 0 where the maker defines no flip."""
-        model = self._bounds.model
-        return 0 if model.description.elbow_flip is None else model.elbow(q)[1]
+        flip = self._flip
+        if flip is None:
+            return 0
+        return 1 if q[3] > flip else -1
 
     def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
         bounds = self._bounds

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -58,6 +59,7 @@ RECOVERY_TIME = 50  # [cycles] Shortest duration of an error recovery, so that i
 _NO_GENERATOR, _NO_CONTROLLER = 0, 3  # As in the state.
 _RESTING_LAWS = {Phase.USER_STOPPED: ControlLaw.BRAKED, Phase.GUIDING: ControlLaw.GUIDE}
 _MOVES_THE_TOOL = (SetNEToEE, SetLoad)
+_ROW_MAJOR = itemgetter(*(column * 4 + row for row in range(4) for column in range(4)))
 """Settings of tool and load, with which the arm begins again at its present angles."""
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
 _START = StartTolerance(
@@ -470,14 +472,13 @@ class FciController:
 def _as_command(packet: CommandPacket, motion: MotionKind, version: FciVersion) -> ArmCommand:
     """Returns what a motion uses of a command: the rest of the datagram may hold anything."""
     kind, is_cartesian = motion.mode.kind, motion.mode.is_cartesian
-    m, has_elbow = packet.O_T_EE_c, is_cartesian and packet.has_elbow
-    rows = tuple(m[column * 4 + row] for row in range(4) for column in range(4)) if kind is CommandKind.POSES else ()
+    has_elbow = is_cartesian and packet.has_elbow
     is_alone = motion.generator is MoveGenerator.NONE and version.finishes_torques
     angle, side = packet.elbow_c if has_elbow else (0.0, 0.0)
     return ArmCommand(
         packet.message_id,
         packet.q_c if kind in (CommandKind.JOINT_ANGLES, CommandKind.JOINT_GOALS) else (),
-        rows,
+        _ROW_MAJOR(packet.O_T_EE_c) if kind is CommandKind.POSES else (),
         has_elbow,
         angle,
         packet.has_ended_torques if is_alone else packet.is_finished,

@@ -42,7 +42,7 @@ from rcilab.sim.wrench import wrench_at, wrench_in
 
 GRAVITY = 9.81  # [m/s^2]
 _JOINT_4 = 3  # From 0.
-_SENSED_JOINTS = 6
+_TWISTS = tuple((cos(row.alpha), sin(row.alpha)) for row in CRAIG[:6])  # Of the joints with a sensor.
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 _O_T_EE, _O_T_EE_D = SLICES["O_T_EE"], SLICES["O_T_EE_d"]
 _FROM_ELBOW = slice(SLICES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
@@ -156,8 +156,7 @@ class StateReporter:
         """Readings of the acceleration sensors, top then bottom, 6 joints with 3 axes each, shape (36,), [m/s^2]."""
         x, y, z = 0.0, 0.0, GRAVITY
         readings: list[float] = []
-        for q, row in zip(self._q.tolist(), CRAIG[:_SENSED_JOINTS], strict=False):
-            c, s = cos(row.alpha), sin(row.alpha)
+        for q, (c, s) in zip(self._q.tolist(), _TWISTS, strict=False):
             y, z = c * y + s * z, c * z - s * y
             c, s = cos(q), sin(q)
             x, y = c * x + s * y, c * y - s * x
