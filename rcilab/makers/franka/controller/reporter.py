@@ -35,7 +35,7 @@ from rcilab.makers.franka.robots.arm import CRAIG
 from rcilab.makers.franka.wire.state_packet import NUMBERS, SLICES
 from rcilab.model.dynamics.payload import Payload
 from rcilab.model.robot_model import RobotModel
-from rcilab.sim.contact_detector import ContactDetector
+from rcilab.sim.contact_detector import ContactDetector, Contacts
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
 from rcilab.sim.virtual_arm import CycleSignals
 from rcilab.sim.wrench import wrench_at, wrench_in
@@ -46,7 +46,7 @@ _TWISTS = tuple((cos(row.alpha), sin(row.alpha)) for row in CRAIG[:6])  # Of the
 _AXES = ("along x", "along y", "along z", "about x", "about y", "about z")
 _O_T_EE, _O_T_EE_D = SLICES["O_T_EE"], SLICES["O_T_EE_d"]
 _FROM_ELBOW = slice(SLICES["elbow"].start, NUMBERS)  # These numbers are written at once, in the order of `FIELDS`.
-_ELBOWS, _FLAGS, _MOTION = slice(0, 4), slice(4, 30), slice(30, None)
+_ELBOWS, _MOTION = slice(0, 4), slice(4, None)
 
 
 class StateReporter:
@@ -75,6 +75,8 @@ class StateReporter:
         """Sets new frames, loads or thresholds; only at standstill."""
         self._model, self._settings = model, settings
         self._contacts = ContactDetector(settings.thresholds)
+        self._shown: Contacts | None = None
+        self._flags = np.zeros(0)  # Those of `_shown` as numbers.
         self._lever = settings.EE_T_K
         numbers = self.numbers
         for name, pose in (
@@ -193,16 +195,17 @@ class StateReporter:
         self._contacts.step(tau_ext.tolist(), self._wrench_in_K.tolist(), is_accelerating=commanded.is_accelerating)
         elbow_c = tool_c.psi, self._side(float(q_c[_JOINT_4]))
         elbows = tool.psi, self._side(float(q[_JOINT_4])), *elbow_c
-        flags = chain.from_iterable(self._contacts.shown)
-        motion = (0.0, 0.0, -GRAVITY, *elbow_c, tool_c.dpsi, 0.0, tool_c.ddpsi, 0.0)
-        few = np.array((*elbows, *flags, *motion))
+        if self._contacts.shown is not self._shown:
+            self._shown = self._contacts.shown
+            self._flags = np.fromiter(chain.from_iterable(self._shown), np.float64)
+        few = np.array((*elbows, 0.0, 0.0, -GRAVITY, *elbow_c, tool_c.dpsi, 0.0, tool_c.ddpsi, 0.0))
         self.numbers[_O_T_EE] = tool.matrix.T.ravel()
         self.numbers[_O_T_EE_D] = T_c
         # External values have the other sign than in rcilab; a difference from 0.0 is not -0.0 without any.
         np.concatenate(
             (
                 few[_ELBOWS], tau, tau_d, self._zeros if last is None else (tau - last.measured.tau) / CYCLE_TIME,
-                q, q_c, dq, dq_c, ddq_c, few[_FLAGS], 0.0 - tau_ext, 0.0 - at_K, 0.0 - self._wrench_in_K,
+                q, q_c, dq, dq_c, ddq_c, self._flags, 0.0 - tau_ext, 0.0 - at_K, 0.0 - self._wrench_in_K,
                 rates[:6], few[_MOTION], T_c, rates, q, dq,
             ),
             out=self.numbers[_FROM_ELBOW],
