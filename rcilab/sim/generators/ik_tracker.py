@@ -74,20 +74,20 @@ class IkTracker:
             SingularError: The tool would lose a direction of motion.
         """
         body, q = self._body, np.array(near)
-        J, error = self._differential(q, T_base_tool)
-        square = J.dot(J.T)
+        jacobian, error = self._differential(q, T_base_tool)
+        square = jacobian.dot(jacobian.T)
         if np.linalg.det(square) < _SMALLEST:
             raise SingularError("the tool cannot move in every direction there")
         for _ in range(_MOST_STEPS):
-            q = q + J.T.dot(body.tool_solver.solve(square, np.array(error)))
+            q = q + jacobian.T.dot(body.tool_solver.solve(square, np.array(error)))
             size = max(map(abs, error))
             if size < _CONVERGING:
                 return q.tolist()
             if size < _NEAR:
                 error = _error(body.tool_pose(q), T_base_tool)
             else:
-                J, error = self._differential(q, T_base_tool)
-                square = J.dot(J.T)
+                jacobian, error = self._differential(q, T_base_tool)
+                square = jacobian.dot(jacobian.T)
         raise UnreachableError("no joint angles near the last ones put the tool there")
 
     def _step_to(self, T_base_tool: Pose, held: int, psi: float, near: Sequence[float]) -> list[float] | None:
