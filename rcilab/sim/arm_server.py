@@ -6,8 +6,9 @@ does not lose commands for which it had no state to answer (see `CycleTimer`). A
 vendor's does with its old state, has then sent more commands than cycles. Such cycles are caught up, one in each
 millisecond and without sending a state; otherwise the delay of its commands would grow.
 
-A maker whose clients are not expected to keep real time gives its server patience: from the first command of a motion
-on, a cycle waits that long for its command before it counts as lost, and the grid moves on with it (soft lock-step).
+A maker whose clients are not expected to keep real time gives its server patience: a cycle of a motion waits that long
+for its command before it counts as lost, and the grid moves on with it (soft lock-step). Before the first command,
+states follow each other after that time, and none counts as lost.
 
 In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
 commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
@@ -336,7 +337,8 @@ class ArmServer:
         The cycles after it keep their distance: time that the client takes is not a missed cycle.
         """
         deadline = self._timer.deadline + self._patience
-        while self.controller.is_starved and not (self._network.has_lost or self._is_ending):
+        controller = self.controller
+        while (controller.is_starved or controller.awaits_start) and not (self._network.has_lost or self._is_ending):
             remaining = deadline - self._clock.now()
             if remaining <= 0.0:
                 break

@@ -114,7 +114,7 @@ class FciController:
         self._links = SelfCollisionWatch(arm.model)
         self._final: Status | None = None  # Outcome of a motion whose commands have ended, once the arm has stopped.
         self._countdown = 0
-        self._shown_cycles = 0  # Since Move.
+        self._shown_states = 0  # Sent since Move.
         self._limit_table = DEFAULT_TABLE
         self._message_id = 0
         arm.on_loss = "bridge"
@@ -204,7 +204,7 @@ class FciController:
     @property
     def awaits_start(self) -> bool:
         """Whether a client that reads every state has read those that it needs before its first command."""
-        return self._is_streamed and not self._has_started and self._shown_cycles >= STATES_BEFORE_START
+        return self._is_streamed and not self._has_started and self._shown_states >= STATES_BEFORE_START
 
     @property
     def _is_streamed(self) -> bool:
@@ -290,7 +290,7 @@ class FciController:
         if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
         self.reflex_reason, self.outcome, self._motion = (), None, motion
-        self._shown_cycles = 0
+        self._shown_states = 0
         self._deviations, self._final = deviations, None
         self._links.begin(self.arm.signals.measured.q)
         self.arm.prepare_motion(motion.mode)
@@ -351,10 +351,13 @@ class FciController:
         self.outcome = self._final = None
         return was_moving
 
+    def count_sent_state(self) -> None:
+        """Counts a state that was sent: also one whose cycle was over when Move came, for it shows the motion."""
+        self._shown_states += 1
+
     def step(self, *, is_sent: bool = True) -> RobotState:
         """Advances by one cycle and returns the state at its end."""
         self._message_id += is_sent
-        self._shown_cycles += is_sent
         command_violations, measured_violations = self.arm.step()
         violations = command_violations or measured_violations
         if violations:

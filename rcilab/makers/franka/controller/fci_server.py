@@ -170,6 +170,7 @@ class FciServer:
         """Sends the last state."""
         if self._version is not None:
             self._link.send_datagram(encode_state(self.controller.packet, self._version))
+            self.controller.count_sent_state()
         self._hand.send_state()
 
     def settle(self) -> None:

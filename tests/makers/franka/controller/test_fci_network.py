@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from tests.peers.franka import programs, wire
@@ -63,3 +65,17 @@ def test_by_the_clock_every_generator_is_followed(version: int) -> None:
         for generator in GENERATORS:
             ending = by_time(robot, generator, 300)
             assert (ending.status, ending.state.errors) == ("success", ())
+
+
+@pytest.mark.parametrize("version", [5, 10])
+def test_by_the_clock_a_first_command_that_takes_its_time_is_waited_for(version: int) -> None:
+    with fci_arena(version, lockstep=False, patience=5.0) as place, place.connect() as robot:
+        for cycle in range(8):  # Move comes at any time of a cycle.
+            start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+            time.sleep(0.004 + 0.0003 * cycle)
+            first = programs.with_offset(start.q_d, 3, 5e-7)
+            robot.answer(start, Output(q=first))
+            state = robot.state()
+            assert state.message_id == start.message_id + 1
+            assert state.q_d == pytest.approx(first, abs=1e-7)
+            assert robot.play(state, [Output(q=first)] * 3).status == "success"
