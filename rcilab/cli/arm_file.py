@@ -82,10 +82,6 @@ def _text(value: Any, name: str) -> str:
     return value
 
 
-def _folder(value: Any, name: str) -> Path:
-    return Path(_text(value, name))
-
-
 def _whole(value: Any, name: str) -> int:
     return as_integer(value, name, 0, _LARGEST_NUMBER)
 
@@ -146,7 +142,7 @@ _SECTIONS: dict[str, dict[str, _Read]] = {
         "world_port": _whole,
         "no_world": as_flag,
         "log_format": _text,
-        "record": _folder,
+        "record": _text,
     },
 }
 """Every key of a configuration file and the reader of its value. Without a unit, numbers are in SI units."""

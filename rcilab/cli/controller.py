@@ -161,7 +161,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--record",
-        type=Path,
         metavar="FOLDER",
         help="write each motion of any client to FOLDER: a run (.rcirun, for rcilab replay and check) with every state "
         "and command, a report (.txt), and a line on stderr",
@@ -251,13 +250,16 @@ def _serve(server: ArmServer, options: Mapping[str, Any]) -> None:
         server.run(lambda: print_interruptibly(f"{server.description}{world}"))
 
 
-def _recording(folder: Path | None, server: ArmServer) -> AbstractContextManager[None]:
+def _recording(folder: str | None, server: ArmServer) -> AbstractContextManager[None]:
     """Returns the recorder of --record; without it nothing."""
     if folder is None or server.ring is None:
         return nullcontext()
     from rcilab.cli.motion_recorder import recorder_process
+    from rcilab.core.errors import InvalidValueError
 
-    return recorder_process(folder, server.ring, server.config.log_format, lambda: server.controller.cycle_number)
+    if not folder:  # As a path it would be the working folder.
+        raise InvalidValueError("record", folder, "needs the name of a folder, such as recordings")
+    return recorder_process(Path(folder), server.ring, server.config.log_format, lambda: server.controller.cycle_number)
 
 
 def _config(options: Mapping[str, Any]) -> ControllerConfig:

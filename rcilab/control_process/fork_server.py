@@ -70,6 +70,7 @@ def fork(task: object, files: Sequence[int]) -> tuple[int, int]:
     """
     fork_server_pid()
     sent = pickle.dumps({"sys_path": sys.path}) + pickle.dumps(task)
+    _require_free_files()
     status, pipe = _server.connect_to_new_process(list(files))
     try:
         if len(sent) > fcntl.fcntl(pipe, fcntl.F_GETPIPE_SZ):  # A large environment; writing must not wait.
@@ -88,6 +89,20 @@ def _require_files() -> None:
         if hard != resource.RLIM_INFINITY and hard < _MIN_FILES:
             raise OSError(errno.EMFILE, f"only {hard} files may be open, {_MIN_FILES} are needed: raise ulimit -n")
         resource.setrlimit(resource.RLIMIT_NOFILE, (_MIN_FILES, hard))
+
+
+def _require_free_files() -> None:
+    """Requires the descriptors for a socket and two pipes.
+
+    Without them multiprocessing connects and sends nothing, which the fork server does not survive.
+    """
+    held: list[int] = []
+    try:
+        for _ in range(3):
+            held += os.pipe()
+    finally:
+        for descriptor in held:
+            os.close(descriptor)
 
 
 def kill_fork_server() -> None:

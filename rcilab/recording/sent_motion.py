@@ -329,15 +329,19 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
 def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:
     """Returns the numbers of commands without the gaps after which a client goes on from where it paused.
 
-    Only the values show it: its velocities before and after a gap lead over one cycle or over all.
+    Only the values show it: its velocities before and after a gap lead over one cycle or over all. Gaps that follow
+    each other at once are one, over as many commands.
     """
     steps = np.diff(index)
-    for gap in np.flatnonzero(steps[1:-1] > 1) + 1:
-        if steps[gap - 1] > 1 or steps[gap + 1] > 1:
+    edges = np.diff(np.pad((steps > 1).astype(np.int8), 1))
+    for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        if first == 0 or end == len(steps):
             continue
-        step, velocity = q[gap + 1] - q[gap], (q[gap] - q[gap - 1] + q[gap + 2] - q[gap + 1]) / 2.0
-        if np.abs(step - velocity).sum() < np.abs(step - steps[gap] * velocity).sum():
-            steps[gap] = 1
+        way, velocity = q[end] - q[first], (q[first] - q[first - 1] + q[end + 1] - q[end]) / 2.0
+        lengths = (end - first, steps[first:end].sum())  # [cycles] Without and with the pauses.
+        kept, whole = (np.abs(way - cycles * velocity).sum() for cycles in lengths)
+        if kept < whole:
+            steps[first:end] = 1
     return np.concatenate((index[:1], index[0] + np.cumsum(steps)))
 
 

@@ -56,7 +56,7 @@ def test_soft_limits_have_a_range_for_each_joint() -> None:
         (parse_tool, "", "is not of the form X,Y,Z"),
         (parse_tool, "0,0,0.1,90deg", "is not of the form X,Y,Z"),
         (parse_load, "heavy", "with a mass in kg"),
-        (parse_load, "-1", "--load: load mass must be from 0 to 100 [kg], got -1.0"),
+        (parse_load, "-1", "--load: load mass must be a finite number, 0 or more [kg], got -1.0"),
         (parse_load, "1@0,0,50", "metres"),
         (parse_box, "1,1,1", "with its centre after @"),
         (parse_box, "1,-1,1@0,0,0", "three lengths above 0"),

@@ -184,6 +184,44 @@ def test_a_program_with_many_open_files_starts_and_ends_a_controller():
     assert (done.stdout, done.stderr) == ("exit code 0\n", "")
 
 
+NO_MORE = """
+import os, resource
+hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+resource.setrlimit(resource.RLIMIT_NOFILE, (100, hard))
+from rcilab.control_process.fork_server import fork, fork_server_pid
+from rcilab.control_process.managed_process import ManagedProcess
+
+def end_one():
+    child = ManagedProcess("timeit", ["-n", "1", "-r", "1", "pass"], "a line of Python")
+    child.wait(20.0)
+    child.end()
+    return child.exit_description
+
+end_one()
+pid, files = fork_server_pid(), []
+try:
+    while True:
+        files.append(os.open("/dev/null", os.O_RDONLY))
+except OSError:
+    os.close(files.pop())
+for _ in range(5):
+    try:
+        fork(print, [0])
+    except OSError as error:
+        print(error.strerror)
+    os.close(files.pop())
+for file in files:
+    os.close(file)
+print(end_one(), fork_server_pid() == pid)
+"""
+
+
+def test_the_fork_server_survives_a_process_that_has_no_file_left():
+    done = subprocess.run([sys.executable, "-c", NO_MORE], capture_output=True, text=True, check=True, timeout=60.0)
+    assert done.stdout == "Too many open files\n" * 5 + "exit code 0 True\n"
+    assert done.stderr == ""
+
+
 LAST = """
 import atexit
 

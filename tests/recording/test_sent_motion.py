@@ -155,6 +155,16 @@ def test_a_client_that_goes_on_where_it_paused_has_no_gap(sine: Run) -> None:
     assert motion.q.tobytes() == sent_motion(sine).q[:-20].tobytes()
 
 
+def test_pauses_with_one_command_between_them_are_one(sine: Run) -> None:
+    cycles = without(without(sine, slice(300, 310), arrived=False), slice(301, 311), arrived=False).cycles.copy()
+    sent = np.flatnonzero(np.isfinite(sine.command).all(axis=1))
+    cycles["command"][sent[310]] = sine.command[sent[300]]
+    cycles["command"][sent[321:]] = sine.command[sent[301:-20]]
+    motion = sent_motion(replace(sine, cycles=cycles))
+    assert motion.notes == ()
+    assert motion.q.tobytes() == sent_motion(sine).q[:-20].tobytes()
+
+
 def test_a_cycle_that_catches_up_leaves_no_gap(sine: Run) -> None:
     """It plays a command and has no state, so that the age of all later commands is one less."""
     rows = sine.cycles

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import hypot, inf
 
 import numpy as np
 
 from rcilab.core.arrays import Matrix, Vector3, as_number, as_vector, readonly_copy
 from rcilab.core.errors import InvalidValueError
 
-_MAX_MASS = 100.0  # [kg] Tuning value: more than ten times the payload of an xMate; a value in grams is above it.
-_MAX_DISTANCE = 5.0  # [m] From the flange. Tuning value: a value in millimetres is above it.
+_MAX_DISTANCE = 2.0  # [m] From the flange, as the controllers have it; a value in millimetres is above it.
 LARGEST_INERTIA = 100.0  # [kg m^2] Tuning value: a hundred times that of any load of an xMate.
 
 
@@ -32,8 +32,8 @@ class Payload:
     def __post_init__(self) -> None:
         """Checks the values and makes them read-only."""
         mass = as_number(self.mass, "load mass", "kg")
-        if not 0.0 <= mass <= _MAX_MASS:
-            raise InvalidValueError("load mass", mass, f"must be from 0 to {_MAX_MASS:g} [kg]")
+        if not 0.0 <= mass < inf:  # How heavy it may be is a matter of the arm.
+            raise InvalidValueError("load mass", mass, "must be a finite number, 0 or more [kg]")
         try:
             moments = np.array(self.inertia, dtype=np.float64).ravel()
         except (TypeError, ValueError, OverflowError):
@@ -46,7 +46,7 @@ class Payload:
         inertia = _valid_inertia(0.5 * inertia + 0.5 * inertia.T)
         object.__setattr__(self, "mass", mass)
         center = as_vector(self.center_of_mass, 3, "load centre of mass", "m")
-        if np.abs(center).max() > _MAX_DISTANCE:
+        if not hypot(*center.tolist()) <= _MAX_DISTANCE:
             raise InvalidValueError(
                 "load centre of mass", center.tolist(), f"is farther than {_MAX_DISTANCE:g} m; the unit is metres"
             )

@@ -313,7 +313,7 @@ class SetLoad:
 
     def __post_init__(self) -> None:
         """Checks the numbers; the controller checks their range."""
-        _put(self, "mass", as_float(self.mass, "mass", "kg", 0.0, 100.0))
+        _put(self, "mass", as_float(self.mass, "mass", "kg", 0.0))
         _put(self, "center_of_mass", as_floats(self.center_of_mass, 3, "center_of_mass", "m"))
         _put(self, "inertia", as_floats(self.inertia, 9, "inertia", "kg m^2"))
 
