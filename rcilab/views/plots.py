@@ -29,7 +29,10 @@ ORDERS: dict[Quantity, int] = {quantity: order for order, quantity in enumerate(
 _WIDENED = 3  # Points added on both sides of a marked violation, so that a single cycle is some pixels wide.
 _FARTHEST = 3.0  # Largest range of a plot, in multiples of the limit; `rcilab.check` gives the values beyond.
 _LEAST_RANGE = 0.02  # Of a plot without limits, in the unit shown, for readable ticks.
-_ROUND_ENDS = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0)
+_ROUND_ENDS = (
+    0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0,
+    30.0, 40.0, 50.0, 60.0,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -235,23 +238,18 @@ def build_error_frame(t: Array, errors: Array, last: float, least: float, bucket
         least: Smallest range of the axis to each side, in the unit shown; see `rcilab.i18n.plot_scale`.
         buckets: Number of time buckets.
     """
-    edges = np.linspace(0.0, last, buckets + 1)
-    times = np.repeat(edges[:-1], 2)
-    times[1::2] = 0.5 * (edges[:-1] + edges[1:])
-    times[-1] = last
-    end = max(_round_end(last), last)
-    times = np.append(times, end)
+    edges, times = _time_axis(last, buckets)
     thin = decimate(Curves(t=t, values=errors), edges)
     largest = float(np.nanmax(np.abs(thin))) if np.isfinite(thin).any() else 0.0
     return Frame(
         t=times,
-        plan=tuple(np.append(column, np.nan) for column in thin.T),
+        plan=tuple(thin.T),
         actual=(),
         upper=np.nan,
         lower=np.nan,
         violated=np.zeros(len(times), dtype=bool),
         bound=max(1.12 * largest, least),
-        end=float(end),
+        end=float(times[-1]),
     )
 
 
@@ -316,27 +314,18 @@ def _frame(
     upper: float,
     buckets: int,
 ) -> Frame:
-    last = last_time(plan, actual)
-    end = _round_end(last)
-    edges = np.linspace(0.0, last, buckets + 1)
-    t = np.repeat(edges[:-1], 2)
-    t[1::2] = 0.5 * (edges[:-1] + edges[1:])
-    t[-1] = last
-    t = np.append(t, max(end, last))  # One more point, so that the limits extend to the end of the axis.
+    edges, t = _time_axis(last_time(plan, actual), buckets)
 
     def thin(curves: Curves | None) -> tuple[Array, ...]:
         if curves is None or not len(curves.t):
             return ()
-        return tuple(
-            np.append(column, np.nan) for column in decimate(Curves(t=curves.t, values=shown(curves.values)), edges).T
-        )
+        return tuple(decimate(Curves(t=curves.t, values=shown(curves.values)), edges).T)
 
     planned, recorded = thin(plan), thin(actual)
-    curves = np.nan_to_num(np.array((*planned, *recorded))) if planned or recorded else np.zeros((1, len(t)))
+    curves = np.array((*planned, *recorded)).reshape(-1, len(t))
     outside = ((curves > upper) | (curves < lower)).any(axis=0)
     violated = np.convolve(outside, np.ones(2 * _WIDENED + 1), mode="same") > 0.5
-    violated[-2:] = False  # The last two points span the empty end of the axis.
-    farthest = float(np.abs(curves).max())
+    farthest = float(np.nanmax(np.abs(curves), initial=0.0))
     bounds = [abs(bound) for bound in (upper, lower) if np.isfinite(bound)]
     limit = max(bounds) if bounds else max(farthest, _LEAST_RANGE)
     return Frame(
@@ -349,6 +338,15 @@ def _frame(
         violated=violated,
         bound=min(1.12 * max(limit, farthest), _FARTHEST * limit),
     )
+
+
+def _time_axis(last: float, buckets: int) -> tuple[Array, Array]:
+    """Returns the times between buckets that fill the time axis, empty end included, and two instants in each."""
+    edges = np.linspace(0.0, _round_end(last), buckets + 1)
+    t = np.repeat(edges[:-1], 2)
+    t[1::2] = 0.5 * (edges[:-1] + edges[1:])
+    t[-1] = edges[-1]
+    return edges, t
 
 
 def _round_end(last: float) -> float:

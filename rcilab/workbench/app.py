@@ -27,6 +27,7 @@ from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.run.watch_actions import WatchActions
 from rcilab.app.run.watched_controller import WatchedController
 from rcilab.app.scene.scene_actions import HighlightBranch
+from rcilab.app.scene.scene_extras import SceneState
 from rcilab.app.setup.setup_actions import OpenTab
 from rcilab.app.status_text import explain_error
 from rcilab.app.store import Store, UiState
@@ -105,6 +106,7 @@ class Workbench:
             target=target,
             watched="" if watched is None else watched.name,
             goal=goal,
+            scene=SceneState() if watched is None else SceneState(extras=frozenset()),
             language=config.language or "en",
             quality=config.quality or "full",
             is_quality_chosen=config.quality is not None,

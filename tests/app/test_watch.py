@@ -16,6 +16,7 @@ import pytest
 
 from rcilab.app.check.freshness import outdated
 from rcilab.app.goal.goal import goal_at
+from rcilab.app.goal.goal_actions import GoalActions, MoveJoint, PlanGoal
 from rcilab.app.request import TypeField
 from rcilab.app.run.readiness import obstacle
 from rcilab.app.run.replay import replayed
@@ -332,14 +333,65 @@ def test_what_a_page_that_watches_cannot_do_is_off(place: Arena) -> None:
         Workbench(WorkbenchConfig(port=0, quality="light", watch=address)) as bench,
     ):
         programs.prepare(robot, NEAR, factor=1.0)
-        wait_for(lambda: bench.session.status().powered is True)
+        wait_for(lambda: any(notice.text.code == "watch.ended" for notice in bench.store.state.notices))
         handles = bench.server.gui._gui_input_handle_from_uuid.values()
         names = ("connect", "recover", "power_on", "power_off", "plan")
         labels = {text("destination.leave"), *(text(f"run.{name}") for name in names)}
+        labels |= {text("jog.robot"), text("settings.model")}
         labels |= {text("setup.edit"), text("softlimits.lower", joint=1), text("softlimits.upper", joint=7)}
         buttons = [handle for handle in handles if getattr(handle, "label", "") in labels]
         assert len(buttons) == len(labels)
         wait_for(lambda: all(button.disabled for button in buttons))
+        target = bench.server.scene._handle_from_node_name["/target"]
+        wait_for(lambda: not target.visible)
+        bench.dispatcher.ask(MoveJoint(page=None, joint=0, angle=0.5))  # As the Jog tab does.
+        wait_for(lambda: target.visible)
+
+
+def test_the_page_waits_for_the_first_motion(place: Arena, watching) -> None:
+    store, _, controller = watching
+    with place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        wait_for(lambda: controller.status().phase == "idle")
+        q_c = controller.status().q_c
+        assert q_c is not None
+        store.update(goal=goal_at(store.state.model, q_c))
+        GoalActions(store, controller).plan(PlanGoal())
+    assert store.state.no_plan is not None
+    assert store.state.no_plan.code == "plan.watched"
+
+
+def test_the_force_frame_is_that_of_the_latest_motion(place: Arena, watching) -> None:
+    store, actions, controller = watching
+    assert "known once a motion begins" in setup_table(store, controller)
+    frame = Pose((0.0, 0.0, 0.05))
+    with place.connect() as robot:
+        robot.set_fc_coor(frame.as_row_major(), 1)
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
+        wait_for(lambda: (actions.tick(), store.state.recording is not None)[1])
+        robot.set_fc_coor(Pose().as_row_major(), 0)
+    assert "0, 0, 50 mm, axes: tool" in setup_table(store, controller)
+    follow(place, store, actions)
+    assert "0, 0, 50 mm, axes: tool" in setup_table(store, controller)
+
+
+def test_curves_show_the_soft_limits_of_their_motion(place: Arena, watching) -> None:
+    store, actions, _ = watching
+    own = place.cycle.model.limits.joint
+    with place.connect() as robot:
+        robot.set_joint_limit((2.0, *own.upper[1:]), (-2.0, *own.lower[1:]))
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
+        wait_for(lambda: (actions.tick(), store.state.recording is not None)[1])
+        robot.set_joint_limit(own.upper, own.lower)
+    run = store.state.recording.run
+    assert run is not None
+    follow(place, store, actions)
+    for state in (store.state, replayed(store.state, run)):
+        state = dataclasses.replace(state, plot_joint=1)
+        frame = Plots(Text("en"))._joint_frame(state, "q", 1.0)
+        assert (frame.lower, frame.upper) == (-2.0, 2.0)
 
 
 @pytest.mark.parametrize(("address", "error"), [("x", InvalidValueError), ("127.0.0.2:1", ConnectionLostError)])

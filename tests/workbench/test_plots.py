@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcilab.conformance.check import check
+from rcilab.core.clock import CYCLE_TIME
 from rcilab.makers.rokae.conditions import RCI_JOINT_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion import Motion, plan_joint, plan_recovery
@@ -16,8 +17,10 @@ from rcilab.views.plots import (
     QUANTITIES,
     Curves,
     bounds_of,
+    build_error_frame,
     build_frame,
     decimate,
+    mark_moment,
     plan_curves,
     recorded_curves,
     streamed_curves,
@@ -97,6 +100,26 @@ def test_a_lost_cycle_makes_no_false_spike():
     t, q = motion.times[keep], motion.q[keep]
     whole = np.abs(recorded_curves(motion.times, motion.q, motion.q, motion.dq, "ddq").values).max()
     assert np.abs(recorded_curves(t, q, q, motion.dq[keep], "ddq").values).max() <= whole * (1 + 1e-9)
+
+
+def test_a_fault_in_the_first_cycles_is_marked_there_and_not_on_the_empty_axis():
+    motion = Motion.from_cycles(np.array([MODEL.home, MODEL.home + 0.3]))
+    for quantity in QUANTITIES:
+        frame = build_frame(plan_curves(motion, quantity, is_recorded=True), None, LIMITS, quantity, 0)
+        assert frame.end == 0.005
+        spoiled = mark_moment(frame, CYCLE_TIME)
+        assert spoiled.t[spoiled.violated].tolist() == pytest.approx([CYCLE_TIME] * spoiled.violated.sum(), abs=1e-4)
+        assert spoiled.violated.any()
+    errors = build_error_frame(motion.times, np.zeros((2, 7)), motion.duration, 0.02)
+    assert not mark_moment(errors, CYCLE_TIME).violated[20:].all()
+
+
+def test_no_violation_is_marked_where_there_is_no_curve():
+    """Zero is out of the range of this joint."""
+    limits = load_model("Panda").limits.joint
+    curves = Curves(t=np.array([0.0, 0.7]), values=np.tile(0.5 * (limits.lower + limits.upper), (2, 1)))
+    assert limits.upper[3] < 0.0
+    assert not build_frame(curves, None, limits, "q", 4).violated.any()
 
 
 def test_the_time_axis_ends_at_a_round_number_and_holds_the_longer_curve():

@@ -29,6 +29,7 @@ from rcilab.workbench.panels.branches import BranchesPanel
 from rcilab.workbench.panels.elbow import ring_html
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.panels.timeline import TimelinePanel
+from rcilab.workbench.scene.goal_view import folded
 from rcilab.workbench.scene.path_strip_view import bead_words
 
 MODEL = load_model("xMatePro7")
@@ -313,3 +314,14 @@ def test_extras_are_computed_when_they_are_switched_on_and_gone_when_off(bench):
         bench.scene.show_extra(ShowExtra(name=name, on=False))
     bench.scene.tick()
     assert (bench.state.scene.ellipsoid, bench.state.scene.cloud, bench.state.scene.swept) == (None, None, None)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_label_of_the_target_is_broken_into_lines(language: str) -> None:
+    text = Text(language)
+    reason = text("reach.both", first=text("plan.here"), second=text("plan.watched"))
+    lines = folded(reason).split("\n")
+    assert len(lines) > 1
+    assert max(len(line) for line in lines) <= 44
+    assert not any(line[0] in "，。；" for line in lines)
+    assert "".join(lines).replace(" ", "") == reason.replace(" ", "")

@@ -383,8 +383,10 @@ class GoalActions:
         """Shows a plan from its start, or why planning failed."""
         if isinstance(made, Plan):
             self._store.update(plan=made, no_plan=None, recording=None, playhead=0.0, playing=False)
-        else:
-            self._store.update(plan=None, no_plan=made, recording=None, playhead=0.0, playing=False)
+            return
+        if self._store.state.watched and made.code == "plan.here":
+            made = message("plan.watched")
+        self._store.update(plan=None, no_plan=made, recording=None, playhead=0.0, playing=False)
 
     def settle(self) -> None:
         """Checks for collisions, too, once the goal has not changed for a moment."""

@@ -15,6 +15,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.errors import UsageError
 from rcilab.makers.configuration import RobotConfiguration
 from rcilab.recording.client_report import check_client
+from rcilab.recording.sent_motion import with_soft_limits
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -38,7 +39,7 @@ def require_replayable(run: Run) -> RobotModel:
 
 def replayed(state: UiState, run: Run) -> UiState:
     """Returns a state that shows a run."""
-    model = require_replayable(run)
+    model = with_soft_limits(require_replayable(run), run)
     if run.has_playout:
         report = check_client(run)
         motion = report.motion

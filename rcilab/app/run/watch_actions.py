@@ -21,6 +21,7 @@ from rcilab.model.robot_model import RobotModel
 from rcilab.recording.client_motions import LAG, ClientMotion, MotionPart
 from rcilab.recording.client_report import check_client
 from rcilab.recording.run import Run, build_run
+from rcilab.recording.sent_motion import with_soft_limits
 
 if TYPE_CHECKING:
     from rcilab.app.store import Store
@@ -127,4 +128,5 @@ def draw_plan(run: Run, model: RobotModel) -> Plan:
     They end with the newest one, or with a refused one.
     """
     report = check_client(run)
-    return replace(build_plan_view(model, report.motion, report), complete=True, is_recorded=True)
+    plan = build_plan_view(with_soft_limits(model, run), report.motion, report)
+    return replace(plan, complete=True, is_recorded=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -16,9 +17,10 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import NOT_RECORDED
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
+from rcilab.core.spatial import Pose
 from rcilab.core.state import ControllerMode, Mode, RobotMode, require_mode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
-from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
+from rcilab.makers.configuration import ForceControlFrame, ForceFrame, RobotConfiguration, SoftJointLimits
 from rcilab.model.robot_model import RobotModel
 from rcilab.recording.client_motions import ClientMotion, ClientMotions, MotionPart
 from rcilab.sim.setup_requests import as_setup
@@ -72,7 +74,8 @@ class WatchedController:
         self.name: str = self._facts["url"]
         """Address of the controller."""
         self.setup = RobotConfiguration()
-        """The configuration in force; the same object until a part changes. Without a safety box it has none."""
+        """The configuration in force; the same object until a part changes. Without a safety box it has none; before
+        the first motion it has no force-control frame."""
         self._world: WorldStatus | None = None
         self.follow(found)
         self._lock = threading.Lock()  # Guards what `poll` writes and `status` reads.
@@ -98,7 +101,7 @@ class WatchedController:
         before, self._world = self._world, world
         parts = ("tool", "load", "box", "soft_limits")
         if before is None or any(getattr(before, part) != getattr(world, part) for part in parts):
-            self.setup = _configuration(world)
+            self.setup = _configuration(world).updated(self.setup.only(["force"]))
 
     def refresh(self, cycles: NDArray[np.void], next: int) -> None:
         """Adds the commands to cycles of `poll` that have arrived since, see `ClientMotions.refresh`."""
@@ -191,6 +194,7 @@ class WatchedController:
         rows = part.cycles
         if part.motion is not self._motion:
             self._motion, self._mode = part.motion, require_mode(part.motion.setup.mode)
+            self._take_force_frame(part.motion.setup.settings)
             self._cycles = self._late = self._lost = 0
             self._responses.clear()
             self._ages.clear()
@@ -204,6 +208,20 @@ class WatchedController:
             self._late, self._lost = int(rows["late"][-1]), self._lost + int(rows["missed"].sum())
         if part.end is not None:
             self._late, self._lost = part.end.late, part.end.lost
+
+    def _take_force_frame(self, settings: Mapping[str, Any]) -> None:
+        """Takes the force-control frame from the settings of a motion: only these have it."""
+        numbers, axes = settings.get("force_frame"), settings.get("force_axes")
+        if numbers is None or axes is None:
+            return
+        frame = ForceControlFrame(T_flange_force=Pose.from_row_major(numbers), type=ForceFrame[axes.upper()])
+        held = self.setup.force
+        if (
+            held is None
+            or held.type != frame.type
+            or not np.array_equal(held.T_flange_force.matrix, frame.T_flange_force.matrix)
+        ):
+            self.setup = self.setup.updated(RobotConfiguration(force=frame))
 
     def _success_rate(self, state: np.void, phase: Phase) -> float:
         """Returns the controller's share of the last second; after a motion, that of the motion."""

@@ -161,9 +161,11 @@ def describe_held(status: SupervisorStatus, part: str) -> Message:
 
 
 def describe_watched(status: SupervisorStatus, part: str) -> Message:
-    """Returns the value of a controller that is watched; it reports all but the force-control frame."""
+    """Returns the value of a controller that is watched; it reports its force-control frame when a motion begins."""
     if part == "box" and status.setup.box is None:
         return message("setup.box_none")
+    if part == "force" and status.setup.force is None:
+        return message("setup.force_later")
     return describe_held(status, part)
 
 

@@ -69,7 +69,8 @@ class CheckPanel:
         changed = outdated(state)
         self._again.visible = changed is not None and not busy
         is_met = plan is not None and plan.report.ok and not plan.report.warnings  # A slow-down has no purpose.
-        self._slow.disabled = plan is None or is_met or busy or changed is not None or is_moving(status)
+        is_fixed = plan is None or plan.is_recorded or is_met  # What a client commanded is not changed here.
+        self._slow.disabled = is_fixed or busy or changed is not None or is_moving(status)
         self._explain.disabled = plan is None or busy
         if self._tools.visible is (plan is None):
             self._tools.visible = plan is not None

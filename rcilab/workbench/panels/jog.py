@@ -90,6 +90,7 @@ class JogPanel:
         """Follows goal and settings."""
         jog, limits = state.jog, state.model.limits.joint
         self._robot.show(jog.robot or jog.asked)
+        self._robot.handle.disabled = bool(state.watched)
         self._note.show(note_html(state, self._text))
         self._agree.visible = self._cancel.visible = jog.asked
         self._step.show(self._steps[jog.step])

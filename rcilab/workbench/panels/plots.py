@@ -41,6 +41,7 @@ _LEISURE = 8.0  # Redraws take at most an eighth of the time, for any length of 
 _OTHER_HEIGHT = 46 + 62 + 170 + 30  # [px] Bar, window head, strip and choices, legend.
 _HINT = 44  # [px] By which the first hint is higher than the clock that replaces it.
 _MARGIN = 6  # [px] Above and below: half of a label at the end of an axis.
+_HALF_LABEL = 18  # [px] Of the time at the right end of the axis.
 _TITLE, _TIMES = 20, 26  # [px] Height of a plot's title, and of the time labels below the last one.
 
 _Reach: TypeAlias = tuple[float, float, tuple[float, ...]]
@@ -80,7 +81,7 @@ class Plots:
                 legend={"show": False},
                 scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": self._reaches[name][:2]}},
                 cursor={"drag": {"x": False, "y": False}, "sync": {"key": "rcilab"}},
-                padding=(_MARGIN, 12, _MARGIN, 0),
+                padding=(_MARGIN, _HALF_LABEL, _MARGIN, 0),
                 axes=self._axes(name, state, self._visible),
                 visible=name in self._visible,
             )
@@ -111,6 +112,7 @@ class Plots:
         wanted = (state.plan, state.recording, state.plot_joint, state.model, state.theme, visible)
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
+            began = time.thread_time()  # A busy machine draws slowly, not rarely.
             self._drawn = wanted
             for name in visible:
                 self._draw(state, name)
@@ -126,7 +128,7 @@ class Plots:
                 )
             )
             self._fit(state, visible)
-            self._next = now + max(_REDRAW_TIME, _LEISURE * (time.monotonic() - now))
+            self._next = now + max(_REDRAW_TIME, _LEISURE * (time.thread_time() - began))
 
     def _fit(self, state: UiState, visible: tuple[str, ...]) -> None:
         """Gives every plot as many labels as fit its height."""
@@ -191,9 +193,8 @@ class Plots:
             actual = recorded_curves(_times(recording), recording.q, recording.q_c, recording.dq, name)
             if name in ("ddq", "jerk"):
                 actual = _commanded_part(actual, state)
-        return build_frame(
-            self._planned.get(name), actual, state.model.limits.joint, name, state.plot_joint, factor=factor
-        )
+        model = plan.model if plan is not None and plan.is_recorded else state.model  # With the limits of its time.
+        return build_frame(self._planned.get(name), actual, model.limits.joint, name, state.plot_joint, factor=factor)
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
         path, recording, actual = played_path(state), state.recording, None

@@ -117,7 +117,8 @@ class RunPanel:
         self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
         self._execute.visible = question is None
         self._agree.visible = self._cancel.visible = question is not None
-        is_said = moving or reason in (outdated(state), connection_note(state, status))  # The bar shows that it moves.
+        is_said = moving or bool(state.watched)  # The bar shows that it moves, the destination that it is watched.
+        is_said |= reason in (outdated(state), connection_note(state, status))
         is_said |= reason is not None and reason.code == "ready.no_plan" and state.no_plan is not None
         unsaid = None if is_said else reason
         self._reason.show(why_html(text, unsaid))

@@ -66,6 +66,7 @@ class SettingsPanel:
         """Follows the state."""
         text, lock = self._text, state.control_lock
         self._model.show(state.model.name)
+        self._model.handle.disabled = bool(state.watched)
         self._language.show(LANGUAGES[state.language])
         for choice, chosen in self._choices:
             choice.show(chosen(state))

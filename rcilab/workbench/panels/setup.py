@@ -119,7 +119,7 @@ class SetupPanel:
         for part in LISTED:
             missing = explain_missing_part(state.model, part)
             if state.watched:
-                held = text.render(describe_watched(status, part))
+                held = text.render(missing or describe_watched(status, part))
                 rows.append(f"<tr><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(held)}</td></tr>")
                 continue
             here = self._said(state.setup.wanted, part) if missing is None else "—"

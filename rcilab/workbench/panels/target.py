@@ -30,7 +30,7 @@ class TargetPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
-        gui.add_html(f'<p class="rl-note">{esc(text("target.note"))}</p>')
+        gui.add_html(f'<p class="rl-note">{esc(text("target.note_watched" if state.watched else "target.note"))}</p>')
         self._fields: list[NumberField] = []
         with gui.add_folder(text("target.pose")):
             gui.add_html('<i class="rl-trios"></i>')

@@ -92,7 +92,8 @@ class TargetRobotPanel:
         tone = "warn" if status.code == "lost.rebooted" else _TONES.get(status.phase, "bad")
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name
-        address = f'<br><span class="rl-dim">{esc(status.address)}</span>' if status.address else ""
+        is_named = status.address in ("", name)
+        address = "" if is_named else f'<br><span class="rl-dim">{esc(status.address)}</span>'
         note = connection_note(state, status)
         self._where.show(
             f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 TONE_COLORS = {"good": (38, 166, 91), "warn": (240, 150, 20), "bad": (214, 48, 38)}
 _VIA_COLOR = (11, 111, 194)
 _GIZMO_SCALE = 0.26  # [m]
+_COLUMNS = 44  # Of a line of the label, about 300 px; a Chinese character takes two.
+_WIDE = "\u2e80-\u9fff\uff00-\uffef"
+_PIECES = re.compile(f"[{_WIDE}][，。；：！？）”%]*|[^\\s{_WIDE}]+|\\s+")  # No line begins with a closing mark.
 
 
 class GoalView:
@@ -79,10 +83,16 @@ class GoalView:
         """The nodes that can be dragged now."""
         return (self._gizmo.name,) if self._gizmo.visible else ()
 
-    def show(self, state: UiState, text: Text) -> None:
-        """Follows the goal, unless the handles are being dragged."""
+    def show(self, state: UiState, text: Text, *, is_hidden: bool = False) -> None:
+        """Follows the goal, unless the handles are being dragged.
+
+        Args:
+            state: State of the page.
+            text: Texts.
+            is_hidden: Whether the target is not shown unless it is being dragged.
+        """
         goal = state.goal
-        away = hides_target(state)
+        away = hides_target(state) or (is_hidden and not self.is_held)
         if self._gizmo.visible == away:
             self._gizmo.visible = self._mark.visible = self._label.visible = not away
         if not self.is_held:
@@ -101,7 +111,7 @@ class GoalView:
             self._mark.color = TONE_COLORS[self._tone]
         lead = text("reach.tone." + tone)
         sentence = text("reach.label") if tone == "good" else "".join(with_space(lead, text.render(why)))
-        sentence = text("target.handles", verdict=sentence)
+        sentence = folded(text("target.handles", verdict=sentence))
         if sentence != self._sentence:
             self._sentence = sentence
             self._label.text = sentence
@@ -122,6 +132,19 @@ class GoalView:
         self._via_mark.visible = self._via_label.visible = via is not None
         if via is not None:
             self._via_mark.position = self._via_label.position = via.position
+
+
+def folded(sentence: str) -> str:
+    """Returns a sentence in lines that fit a narrow scene: viser does not break a label."""
+    lines, columns = [""], 0
+    for piece in _PIECES.findall(sentence):
+        width = sum(1 + bool(re.match(f"[{_WIDE}]", letter)) for letter in piece)
+        if columns and columns + width > _COLUMNS:
+            lines, columns = [*lines, ""], 0
+        if columns or not piece.isspace():
+            lines[-1] += piece
+            columns += width
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def _below(position: np.ndarray) -> tuple[float, float, float]:

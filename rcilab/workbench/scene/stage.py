@@ -82,7 +82,8 @@ class Stage:
         self._show_commanded(status, live)
         self._show_candidate(state, status, live)
         self._show_plan(state, status, live)
-        self._goal.show(state, text)
+        is_with_arm = is_moving(status) or _apart(state.goal.q, live) <= _SAME_POSE
+        self._goal.show(state, text, is_hidden=bool(state.watched) and is_with_arm)
         self._elbow.show(state, status, text)
         self._ribbon.show(state, text)
         self._extras.show(state)
