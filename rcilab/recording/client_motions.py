@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.cycle_log import cycle_dtype
+from rcilab.core.cycle_log import RATE_FIELDS, cycle_dtype
 from rcilab.core.cycle_ring import CycleRing
 from rcilab.core.errors import UsageError
 from rcilab.core.spatial import Pose
@@ -21,7 +21,7 @@ from rcilab.recording.run_setup import Setup
 LAG = 1100
 """[cycles] Rows this young are left for the next poll: their commands may still arrive."""
 _SETTLED = 300  # [cycles] After the first played command: all that came in one burst with it have been played.
-_ANSWER = ("sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau")
+_ANSWER = ("sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau", *RATE_FIELDS)
 _BEFORE = LAG  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
 
 

@@ -362,6 +362,21 @@ def test_overwritten_cycles_are_a_gap_with_its_size(ring: CycleRing) -> None:
     np.testing.assert_allclose(after.cycles["t"], 1e-3 * np.arange(first, written), rtol=0, atol=1e-9)
 
 
+def test_a_display_reads_late_commands_of_every_kind_again(ring: CycleRing) -> None:
+    motions = ClientMotions(ring, lag=5)
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 1000)
+    (part,) = motions.poll()
+    rows = np.frombuffer(ring.memory, cycle_dtype(ring.n, complete=True, playout=True), CAPACITY)
+    names = [name for name in part.cycles.dtype.names or () if name.startswith("command")]
+    assert len(names) == 7
+    for name in names:
+        rows[name][900] = 0.5
+    motions.refresh(part.cycles, part.next)
+    for name in names:
+        assert (part.cycles[name][900] == 0.5).all(), name
+
+
 def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: CycleRing, tmp_path: Path) -> None:
     lines: list[str] = []
     recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))

@@ -76,6 +76,19 @@ class MissedCycles:
         return cycles
 
 
+def not_finite(condition: ArmCondition, what: str, numbers: Sequence[float], unit: str) -> GeneratorOutput:
+    """Returns the output for a command that is not made of finite numbers.
+
+    Args:
+        condition: The violated condition.
+        what: Name of the numbers, such as "positions".
+        numbers: The command, in `unit`.
+        unit: Their unit, such as "rad".
+    """
+    remark = Remark(f"commanded {what} {numbers} {unit} are not all finite numbers", "no_numbers")
+    return GeneratorOutput(violations=(ArmViolation(condition, remark),))
+
+
 def lost_motion(reason: Remark) -> GeneratorOutput:
     """Returns the output of a motion that cannot continue without the lost commands."""
     return GeneratorOutput(violations=(blame_lost_commands(reason),))

@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from math import isfinite
 
 from rcilab.conformance.joint_monitor import JointMonitor
-from rcilab.i18n.translator import Remark
 from rcilab.motion.goal_follower import GoalFollower
 from rcilab.sim.arm_command import ArmCommand
-from rcilab.sim.generators.generator import GeneratorOutput, JointReference
+from rcilab.sim.generators.generator import GeneratorOutput, JointReference, not_finite
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.jitter_buffer import Playback
-from rcilab.sim.violations import ArmCondition, ArmViolation
+from rcilab.sim.violations import ArmCondition
 
 
 class GoalGenerator:
@@ -48,8 +47,7 @@ class GoalGenerator:
             return self._advance()
         goal = list(command.q[: self._n])
         if not isfinite(sum(goal)):
-            reason = Remark(f"commanded positions {goal} rad are not all finite numbers", "no_numbers")
-            return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
+            return not_finite(ArmCondition.FINITE_ANGLES, "positions", goal, "rad")
         self._goal_monitor.reset(goal)  # At standstill there: only its position is checked.
         violations = self._goal_monitor.step(goal)
         if violations:

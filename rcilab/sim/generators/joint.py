@@ -11,14 +11,13 @@ from __future__ import annotations
 from copy import copy
 from math import isfinite
 
-from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
-from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles
+from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles, not_finite
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.jitter_buffer import Playback
-from rcilab.sim.violations import ArmCondition, ArmViolation
+from rcilab.sim.violations import ArmCondition
 
 
 class JointGenerator:
@@ -57,8 +56,7 @@ class JointGenerator:
             if playback.is_lost:
                 q = self._stream.predict(1, q, playback.steps)
         if not isfinite(sum(q)):  # A NaN would pass every comparison.
-            reason = Remark(f"commanded positions {q} rad are not all finite numbers", "no_numbers")
-            return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
+            return not_finite(ArmCondition.FINITE_ANGLES, "positions", q, "rad")
         if not self._has_begun:
             self._begin(q)
         if is_held:

@@ -10,14 +10,13 @@ from __future__ import annotations
 from math import isfinite
 
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.filters import LowPass
-from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles
+from rcilab.sim.generators.generator import GeneratorOutput, JointReference, MissedCycles, not_finite
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.rate_extrapolator import RateExtrapolator
 from rcilab.sim.jitter_buffer import Playback
-from rcilab.sim.violations import ArmCondition, ArmViolation
+from rcilab.sim.violations import ArmCondition
 
 
 class JointVelocityGenerator:
@@ -46,8 +45,7 @@ class JointVelocityGenerator:
         sent = None if playback.command is None else playback.command.dq[: self._n]
         dq = self._stream.step(sent, playback.steps)
         if not isfinite(sum(dq)):
-            reason = Remark(f"commanded velocities {dq} rad/s are not all finite numbers", "no_numbers")
-            return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_ANGLES, reason),))
+            return not_finite(ArmCondition.FINITE_ANGLES, "velocities", dq, "rad/s")
         dq = self._filter.step(dq)
         self._q = [angle + CYCLE_TIME * rate for angle, rate in zip(self._q, dq, strict=True)]
         return self._reference.step(self._q, cycles)

@@ -13,14 +13,13 @@ from math import isfinite
 
 from rcilab.conformance.limit_violation import LimitViolation
 from rcilab.conformance.torque_monitor import TorqueMonitor
-from rcilab.i18n.translator import Remark
 from rcilab.sim.arm_command import ArmCommand
 from rcilab.sim.command_extrapolator import CommandExtrapolator
 from rcilab.sim.filters import LowPass
-from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles, MotionGenerator
+from rcilab.sim.generators.generator import GeneratorOutput, MissedCycles, MotionGenerator, not_finite
 from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.jitter_buffer import Playback
-from rcilab.sim.violations import ArmCondition, ArmViolation
+from rcilab.sim.violations import ArmCondition
 
 
 class TorqueGenerator:
@@ -53,8 +52,7 @@ class TorqueGenerator:
         if command is not None:
             tau = list(command.tau[: self._n])
             if not isfinite(sum(tau)):
-                reason = Remark(f"commanded torques {tau} N m are not all finite numbers", "no_numbers")
-                return GeneratorOutput(violations=(ArmViolation(ArmCondition.FINITE_TORQUES, reason),))
+                return not_finite(ArmCondition.FINITE_TORQUES, "torques", tau, "N m")
             if is_lost and (violations := self._check_ahead(tau, steps)):
                 return GeneratorOutput(violations=tuple(violations))
             if is_lost:
