@@ -231,13 +231,11 @@ def _soft_limits(request: rci.SetJointLimit, arm: RobotDescription) -> dict[str,
 
 def _load(request: rci.SetLoad, arm: RobotDescription) -> Payload:
     _require("mass", request.mass, 0.0, arm.rated_payload, "kg")
-    load = Payload(
+    return Payload(
         mass=request.mass,
         center_of_mass=np.array(request.center_of_mass),
         inertia=np.array(request.inertia).reshape(3, 3),
     )
-    _require("distance of the centre of mass from the flange", hypot(*request.center_of_mass), 0.0, LONGEST_TOOL, "m")
-    return load
 
 
 def _pose_at_flange(name: str, numbers: Floats) -> Pose:

@@ -217,8 +217,9 @@ def test_the_status_has_the_configuration_in_force_and_the_log_each_change_of_it
             world.set_load(LOAD)
             world.set_box(BOX)
             world.set_soft_limits(*SOFT)
-            with pytest.raises(UsageError):
-                world.set_load(Payload(mass=50.0))
+            for mass in (50.0, 500.0):
+                with pytest.raises(UsageError, match=f"mass: {mass} kg is outside 0 to 7 kg"):
+                    world.set_load(Payload(mass=mass))
             world.set_on_loss("bridge")
             world.set_input(3, False)
             status = world.status()
