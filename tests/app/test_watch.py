@@ -38,6 +38,7 @@ from rcilab.recording.client_motions import ClientMotions, MotionPart
 from rcilab.sim.api import NetworkFaults, WorldStatus, decode_world_answer, encode_world_answer
 from rcilab.workbench.app import Workbench, WorkbenchConfig
 from rcilab.workbench.panels.health import health_html
+from rcilab.workbench.panels.outcome import outcome_html
 from rcilab.workbench.panels.plots import Plots
 from rcilab.workbench.panels.setup import SetupPanel
 from tests.peers import programs, wire
@@ -209,6 +210,12 @@ def test_a_refused_command_is_drawn_and_reported(place: Arena, watching) -> None
             programs.joint_sine(robot, SECONDS, period=0.05)
         wait_for(lambda: (actions.tick(), any(n.text.code == "watch.stopped_more" for n in store.state.notices))[1])
         assert controller.status().phase == "fault"
+        shown = dataclasses.replace(store.state, target=controller.name)  # As the workbench has it.
+        outcome = outcome_html(shown, controller.status(), Text("en"))
+        assert "Ended by a fault" in outcome
+        assert "Joint acceleration: " in outcome  # The joint, its value and the bound.
+        in_progress = dataclasses.replace(shown, last_run=None)
+        assert outcome_html(in_progress, controller.status(), Text("en")) == ""
         robot.automatic_error_recovery()
     assert store.state.plan is not None
     assert not store.state.plan.report.ok

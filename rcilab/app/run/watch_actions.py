@@ -75,6 +75,8 @@ class WatchActions:
             self._next = part.next
         if part.end is not None:
             if self._has_rows:
+                goal = goal_at(self._store.state.model, self._rows[-1]["q_c"][-1])
+                self._store.update(goal=goal)  # Before the check, which takes its time.
                 self._show(_LONGEST, part.end.stopped, has_ended=True)
             self._report(part)
             self._motion = None
@@ -106,9 +108,9 @@ class WatchActions:
         model, setup = self._motion.model, self._motion.setup
         run = build_run(cycles, plan=None, stopped=stopped, truncated=not is_whole, model=model, setup=setup)
         plan, recording = draw_plan(run, model), whole_recording(run)
-        self._store.update(plan=plan, no_plan=None, recording=recording, last_run=recording, playhead=1.0)
-        if has_ended:
-            self._store.update(goal=goal_at(self._store.state.model, run.q_c[-1]))
+        self._store.update(
+            plan=plan, no_plan=None, recording=recording, last_run=recording if has_ended else None, playhead=1.0
+        )
 
     def _report(self, part: MotionPart) -> None:
         end, motion = part.end, part.motion

@@ -11,6 +11,7 @@ from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import state_cycles
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
+from rcilab.i18n.translator import Remark
 from rcilab.recording.html_facts import describe_goal, describe_stop
 from rcilab.workbench.widgets import esc
 
@@ -49,13 +50,16 @@ def outcome_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     recording = state.recording if state.recording is not None else state.last_run
     if recording is None or recording.run is None:
         return ""
+    if state.watched and recording is not state.last_run:  # In progress, or its end is being checked.
+        return ""
     tone, ended, facts = _outcome(recording, text)
     elsewhere = _elsewhere(recording.run, state, status, text)
     if elsewhere:
         return f'<p class="rl-note">{esc(text("record.last_on", where=elsewhere))} {esc(ended)} {esc(facts)}</p>'
     last = "" if recording is state.recording else esc(text("record.last")) + " "
-    finding = recording.finding and f"<br>{esc(text.render(describe_note(recording.finding)))}"
-    return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}{finding}</p>'
+    finding = recording.finding or _reported_stop(recording.run)
+    finding = finding and f"<br>{esc(text.render(describe_note(finding)))}"
+    return f'<p class="rl-verdict rl-{tone}">{last}<b>{esc(ended)}</b> {esc(facts)}{finding or ""}</p>'
 
 
 def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
@@ -77,6 +81,11 @@ def replay_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
 
 def _describe_stop(run: Run, text: Text) -> str:
     return describe_stop(run.stopped or "", run.faults, text)
+
+
+def _reported_stop(run: Run) -> Remark | None:
+    """Returns the first reason that a virtual controller recorded for the stop of its client's motion."""
+    return run.stopped.parts[0] if run.has_playout and isinstance(run.stopped, Remark) else None
 
 
 def _elsewhere(run: Run, state: UiState, status: SupervisorStatus, text: Text) -> str:

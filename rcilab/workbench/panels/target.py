@@ -81,7 +81,7 @@ def planned_html(state: UiState, status: SupervisorStatus, text: Text) -> str:
     failed = "check.recorded" if plan.is_recorded else "check.failed"
     tone, word = ("good", "check.passed") if report.ok else ("bad", failed)
     code = "target.planned" if plan.kind == "joint" else f"target.planned.{plan.kind}"
-    code = code if plan.program is None else "program.planned"
+    code = "target.recorded" if plan.is_recorded else code if plan.program is None else "program.planned"
     sentence = text(code, duration=f"{plan.motion.duration:.3f}")
     if plan.missed_by is not None:
         sentence += ". " + text("target.leads_short", short=text.render(plan.missed_by))
