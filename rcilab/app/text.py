@@ -13,13 +13,14 @@ class Text(translator.Text):
     Args:
         language: Language.
         units: Units in which angles and lengths are shown.
+        maker: Maker of the arm, whose wording replaces the usual one; "" for none.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str, units: Units = USUAL) -> None:
-        super().__init__(language, "rcilab.app", units)
+    def __init__(self, language: str, units: Units = USUAL, maker: str = "") -> None:
+        super().__init__(language, "rcilab.app", units, maker)
 
     def _explain(self, item: Explainable) -> str:
         return item.explain(self.language, self.units)

@@ -39,6 +39,7 @@ class StatusWriter:
         self._histogram = JitterHistogram(block.histogram)
         self._rate_since = time.monotonic_ns()
         self._rate_from = self.recorder.count
+        self._skipped = 0
         self._motion_cycle = 0
         self._wrench: Array | None = None  # The external wrench in the block.
         self.update()
@@ -59,8 +60,8 @@ class StatusWriter:
         self._counters[Counter.WORKER_HEARTBEAT] = now
         elapsed = (now - self._rate_since) * 1e-9
         if elapsed >= _RATE_TIME:
-            self.update(rate_hz=(self.recorder.count - self._rate_from) / elapsed)
-            self._rate_since, self._rate_from = now, self.recorder.count
+            self.update(rate_hz=(self.recorder.count + self._skipped - self._rate_from) / elapsed)
+            self._rate_since, self._rate_from = now, self.recorder.count + self._skipped
 
     def update(self, **changes: Any) -> None:
         """Writes the snapshot with some fields changed."""
@@ -75,6 +76,7 @@ class StatusWriter:
     def on_row(self, log: CycleLog) -> None:
         """Updates counters and status after a row was written to the ring."""
         count = self.recorder.count
+        self._skipped = log.skipped_total
         self._counters[Counter.CYCLES] = count
         self._counters[Counter.LOST] = log.lost_total
         if log.lateness == log.lateness:  # NaN if the loop did not wait for the state.

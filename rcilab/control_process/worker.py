@@ -82,6 +82,7 @@ class ControlProcess:
         self._requests = RequestChannel(block)
         self._stop_conditions = StopConditions(block.counters, parent)
         self._model = load_model(self._settings.arm.name, tool=self._settings.T_flange_tool)
+        self._switches_power = capabilities_of(self._model).switches_power
         self._status = StatusWriter(block)
         self._log = CycleLog(
             self._status.recorder, self._status.on_row, state_cycles=timing_of(self._model).state_cycles
@@ -165,9 +166,10 @@ class ControlProcess:
 
     def _update_phase(self, state: RobotState) -> None:
         """Updates the phase from a state of the robot while nothing moves."""
-        phase = self._status.snapshot.phase
-        if state.robot_mode is RobotMode.USER_STOPPED and self._status.snapshot.powered:
-            self._status.update(powered=False)  # Cut by the emergency stop or the gate.
+        phase, was_powered = self._status.snapshot.phase, self._status.snapshot.powered
+        powered = self._power_shown(state)
+        if powered is not was_powered:
+            self._status.update(powered=powered)
             self._report_ready()
         self._update_tool(state)
         if self._guide is not None and self._guide.has_ended(state):
@@ -178,6 +180,13 @@ class ControlProcess:
                 self._report_fault(state.faults)
         elif phase in ("fault", "lost"):
             self._report_ready()
+
+    def _power_shown(self, state: RobotState) -> bool | None:
+        """Returns motor power after a state of the robot."""
+        if not self._switches_power:
+            return self._require_driver().is_powered(alongside=True)
+        is_cut = state.robot_mode is RobotMode.USER_STOPPED  # By the emergency stop or the gate.
+        return False if is_cut else self._status.snapshot.powered
 
     def _update_tool(self, state: RobotState) -> None:
         """Updates the tool, which follows from joint angles and pose, when one of them has changed."""

@@ -43,6 +43,8 @@ class CycleLog:
         """Lateness of the newest row, [s]; NaN if the loop did not wait for it."""
         self.lost_total = 0
         """States that were not received."""
+        self.skipped_total = 0
+        """States that the driver replaced by newer ones."""
         self.state: RobotState | None = None
         """The state of the newest row."""
         self.braking = False
@@ -86,9 +88,11 @@ class CycleLog:
         lost = 0
         if self._last_id is None or number < self._last_id:
             self._origins.clear()
-        elif number > self._last_id and counts_gap:
-            lost = max((number - self._last_id) // self._state_cycles - 1, 0)
+        elif number > self._last_id:
+            missing = max((number - self._last_id) // self._state_cycles - 1, 0)
+            lost = missing if counts_gap else 0
             self.lost_total += lost
+            self.skipped_total += missing - lost
         self._last_id = number
         if is_awaited:
             self._origins.append(received_ns - number * _CYCLE_NS)

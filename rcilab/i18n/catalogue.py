@@ -37,9 +37,18 @@ def load_catalogue(package: str, language: Language) -> Mapping[str, str]:
 
 
 @lru_cache
-def load_ui_catalogue(package: str, language: Language) -> Mapping[str, str]:
-    """Returns all texts of a user interface in one language: the shared ones, those of the makers and its own."""
-    return merge_catalogues((SHARED, *MAKERS, package), language)
+def load_ui_catalogue(package: str, language: Language, maker: str = "") -> Mapping[str, str]:
+    """Returns all texts of a user interface in one language: the shared ones, those of the makers and its own.
+
+    Args:
+        package: Package of the user interface, such as rcilab.app.
+        language: "en" or "zh".
+        maker: Maker of the arm, such as "franka": where there is a text KEY.franka, it takes the place of KEY.
+    """
+    texts = merge_catalogues((SHARED, *MAKERS, package), language)
+    end = f".{maker}"
+    own = {key.removesuffix(end): text for key, text in texts.items() if maker and key.endswith(end)}
+    return MappingProxyType({**texts, **own})
 
 
 @lru_cache

@@ -145,15 +145,16 @@ class Text:
         language: "en" or "zh".
         package: Package with the texts of this user interface, such as rcilab.app; shared texts are added.
         units: Units of angles and lengths.
+        maker: Maker of the arm, whose wording replaces the usual one; "" for none.
 
     Raises:
         InvalidValueError: There is no catalogue for this language.
     """
 
-    def __init__(self, language: str, package: str, units: Units = USUAL) -> None:
+    def __init__(self, language: str, package: str, units: Units = USUAL, maker: str = "") -> None:
         self.language: Language = require_language(language)
         self.units = units
-        self._entries = load_ui_catalogue(package, self.language)
+        self._entries = load_ui_catalogue(package, self.language, maker)
 
     def __call__(self, code: str, **values: object) -> str:
         """Returns the text for a key; the key itself if it is missing (a test keeps the catalogues complete)."""

@@ -54,6 +54,10 @@ class Capabilities:
     """Names of its digital inputs, by number from 0."""
     reboots: bool = False
     """Whether it can be restarted over its interface."""
+    switches_power: bool = False
+    """Whether motor power is switched over its interface; otherwise the states say whether the arm can move."""
+    has_gate: bool = False
+    """Whether a safety gate stops it, besides the emergency stop."""
     setup: tuple[SetupPart, ...] = ()
     """The parts of its configuration: safety box, tool, load, force-control frame, soft joint limits, parameters."""
     longest_tool: float = 2.0

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import chain
 from typing import Any
 
 import ipywidgets
 import numpy as np
 
-from rcilab.app.arm_features import explain_missing_feature
+from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.run.world_actions import SetWiring, WorldActions
 from rcilab.app.setup.setup_fields import exact_end, joint_limits_between
 from rcilab.control_process import SupervisorStatus
@@ -21,7 +20,7 @@ from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.notebook.number_field import NumberField
 from rcilab.notebook.signal_fields import SendRequest
 from rcilab.notebook.state import LabState
-from rcilab.notebook.style import block, problem, soft, verdict, why_html, write
+from rcilab.notebook.style import block, problem, soft, verdict, write
 from rcilab.notebook.widget_sharing import shared_style_widget
 from rcilab.robots import describe_robot
 
@@ -59,13 +58,13 @@ class LimitFields:
         )  # fmt: skip
         self.auto.observe(self._on_auto, names="value")
         self._inside: Any = shared_style_widget(ipywidgets.VBox, [])
-        self.message_box, self._missing = block(), block()
+        self.message_box = block()
         self._answers = shared_style_widget(
             ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
         )
+        is_there = explain_missing_part(state.model, "joints") is None
         rows = [
             block(soft(text("softlimits.hint"))),
-            self._missing,
             self._inside,
             shared_style_widget(ipywidgets.HBox, [self.send, self.whole]),
             self.message_box,
@@ -78,16 +77,13 @@ class LimitFields:
             [shared_style_widget(ipywidgets.VBox, rows)],
             titles=(text("softlimits.title"),),
             selected_index=None,
+            layout=ipywidgets.Layout(display=None if is_there else "none"),
         )
         self.folder.observe(self._on_open, names="selected_index")
 
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller and the limits of the arm."""
-        missing = explain_missing_feature(self._state.model, "joints")
-        write(self._missing, why_html(self._text, missing))
-        for field in chain.from_iterable(self.fields):
-            field.box.disabled = missing is not None
-        is_ready = status is not None and status.phase in ("idle", "fault") and missing is None
+        is_ready = status is not None and status.phase in ("idle", "fault")
         self.send.disabled = not is_ready or not self.fields
         self.whole.disabled = not is_ready
         if not is_ready:

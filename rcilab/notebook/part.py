@@ -33,8 +33,9 @@ class Part(Closeable):
 
     def __init__(self, subject: object, language: str | None = None) -> None:
         neighbour = subject.text.language if isinstance(subject, Part) else None
-        self.text = Text(chosen_language(language, neighbour), _PACKAGE)
         self.state: LabState = state_of(subject)
+        maker = self.state.model.description.maker
+        self.text = Text(chosen_language(language, neighbour), _PACKAGE, maker=maker)
         self._cleanups: list[Callable[[], None]] = []
         self._root: Any = None
         self._closed = False

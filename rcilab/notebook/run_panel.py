@@ -26,7 +26,7 @@ from rcilab.control_process.supervisor import VIRTUAL
 from rcilab.core.errors import SAFETY_STOP, PlanningError, RcilabError
 from rcilab.i18n.translator import Message, message
 from rcilab.makers.driver import parse_address
-from rcilab.makers.maker import require_driver
+from rcilab.makers.maker import capabilities_of, require_driver
 from rcilab.notebook.browser_heartbeat import kernel_heartbeat
 from rcilab.notebook.browser_watchdog import PAGE_GONE
 from rcilab.notebook.limit_fields import LimitFields
@@ -101,7 +101,7 @@ class RunPanel(Part):
             layout={"width": "24em"},
         )  # fmt: skip
         self.address = shared_style_widget(
-            ipywidgets.Text, description=text("run.address"), placeholder="rci://192.168.0.160:1337",
+            ipywidgets.Text, description=text("run.address"), placeholder=text("run.address_example"),
             tooltip=text("run.address_hint"),
             layout=ipywidgets.Layout(width="24em", display="none"),
         )  # fmt: skip
@@ -137,12 +137,13 @@ class RunPanel(Part):
             ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
         )
         self._choice = shared_style_widget(ipywidgets.VBox, [self.target, self.address], layout=ipywidgets.Layout())
+        has_power, power = capabilities_of(self.model).switches_power, (self.power_on, self.power_off)
         self.build([
             self._choice,
             shared_style_widget(ipywidgets.HBox, [self.connect, self.disconnect]),
             self._sentence,
             self._note,
-            shared_style_widget(ipywidgets.HBox, [self.power_on, self.power_off, self.recover]),
+            shared_style_widget(ipywidgets.HBox, [*(power if has_power else ()), self.recover]),
             self.modes.choice,
             self._plan,
             shared_style_widget(ipywidgets.HBox, [self.execute, *self.speed_override.buttons, self.stop]),

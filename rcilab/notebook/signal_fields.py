@@ -8,14 +8,13 @@ from typing import Any
 
 import ipywidgets
 
-from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.connection import Robot
 from rcilab.app.run.signal_actions import signal_rows
 from rcilab.control_process import PendingRequest, SupervisorStatus
 from rcilab.i18n.translator import Text
 from rcilab.makers.maker import capabilities_of
 from rcilab.model.robot_model import RobotModel
-from rcilab.notebook.style import block, esc, head, soft, verdict, why_html, write
+from rcilab.notebook.style import block, esc, head, soft, verdict, write
 from rcilab.notebook.widget_sharing import shared_style_widget
 
 SendRequest = Callable[[str, Callable[[Robot], PendingRequest]], None]
@@ -45,40 +44,30 @@ class SignalFields:
         self.reboot = button("reboot.press", lambda: self._ask(True))
         self.yes = button("reboot.confirm", self._restart, style="danger")
         self.no = button("run.cancel", lambda: self._ask(False))
-        self._missing, self._reboot_missing, self._levels, self._question = block(), block(), block(), block()
+        self._levels, self._question = block(), block()
         self._address = ""
         self._answers = shared_style_widget(
             ipywidgets.HBox, [self.yes, self.no], layout=ipywidgets.Layout(display="none")
         )
-        rows = [
-            self._missing,
-            shared_style_widget(ipywidgets.HBox, [self.output, self.on, self.off, self.read]),
-            self._levels,
-            block(soft(text("signals.note"))),
-            block(head(text("reboot.title"))),
-            self._reboot_missing,
-            self.reboot,
-            self._question,
-            self._answers,
-        ]
+        capabilities = capabilities_of(model)
+        has_signals = bool(capabilities.outputs or capabilities.inputs)
+        switches = shared_style_widget(ipywidgets.HBox, [self.output, self.on, self.off, self.read])
+        signals = [switches, self._levels, block(soft(text("signals.note")))]
+        restart = [block(head(text("reboot.title"))), self.reboot, self._question, self._answers]
+        rows = [*(signals if has_signals else ()), *(restart if capabilities.reboots else ())]
         self.folder: Any = shared_style_widget(
             ipywidgets.Accordion,
             [shared_style_widget(ipywidgets.VBox, rows)],
             titles=(text("signals.title"),),
             selected_index=None,
+            layout=ipywidgets.Layout(display=None if rows else "none"),
         )
 
     def show(self, status: SupervisorStatus | None) -> None:
         """Follows the controller."""
         is_ready = status is not None and status.phase in ("idle", "fault")
-        missing = explain_missing_feature(self._model, "signals")
-        unable = explain_missing_feature(self._model, "reboot")
-        write(self._missing, why_html(self._text, missing))
-        write(self._reboot_missing, why_html(self._text, unable))
-        self.output.disabled = missing is not None
-        for button in (self.on, self.off, self.read):
-            button.disabled = not is_ready or missing is not None
-        self.reboot.disabled = not is_ready or unable is not None
+        for button in (self.on, self.off, self.read, self.reboot):
+            button.disabled = not is_ready
         if not is_ready:
             self._ask(False)
         self._address = "" if status is None else status.address or status.target

@@ -39,7 +39,11 @@ _FIRST_ARM = "xMatePro7"  # For a recording without a model and maker: all early
 _MAX_DELAY = 64  # [cycles] Between a command and the state that shows it; longer than any play-out buffer.
 
 
-_SAFETY_STOPS = {"estop": "an emergency stop was pressed", "gstop": "the safety gate was opened"}
+_SAFETY_STOPS = {
+    "estop": "an emergency stop was pressed",
+    "gstop": "the safety gate was opened",
+    "user_stopped": "the user stop was pressed",
+}
 """Values of `Run.stopped` for safety stops, by the code of their status."""
 
 

@@ -70,6 +70,7 @@ _STOP_CODES = {
     "the kernel was interrupted": "kernel_interrupted",
     "an emergency stop was pressed": "estop",
     "the safety gate was opened": "gstop",
+    "the user stop was pressed": "user_stopped",
 }
 """Codes of the reasons of a stop, by their sentences: files of earlier versions have only the sentence."""
 _ROWS = struct.Struct("<I")

@@ -110,7 +110,7 @@ class Renderer:
         self._server, self._store, self._session, self._live, self._ask = server, store, session, live, ask
         self._stage = Stage(server, ask)
         self._marks = ProgramMarks(server)
-        self._text = Text(store.state.language, store.state.units)
+        self._text = _text_of(store.state)
         self._panels: list[Panel] = []
         self._tab_numbers: list[int] = []  # Index of the tab of each panel.
         self._open: dict[int, int] = {}  # Number of the open tab, by page. Owned by the event loop.
@@ -208,7 +208,7 @@ class Renderer:
         gui: Any = self._server.gui  # Icons are plain strings here, which viser's types do not allow.
         if not self._tabs:
             self._lay_out(gui)
-        self._text = Text(state.language, state.units)
+        self._text = _text_of(state)
         self._built = _looks(state)
         gui.set_panel_label(self._text("panel.main"))
         self._panels, self._tab_numbers = [], []
@@ -248,6 +248,10 @@ class Renderer:
                 self._ending.wait(max(0.3 * _PERIOD, began + _PERIOD - time.monotonic()))
             else:
                 self._store.changed.wait(_PERIOD)
+
+
+def _text_of(state: UiState) -> Text:
+    return Text(state.language, state.units, state.model.description.maker)
 
 
 def _traits(status: SupervisorStatus) -> tuple[object, ...]:

@@ -8,6 +8,8 @@ import pytest
 from babel.messages.pofile import read_po
 
 import rcilab
+from rcilab.i18n.catalogue import MAKERS, SHARED, load_catalogue, merge_catalogues
+from rcilab.i18n.translator import Text
 from tests.catalogues import fields
 
 ROOT = Path(rcilab.__file__).parent
@@ -17,6 +19,18 @@ FILES = sorted(ROOT.rglob("catalogues/*.po"))
 def test_every_folder_of_catalogues_holds_one_gettext_file():
     assert len(FILES) >= 7
     assert {path.name for path in ROOT.rglob("catalogues/*")} == {"zh.po"}
+
+
+def test_the_wording_of_a_maker_takes_the_place_of_the_usual_one_and_fills_the_same():
+    packages = ("rcilab.app", "rcilab.notebook", "rcilab.recording")
+    usual = merge_catalogues((SHARED, *packages), "en")
+    for maker in MAKERS:
+        name = maker.rpartition(".")[2]
+        for key, text in load_catalogue(maker, "en").items():
+            if key.endswith(f".{name}") and key not in (f"manual.{name}", f"remedy.{name}"):
+                assert fields(text) <= fields(usual[key.removesuffix(f".{name}")]), key
+    assert Text("en", "rcilab.app", maker="franka")("safety.estop") == "User stop"
+    assert Text("en", "rcilab.app")("safety.estop") == "Emergency stop"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.parent.parent.relative_to(ROOT)))

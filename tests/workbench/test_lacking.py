@@ -1,4 +1,4 @@
-"""What an arm lacks is off on the page and in the notebook, field by field, with the reason beside it."""
+"""What an arm lacks is not on the page and in the notebook, and refused with the reason."""
 
 from __future__ import annotations
 
@@ -25,8 +25,12 @@ from rcilab.makers.configuration import RobotConfiguration, SoftJointLimits
 from rcilab.makers.maker import maker_of, require_parts
 from rcilab.model.robot_model import load_model
 from rcilab.notebook.limit_fields import LimitFields
+from rcilab.notebook.run_panel import RunPanel as RunPart
 from rcilab.notebook.signal_fields import SignalFields
+from rcilab.workbench.panels.fault_injection import FaultInjectionPanel
 from rcilab.workbench.panels.mode import ModePanel
+from rcilab.workbench.panels.push import PushPanel
+from rcilab.workbench.panels.run import RunPanel
 from rcilab.workbench.panels.setup import SetupPanel
 from rcilab.workbench.panels.setup_numbers import SetupNumbersPanel
 from rcilab.workbench.panels.signals import SignalsPanel, levels_html
@@ -58,7 +62,7 @@ def gui() -> MagicMock:
     def build(*_: object, **__: object) -> MagicMock:
         return MagicMock(value="")
 
-    names = ("add_text", "add_button", "add_checkbox", "add_dropdown", "add_html", "add_folder")
+    names = ("add_text", "add_button", "add_checkbox", "add_dropdown", "add_html", "add_folder", "add_slider")
     return MagicMock(**{f"{name}.side_effect": build for name in names})
 
 
@@ -66,47 +70,60 @@ def disabled(handle: Any) -> bool:
     return handle.disabled is True
 
 
-def test_the_parts_that_are_lacking_are_off_on_the_setup_tab_and_the_others_are_not(lacking, store) -> None:
+def test_the_setup_tab_has_the_parts_that_the_arm_has(lacking, store) -> None:
     lacking(setup=("tool", "load", "control"))
-    panel, text = SetupNumbersPanel(Text("en"), lambda request: None), Text("en")
-    panel.build(gui(), store.state)
-    panel.show(store.state, READY)
-    for part, is_off in {"box": True, "force": True, "tool": False, "load": False}.items():
-        assert {disabled(field._handle) for field in panel._fields[part]} == {is_off}
-        assert disabled(panel._seen[part].handle) is is_off
-        lack = explain_missing_part(MODEL, part)
-        assert panel._missing[part]._shown == (
-            "" if lack is None else f'<p class="rl-note rl-why">{text.render(lack)}</p>'
-        )
-    assert disabled(panel._active.handle)
-    assert disabled(panel._axes.handle)
-    table = SetupPanel(text, lambda request: None)._table_html(store.state, READY)
-    assert "The controller of xMate3 has no safety box." in table
-    assert "The controller of xMate3 has no tool." not in table
-
-
-def test_soft_limits_mode_parameters_and_signals_are_off_one_by_one(lacking, store) -> None:
-    text = Text("zh")
-    limits, mode, signals = (panel(text, lambda request: None) for panel in (SoftLimitsPanel, ModePanel, SignalsPanel))
-    for panel in (limits, mode, signals):
+    text = Text("en")
+    numbers, setup = (panel(text, lambda request: None) for panel in (SetupNumbersPanel, SetupPanel))
+    for panel in (numbers, setup):
         panel.build(gui(), store.state)
         panel.show(store.state, READY)
-    assert not any(disabled(field._handle) for _, _, field in limits._fields)
+    assert set(numbers._folders) == {"tool", "load"}
+    assert set(setup._choices) == {"", "tool", "load"}
+    table = setup._table_html(store.state, READY)
+    assert "safety box" not in table
+    assert "<th>tool</th>" in table
+    assert "Joint stiffness [" in table
+    assert text("setup.in_mode") in table
+
+
+def test_groups_of_what_an_arm_lacks_are_not_there(lacking, store) -> None:
+    kinds = (SoftLimitsPanel, SignalsPanel, PushPanel, RunPanel, FaultInjectionPanel)
+
+    def labels() -> set[str]:
+        page, text = gui(), Text("en")
+        for panel in (kind(text, lambda request: None) for kind in kinds):
+            panel.build(page, store.state)
+            panel.show(store.state, READY)
+        return {call.args[0] for control in (page.add_folder, page.add_button) for call in control.call_args_list}
+
+    things = {
+        "Soft joint limits [deg]",
+        "At a soft limit",
+        "Digital outputs and inputs",
+        "Restart the controller",
+        "Guide by hand",
+        "Power on",
+        "Power off",
+        "Open the gate",
+    }
+    assert things <= labels()
+    lacking(setup=("tool",), outputs=(), inputs=(), reboots=False, guides=False, switches_power=False, has_gate=False)
+    assert not things & labels()
+    assert "Recover" in labels()
+
+
+def test_parameters_of_the_modes_are_off_with_the_reason(lacking, store) -> None:
+    text = Text("zh")
+    mode = ModePanel(text, lambda request: None)
+    mode.build(gui(), store.state)
+    mode.show(store.state, READY)
     assert not disabled(mode._reset)
-    assert not disabled(signals._reboot)
-    lacking(setup=("tool",), outputs=(), inputs=(), reboots=False)
-    for panel in (limits, mode, signals):
-        panel.show(store.state, READY)
-    assert all(disabled(field._handle) for _, _, field in limits._fields)
-    assert disabled(limits._whole)
-    assert disabled(limits._auto.handle)
+    lacking(setup=("tool",))
+    mode.show(store.state, READY)
     assert disabled(mode._reset)
-    assert all(disabled(control) for control in (*signals._buttons, signals._output, signals._reboot))
-    shown = [limits._missing, mode._missing, signals._missing, signals._reboot_missing]
-    for html, feature in zip(shown, ("joints", "control", "signals", "reboot"), strict=True):
-        lack = explain_missing_feature(MODEL, feature)  # type: ignore[arg-type]
-        assert lack is not None
-        assert text.render(lack) in html._shown
+    lack = explain_missing_feature(MODEL, "control")
+    assert lack is not None
+    assert text.render(lack) in mode._missing._shown
 
 
 def test_the_signals_are_those_of_the_maker(lacking) -> None:
@@ -146,18 +163,18 @@ def test_an_arm_that_is_only_planned_for_keeps_its_setup(store, only_planned) ->
         assert explain_missing_part(panda, part) is None
 
 
-def test_in_the_notebook_signals_restart_and_soft_limits_are_off(lacking) -> None:
-    lacking(setup=("tool",), outputs=(), inputs=(), reboots=False)
+def test_in_the_notebook_signals_restart_soft_limits_and_power_are_not_there(lacking) -> None:
+    lacking(setup=("tool",), outputs=(), inputs=(), reboots=False, switches_power=False)
     text = NotebookText("en", "rcilab.notebook")
     signals = SignalFields(MODEL, text, MagicMock(), lambda *_, **__: ipywidgets.Button())
     signals.show(READY)
-    assert all(control.disabled for control in (signals.on, signals.off, signals.read, signals.output, signals.reboot))
-    assert "The controller of xMate3 has no digital signals." in signals._missing.value
-    assert "The controller of xMate3 has no restart on request." in signals._reboot_missing.value
+    assert signals.folder.layout.display == "none"
     state = SimpleNamespace(model=MODEL, status=READY, robot=None, now=SimpleNamespace(is_virtual=True))
     limits = LimitFields(state, text, MagicMock(), MagicMock(), lambda *_, **__: ipywidgets.Button())
-    limits.folder.selected_index = 0
-    assert limits.fields
-    assert all(field.box.disabled for ends in limits.fields for field in ends)
-    assert limits.send.disabled
-    assert "The controller of xMate3 has no soft joint limits." in limits._missing.value
+    limits.show(READY)
+    assert limits.folder.layout.display == "none"
+    panel = RunPart(MODEL)
+    rows = [row.children for row in panel.widget.children if isinstance(row, ipywidgets.HBox)]
+    assert (panel.recover,) in rows
+    assert not any(panel.power_off in row for row in rows)
+    panel.close()

@@ -87,28 +87,36 @@ def name_parameter(text: Text, group: ParameterGroup, index: int) -> str:
 
 def format_ranges(group: ParameterGroup) -> str:
     """Returns ranges and units in brackets, each once: "[0…75, 60, 45 N·m]" where only the upper ends differ."""
-    ends: dict[tuple[float, str], dict[str, None]] = {}
+    bounds: dict[tuple[float, str], dict[str, None]] = {}
     for item in group.parameters:
-        ends.setdefault((item.low, item.unit), {})[f"{item.high:g}"] = None
-    shown = (f"{low:g}…{', '.join(highs)} {unit}" for (low, unit), highs in ends.items())
+        bounds.setdefault((item.low, item.unit), {})[f"{item.high:g}"] = None
+    units: dict[str, list[str]] = {}
+    for (low, unit), highs in bounds.items():
+        units.setdefault(f"{low:g}…{', '.join(highs)}", []).append(unit)
+    shown = (f"{ends} {', '.join(names)}" for ends, names in units.items())
     return f"[{', '.join(shown)}]"
 
 
 def held_rows(
-    groups: tuple[ParameterGroup, ...], mode: Mode, held: ControllerParameters | None, text: Text, *, is_known: bool
+    groups: tuple[ParameterGroup, ...],
+    mode: Mode | None,
+    held: ControllerParameters | None,
+    text: Text,
+    *,
+    is_known: bool,
 ) -> list[tuple[str, str]]:
-    """Returns the acknowledged parameters of a mode, name and numbers.
+    """Returns the acknowledged parameters of a mode, or of all (None), name and numbers.
 
     Args:
         groups: Parameter groups of the arm.
-        mode: The mode.
+        mode: The mode, or None.
         held: The acknowledged parameters.
         text: The catalogue.
         is_known: Whether the others have their defaults: the controller is ours.
     """
     rows: list[tuple[str, str]] = []
     for group in groups:
-        if mode in group.modes:
+        if mode is None or mode in group.modes:
             numbers = (held or {}).get(group.name, group.defaults if is_known else None)
             rows.append((text(f"control.{group.name}"), text("control.own") if numbers is None else _shown(numbers)))
     return rows

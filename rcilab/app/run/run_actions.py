@@ -336,6 +336,8 @@ class RunActions:
         if _lasts_until_ready(error):
             status = self._connection.status()
             return "bad", pulled_cable(self._store.state, status) or explain_error(error, status)
+        if error.code == SAFETY_STOP:
+            return "warn", message("ready.pressed")
         if isinstance(error, ControlError) and outcome.what == "execute":
             return "warn", message("notice.operator" if outcome.is_operator_absent else _stopped(self._store.state))
         return "bad", message("notice.refused", what=message(f"drive.{outcome.what}"), error=explain_error(error))

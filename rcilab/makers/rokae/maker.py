@@ -40,6 +40,8 @@ class Rokae:
         modes=MODES,
         guides=True,
         reboots=True,
+        switches_power=True,
+        has_gate=True,
         outputs=tuple(f"DO{name}" for name in SIGNAL_NAMES),
         inputs=tuple(f"DI{name}" for name in SIGNAL_NAMES),
         setup=("box", "tool", "load", "force", "joints", "control"),

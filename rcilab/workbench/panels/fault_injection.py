@@ -11,6 +11,7 @@ from rcilab.app.status_text import describe_success
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.error_messages import describe_note
+from rcilab.makers.maker import capabilities_of
 from rcilab.sim.api import DIRECTIONS
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -38,7 +39,10 @@ class FaultInjectionPanel:
         self._buttons: dict[str, Any] = {}
         with gui.add_folder(text("safety.title"), expand_by_default=False):
             gui.add_html('<i class="rl-buttons"></i>')
+            has_gate = capabilities_of(state.model).has_gate
             for name, icon, color in _BUTTONS:
+                if name == "gstop" and not has_gate:
+                    continue
                 button = gui.add_button(
                     text(f"safety.{name}"), icon=icon, color=color, hint=text(f"safety.{name}_hint")
                 )

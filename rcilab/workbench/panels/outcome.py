@@ -110,6 +110,7 @@ def _outcome(recording: Recording, text: Text) -> tuple[str, str, str]:
         facts += " " + text("record.missing", count=missing)
     moment = "" if recording.moment is None else f"{recording.moment - run.begin:.3f}"
     if run.is_safety_stop:
+        moment = moment or f"{run.duration:.3f}"  # A stop need not set an error bit.
         return "bad", text("record.safety_stop", moment=moment, why=_describe_stop(run, text)), facts
     if run.faults:
         faults = name_faults(run.faults)

@@ -21,7 +21,7 @@ from rcilab.app.run.push_actions import HoldPush, SetPush
 from rcilab.app.run.run_actions import RobotCommand
 from rcilab.app.text import Text
 from rcilab.i18n.rounding import format_fixed
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -38,8 +38,10 @@ class PushPanel:
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
-        with gui.add_folder(self._text("guide.title"), expand_by_default=False):
-            self._build_guiding(gui, state)
+        self._has_guiding = explain_missing_feature(state.model, "guiding") is None
+        if self._has_guiding:
+            with gui.add_folder(self._text("guide.title"), expand_by_default=False):
+                self._build_guiding(gui, state)
         with gui.add_folder(self._text("push.title"), expand_by_default=False):
             self._build_push(gui, state)
 
@@ -58,7 +60,6 @@ class PushPanel:
         on_press(self._guide, ask, lambda page: RobotCommand(page=page, what="guide"))
         self._unguide = gui.add_button(text("drive.unguide"), icon="hand-stop", color="gray")
         on_press(self._unguide, ask, lambda page: RobotCommand(page=page, what="unguide"))
-        self._missing = Html(gui)
 
     def _build_push(self, gui: Any, state: UiState) -> None:
         text, ask, push = self._text, self._ask, state.push
@@ -87,19 +88,12 @@ class PushPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows state and robot."""
         text, push = self._text, state.push
-        self._way.show(self._ways[push.guiding_kind])
         self._link.show(self._places[push.link])
         self._direction.show(push.direction)
         self._force.show(push.newtons)
         self._grab.show(push.grab)
         unsimulated = explain_missing_feature(state.model, "simulation") if state.target == "virtual" else None
-        guided, reason = is_guided(status), unsimulated or no_push(status)
-        missing = explain_missing_feature(state.model, "guiding")
-        self._missing.show(why_html(text, missing))
-        self._way.handle.disabled = missing is not None
-        is_ready = status.phase == "idle" and bool(status.powered)
-        self._guide.disabled = is_moving(status) or not is_ready or missing is not None
-        self._unguide.disabled = not guided
+        reason = unsimulated or no_push(status)
         self._button.disabled = reason is not None
         soft = gives_way(status)
         if reason is None and state.plant == "ideal" and not soft:
@@ -112,6 +106,11 @@ class PushPanel:
             sentence += " " + text("push.drag")
         self._note.show(f'<p class="rl-note">{esc(sentence)}</p>')
         self._felt.show(felt_html(status, text))
+        if self._has_guiding:
+            self._way.show(self._ways[push.guiding_kind])
+            is_ready = status.phase == "idle" and bool(status.powered)
+            self._guide.disabled = is_moving(status) or not is_ready
+            self._unguide.disabled = not is_guided(status)
 
 
 def felt_html(status: SupervisorStatus, text: Text) -> str:

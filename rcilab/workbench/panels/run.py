@@ -24,6 +24,7 @@ from rcilab.app.status_text import describe_remedy
 from rcilab.app.text import Text
 from rcilab.core.fault import name_faults
 from rcilab.i18n.translator import Remark
+from rcilab.makers.maker import capabilities_of
 from rcilab.motion.speed_scaling import MIN_SPEED_OVERRIDE
 from rcilab.sim.api import WorldStatus
 from rcilab.workbench.panels.outcome import outcome_html, progress_html
@@ -35,11 +36,8 @@ if TYPE_CHECKING:
     from rcilab.control_process import SupervisorStatus
 
 
-_BUTTONS: tuple[tuple[Any, Any, Any], ...] = (
-    ("recover", "first-aid-kit", "orange"),
-    ("power_on", "power", "blue"),
-    ("power_off", "plug-connected-x", "gray"),
-)
+_RECOVER: tuple[tuple[Any, Any, Any], ...] = (("recover", "first-aid-kit", "orange"),)
+_POWER: tuple[tuple[Any, Any, Any], ...] = (("power_on", "power", "blue"), ("power_off", "plug-connected-x", "gray"))
 
 
 class RunPanel:
@@ -101,7 +99,8 @@ class RunPanel:
                 hint=text("run.to_target_hint"),
             )
             on_press(self._to_target, ask, lambda page: PlanGoal(page=page))
-            for what, icon, color in _BUTTONS:
+            has_power = capabilities_of(state.model).switches_power
+            for what, icon, color in (*_RECOVER, *(_POWER if has_power else ())):
                 button = gui.add_button(text(f"run.{what}"), icon=icon, color=color, hint=text(f"run.{what}_hint"))
                 on_press(button, ask, _drive(what))
                 self._buttons[what] = button
@@ -137,8 +136,9 @@ class RunPanel:
         is_off = moving or bool(state.watched)
         self._plan.disabled = self._to_target.disabled = is_off or not is_connected(status)
         self._buttons["recover"].disabled = is_off or status.phase != "fault" or status.is_pressed
-        self._buttons["power_on"].disabled = is_off or status.powered is not False or status.is_pressed
-        self._buttons["power_off"].disabled = is_off or status.powered is not True
+        if "power_on" in self._buttons:
+            self._buttons["power_on"].disabled = is_off or status.powered is not False or status.is_pressed
+            self._buttons["power_off"].disabled = is_off or status.powered is not True
         self._faults.show(faults_html(status, text, state.world.status))
 
 

@@ -12,7 +12,7 @@ from rcilab.app.view_actions import QUALITIES, THEMES, SetView
 from rcilab.conformance.explain import explain_limit
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.units import ANGLES, LENGTHS
-from rcilab.robots import ROBOT_NAMES
+from rcilab.makers.maker import all_makers
 from rcilab.views.viser_ext.message_guard import allow_spectators
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -38,10 +38,15 @@ class SettingsPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
+        arms = {f"{maker.title} {name}": name for maker in all_makers() for name in maker.robots}
+        self._arms = {name: label for label, name in arms.items()}
         model = gui.add_dropdown(
-            text("settings.model"), ROBOT_NAMES, initial_value=state.model.name, hint=text("settings.model_hint")
+            text("settings.model"),
+            tuple(arms),
+            initial_value=self._arms[state.model.name],
+            hint=text("settings.model_hint"),
         )
-        self._model = BoundControl(model, ask, lambda v, p: ChooseRobot(page=p, model=v))
+        self._model = BoundControl(model, ask, lambda v, p: ChooseRobot(page=p, model=arms.get(v)))
         codes = {label: code for code, label in LANGUAGES.items()}
         language = gui.add_dropdown(text("settings.language"), tuple(codes), initial_value=LANGUAGES[state.language])
         self._language = BoundControl(
@@ -65,7 +70,7 @@ class SettingsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the state."""
         text, lock = self._text, state.control_lock
-        self._model.show(state.model.name)
+        self._model.show(self._arms[state.model.name])
         self._model.handle.disabled = bool(state.watched)
         self._language.show(LANGUAGES[state.language])
         for choice, chosen in self._choices:

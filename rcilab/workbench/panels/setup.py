@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
+from rcilab.app.run.mode_parameters import held_rows, name_group
 from rcilab.app.setup.configuration_state import (
     LISTED,
     describe_held,
@@ -21,6 +22,7 @@ from rcilab.app.setup.configuration_state import (
 from rcilab.app.setup.setup_actions import PressSetup, SetSetup
 from rcilab.app.text import Text
 from rcilab.makers.configuration import SETUP_PARTS
+from rcilab.makers.maker import parameters_of
 from rcilab.workbench.panels.target import planned_html
 from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
@@ -55,7 +57,8 @@ class SetupPanel:
             on_press(self._undo, ask, _press("undo"))
             self._again = gui.add_button(text("setup.check"), icon="clipboard-check", hint=text("setup.check_hint"))
             on_press(self._again, ask, lambda page: PressCheck(page=page, what="again"))
-            choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in SETUP_PARTS}}
+            parts = (part for part in SETUP_PARTS if explain_missing_part(state.model, part) is None)
+            choices = {text("setup.nothing"): "", **{text(f"setup.part.{part}"): part for part in parts}}
             self._choices = {part: label for label, part in choices.items()}
             edited = gui.add_dropdown(
                 text("setup.edit"), tuple(choices), initial_value=self._choices[state.setup.edited]
@@ -117,23 +120,32 @@ class SetupPanel:
         text, pending = self._text, pending_parts(state, status)
         rows = []
         for part in LISTED:
-            missing = explain_missing_part(state.model, part)
+            if explain_missing_part(state.model, part) is not None:
+                continue
             if state.watched:
-                held = text.render(missing or describe_watched(status, part))
+                held = text.render(describe_watched(status, part))
                 rows.append(f"<tr><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(held)}</td></tr>")
                 continue
-            here = self._said(state.setup.wanted, part) if missing is None else "—"
-            held = (
-                text("setup.held", held=text.render(describe_held(status, part)))
-                if missing is None
-                else text.render(missing)
-            )
+            here = self._said(state.setup.wanted, part)
+            held = text("setup.held", held=text.render(describe_held(status, part)))
             mark = ' class="rl-differs"' if part in pending else ""
             rows.append(
                 f"<tr{mark}><th>{esc(text(f'setup.part.{part}'))}</th><td>{esc(here)}"
                 f'<br><span class="rl-dim">{esc(held)}</span></td></tr>'
             )
+        rows += [] if state.watched else self._parameter_rows(state, status)
         return f'<table class="rl-table rl-facts-table rl-setup">{"".join(rows)}</table>'
+
+    def _parameter_rows(self, state: UiState, status: SupervisorStatus) -> list[str]:
+        """Returns the parameters of all modes as the controller has them; Run has their fields."""
+        groups, is_known = parameters_of(state.model), state.target == "virtual"
+        held = held_rows(groups, None, status.setup.control, self._text, is_known=is_known)
+        where = f'<br><span class="rl-dim">{esc(self._text("setup.in_mode"))}</span>'
+        names = (name_group(self._text, group) for group in groups)
+        return [
+            f"<tr><th>{esc(name)}</th><td>{esc(shown)}{where}</td></tr>"
+            for name, (_, shown) in zip(names, held, strict=True)
+        ]
 
     def _said(self, setup: Any, part: str) -> str:
         return self._text.render(describe_part(setup, part))

@@ -12,7 +12,7 @@ from rcilab.app.setup.setup_fields import FIELD_NAMES, INERTIA_NAMES, read_field
 from rcilab.app.text import Text
 from rcilab.makers.configuration import SETUP_PARTS
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown, why_html
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, shown
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -43,21 +43,19 @@ class SetupNumbersPanel:
         self._folders: dict[str, Any] = {}
         self._fields: dict[str, list[NumberField]] = {}
         self._problems: dict[str, Html] = {}
-        self._missing: dict[str, Html] = {}
         self._named: dict[str, list[tuple[str, str]]] = {}  # Each field, and its name in problems.
         self._seen: dict[str, BoundControl] = {}
-        self._switches: dict[str, tuple[BoundControl, ...]] = {}
         for part in SETUP_PARTS:
+            if explain_missing_part(state.model, part) is not None:
+                continue
             title = text(f"setup.part.{part}")
             title = title[:1].upper() + title[1:]
             folder = gui.add_folder(title, visible=state.setup.edited == part, order=0.5)  # After the choice.
             with folder:
-                self._missing[part] = Html(gui)
                 gui.add_html('<i class="rl-triples"></i>')
                 if part == "box":
                     active = gui.add_checkbox(text("setup.active"), False, hint=text("setup.active_hint"))
                     self._active = BoundControl(active, ask, _switch("active"))
-                    self._switches[part] = (self._active,)
                 if part == "force":
                     self._build_axes(gui, ask)
                 self._build_numbers(gui, part)
@@ -75,16 +73,13 @@ class SetupNumbersPanel:
         box, force = setup.wanted.box, setup.wanted.force
         assert box is not None
         assert force is not None
-        self._active.show(box.active)
-        self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
-        for part in SETUP_PARTS:
-            missing = explain_missing_part(state.model, part)
-            self._missing[part].show(why_html(self._text, missing))
+        if "box" in self._folders:
+            self._active.show(box.active)
+        if "force" in self._folders:
+            self._axes.show(next(self._labels[name] for name, kind in FORCE_AXES.items() if kind == force.type))
+        for part in self._folders:
             self._seen[part].show(part in setup.seen)
-            for control in (self._seen[part], *self._switches.get(part, ())):
-                control.handle.disabled = missing is not None
             for field, name in zip(self._fields[part], FIELD_NAMES[part], strict=True):
-                field.disable(missing is not None)
                 number = read_field(setup, part, name)
                 sentence = f"{number + 0.0:.6g}" if part == "load" and name in INERTIA_NAMES else shown(number)
                 field.show(sentence, state.problems.get(field.field), state.entered)
@@ -109,7 +104,6 @@ class SetupNumbersPanel:
         self._labels = {name: label for label, name in names.items()}
         axes = gui.add_dropdown(self._text("setup.axes"), tuple(names), hint=self._text("setup.axes_hint"))
         self._axes = BoundControl(axes, ask, lambda v, p: SetSetup(page=p, name="axes", value=names.get(v, "")))
-        self._switches["force"] = (self._axes,)
 
     def _label(self, name: str) -> str:
         return self._text(f"setup.field.{name}")

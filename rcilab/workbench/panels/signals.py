@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rcilab.app.arm_features import explain_missing_feature
 from rcilab.app.run.drive_state import is_ours
 from rcilab.app.run.signal_actions import PressSignals, SetOutput, signal_rows
 from rcilab.app.run.world_actions import SetWiring
 from rcilab.app.text import Text
 from rcilab.makers.maker import capabilities_of
-from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press, why_html
+from rcilab.workbench.widgets import Ask, BoundControl, Html, esc, on_press
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -19,19 +18,25 @@ if TYPE_CHECKING:
 
 
 class SignalsPanel:
-    """Two groups of the Run tab."""
+    """Two groups of the Run tab, of an arm that has signals and of one that can be restarted."""
 
     def __init__(self, text: Text, ask: Ask) -> None:
         self._text, self._ask = text, ask
 
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
+        capabilities = capabilities_of(state.model)
+        self._has_signals = bool(capabilities.outputs or capabilities.inputs)
+        self._reboots = capabilities.reboots
+        if self._has_signals:
+            self._build_signals(gui, capabilities.outputs)
+        if self._reboots:
+            self._build_reboot(gui)
+
+    def _build_signals(self, gui: Any, names: tuple[str, ...]) -> None:
         text, ask = self._text, self._ask
         with gui.add_folder(text("signals.title"), expand_by_default=False):
-            names = capabilities_of(state.model).outputs
-            self._output = output = gui.add_dropdown(
-                text("signals.output"), names or ("—",), hint=text("signals.output_hint")
-            )
+            output = gui.add_dropdown(text("signals.output"), names or ("—",), hint=text("signals.output_hint"))
             gui.add_html('<i class="rl-buttons rl-signals"></i>')
             self._buttons: list[Any] = []
             for word, icon, level in (("on", "toggle-right", True), ("off", "toggle-left", False)):
@@ -45,12 +50,14 @@ class SignalsPanel:
             read = gui.add_button(text("signals.read"), icon="refresh", color="gray", hint=text("signals.read_hint"))
             on_press(read, ask, lambda page: PressSignals(page=page, what="read"))
             self._buttons.append(read)
-            self._levels, self._missing = Html(gui), Html(gui)
+            self._levels = Html(gui)
             gui.add_html(f'<p class="rl-note">{esc(text("signals.note"))}</p>')
             wired = gui.add_checkbox(text("signals.loop_back"), False, hint=text("signals.loop_back_hint"))
             self._wired = BoundControl(wired, ask, lambda v, p: SetWiring(page=p, name="loop_back", on=bool(v)))
+
+    def _build_reboot(self, gui: Any) -> None:
+        text, ask = self._text, self._ask
         with gui.add_folder(text("reboot.title"), expand_by_default=False):
-            self._reboot_missing = Html(gui)
             gui.add_html('<i class="rl-buttons"></i>')
             self._reboot = gui.add_button(
                 text("reboot.press"), icon="rotate-clockwise", color="orange", hint=text("reboot.hint")
@@ -65,20 +72,20 @@ class SignalsPanel:
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the controller."""
         text, is_ready = self._text, status.phase in ("idle", "fault")
-        missing = explain_missing_feature(state.model, "signals")
-        self._missing.show(why_html(text, missing))
-        self._output.disabled = missing is not None
-        for button in self._buttons:
-            button.disabled = not is_ready or missing is not None
-        self._levels.show(levels_html(state.model, status, text))
-        self._wired.show(state.world.loop_back)
-        self._wired.handle.disabled = not is_ours(status) or missing is not None
-        unable = explain_missing_feature(state.model, "reboot")
-        self._reboot_missing.show(why_html(text, unable))
-        self._reboot.disabled = not is_ready or unable is not None
+        if self._has_signals:
+            for button in self._buttons:
+                button.disabled = not is_ready
+            self._levels.show(levels_html(state.model, status, text))
+            self._wired.show(state.world.loop_back)
+            self._wired.handle.disabled = not is_ours(status)
+        if self._reboots:
+            self._show_reboot(state, status, is_ready=is_ready)
+
+    def _show_reboot(self, state: UiState, status: SupervisorStatus, *, is_ready: bool) -> None:
+        self._reboot.disabled = not is_ready
         self._reboot.visible = not state.reboot_asked
         self._agree.visible = self._cancel.visible = state.reboot_asked
-        sentence = esc(text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""
+        sentence = esc(self._text("reboot.ask", address=status.address or status.target)) if state.reboot_asked else ""
         self._question.show(sentence and f'<p class="rl-verdict rl-warn" role="alert">{sentence}</p>')
 
 

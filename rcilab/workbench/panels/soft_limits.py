@@ -13,7 +13,7 @@ from rcilab.app.setup.setup_actions import PressSetup
 from rcilab.app.setup.setup_fields import JOINT_ENDS
 from rcilab.app.text import Text
 from rcilab.workbench.panels.jog import problems_html
-from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown, why_html
+from rcilab.workbench.widgets import Ask, BoundControl, Html, NumberField, esc, on_press, shown
 
 if TYPE_CHECKING:
     from rcilab.app.store import UiState
@@ -29,6 +29,9 @@ class SoftLimitsPanel:
     def build(self, gui: Any, state: UiState) -> None:
         """Adds the controls."""
         text, ask = self._text, self._ask
+        self._has_limits = explain_missing_part(state.model, "joints") is None
+        if not self._has_limits:
+            return
         self._fields: list[tuple[str, int, NumberField]] = []
         self._named: list[tuple[str, str]] = []
         with gui.add_folder(text("softlimits.title"), expand_by_default=False):
@@ -40,7 +43,6 @@ class SoftLimitsPanel:
                     self._fields.append((end, joint, NumberField(box, ask, field, text.unit("deg"))))
                     self._named.append((field, label))
             self._problems = Html(gui)
-            self._missing = Html(gui)
             self._whole = gui.add_button(text("softlimits.whole"), icon="restore", color="gray")
             on_press(self._whole, ask, lambda page: PressSetup(page=page, what="whole"))
         with gui.add_folder(text("softlimits.beyond"), expand_by_default=False):
@@ -50,15 +52,14 @@ class SoftLimitsPanel:
 
     def show(self, state: UiState, status: SupervisorStatus) -> None:
         """Follows the configuration."""
-        limits = soft_limits(state)
-        missing = explain_missing_part(state.model, "joints")
-        is_fixed = missing is not None or bool(state.watched)
+        if not self._has_limits:
+            return
+        limits, is_fixed = soft_limits(state), bool(state.watched)
         for end, joint, field in self._fields:
             field.disable(is_fixed)
             number = shown(math.degrees(getattr(limits, end)[joint]))
             field.show(number, state.problems.get(field.field), state.entered)
         self._problems.show(problems_html(state, self._text, self._named))
-        self._missing.show(why_html(self._text, missing))
         self._whole.disabled = limits == own_limits(state) or is_fixed
         self._auto.show(state.world.auto_limit)
-        self._auto.handle.disabled = not is_ours(status) or missing is not None
+        self._auto.handle.disabled = not is_ours(status)

@@ -13,6 +13,7 @@ from rcilab.app.run.run_actions import ChooseRobot
 from rcilab.app.run.target_robot_actions import ChooseDestination
 from rcilab.app.status_text import phase_code
 from rcilab.app.text import Text
+from rcilab.makers.driver import parse_address
 from rcilab.workbench.widgets import Ask, BoundControl, Html, PageText, esc, on_press
 
 if TYPE_CHECKING:
@@ -89,14 +90,15 @@ class TargetRobotPanel:
         self._yes.visible = self._no.visible = bool(asked)
         self._again.visible = where in ("ideal", "mujoco") and status.phase in ("lost", "crashed")
         self._leave.disabled = is_fixed or where == "preview"
-        tone = "warn" if status.code == "lost.rebooted" else _TONES.get(status.phase, "bad")
+        tone = "warn" if status.code == "lost.rebooted" or status.is_pressed else _TONES.get(status.phase, "bad")
         name = text("destination.preview") if where == "preview" else text(f"where.{where}")
         name = state.target if where == "address" else name
-        is_named = status.address in ("", name)
-        address = "" if is_named else f'<br><span class="rl-dim">{esc(status.address)}</span>'
+        is_named = status.address in (None, "", name)
+        address = "" if is_named else str(parse_address(status.address or "", state.model))
+        below = f'<br><span class="rl-dim">{esc(address)}</span>' if address else ""
         note = connection_note(state, status)
         self._where.show(
-            f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{address}</p>'
+            f'<p class="rl-verdict rl-{tone}"><b>{esc(name)}</b> {esc(text(phase_code(status)))}{below}</p>'
             + ("" if note is None else f'<p class="rl-note">{esc(text.render(note))}</p>')
         )
 
