@@ -149,8 +149,8 @@ class Maker(Protocol):
         """Returns the parameters of a controller in addition to tool, load and limits, in display order."""
         ...
 
-    def scenarios(self) -> tuple[FaultScenario, ...]:
-        """Returns the scenarios that provoke its faults on the virtual controller, in display order."""
+    def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
+        """Returns the scenarios that provoke faults of an arm on the virtual controller, in display order."""
         ...
 
     def build_server(self, arm: VirtualArm, config: ControllerConfig) -> MakerServer:

@@ -29,8 +29,8 @@ def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> st
     t, values = np.array(demo.cycles["t"]), factor * demo.signal.values
     lower, upper = seen_lower(values, factor * demo.signal.lower), factor * demo.signal.upper
     known = np.isfinite(values)
-    seen = [float(values[known].min()), float(values[known].max()), upper]
-    seen += [lower] if math.isfinite(lower) else []
+    seen = [float(values[known].min()), float(values[known].max())]
+    seen += [float(edge) for bound in (lower, upper) for edge in (bound.min(), bound.max()) if math.isfinite(edge)]
     margin = MARGIN * (max(seen) - min(seen) or 1.0)
     low, high, end = min(seen) - margin, max(seen) + margin, float(t[-1]) * (1.0 + AFTER_FAULT)
     right, bottom = _WIDTH - _RIGHT, _HEIGHT - _BOTTOM
@@ -53,9 +53,10 @@ def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> st
     for tick in (tick for tick in ticks(0.0, end, 5) if x(tick) < right - _NAME):
         out.append(f'<text x="{x(tick):.1f}" y="{bottom + 13:g}" text-anchor="middle" fill="{SOFT}">{tick:g}</text>')
     out.append(f'<text x="{right:g}" y="{bottom + 13:g}" text-anchor="end" fill="{SOFT}">{esc(time)}</text>')
-    out.append(_beyond(_TOP, y(upper), y(upper), right))
-    if math.isfinite(lower):
-        out.append(_beyond(y(lower), bottom, y(lower), right))
+    for bound, side in ((upper, _TOP), (lower, bottom)):
+        if np.isfinite(bound).all():
+            edge = [(x(a), y(b)) for a, b in zip((*t.tolist(), end), (*bound.tolist(), bound[-1]), strict=True)]
+            out.append(_beyond(edge, side))
     points = " ".join(f"{x(a):.1f},{y(b):.1f}" for a, b in zip(t[known].tolist(), values[known].tolist(), strict=True))
     out.append(f'<polyline points="{points}" fill="none" stroke="{_CURVE}" stroke-width="2"/>')
     if known[-1]:
@@ -64,10 +65,11 @@ def draw_demo(demo: FaultDemo, title: str, time: str, factor: float = 1.0) -> st
     return "".join(out) + f'{frame}stroke="{LINE}"/></svg>'
 
 
-def _beyond(top: float, bottom: float, edge: float, right: float) -> str:
-    """Returns the tinted area beyond a bound, and the bound itself."""
+def _beyond(edge: list[tuple[float, float]], side: float) -> str:
+    """Returns a bound, and the tinted area from it to a side of the plot."""
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in edge)
     return (
-        f'<rect x="{_LEFT:g}" y="{top:.1f}" width="{right - _LEFT:g}" height="{bottom - top:.1f}" '
-        f'fill="{BAD}" opacity=".1"/>'
-        f'<path d="M{_LEFT:g},{edge:.1f}H{right:g}" stroke="{BAD}" stroke-width="1.2" stroke-dasharray="5 4"/>'
+        f'<polygon points="{line} {edge[-1][0]:.1f},{side:.1f} {edge[0][0]:.1f},{side:.1f}" fill="{BAD}" '
+        'opacity=".1"/>'
+        f'<polyline points="{line}" fill="none" stroke="{BAD}" stroke-width="1.2" stroke-dasharray="5 4"/>'
     )

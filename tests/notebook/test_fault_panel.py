@@ -16,6 +16,7 @@ from rcilab import notebook
 from rcilab.app.fault_lab import FaultDemo
 from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES
+from rcilab.makers.franka.errors import FrankaError
 from rcilab.makers.rokae.faults import Fault
 from rcilab.notebook.kernel_reachability import KernelReachability
 from tests.processes import processes
@@ -113,13 +114,14 @@ def test_an_arm_of_six_axes_is_told_which_fault_it_cannot_have() -> None:
         assert not panel.provoke.disabled
 
 
-def test_an_arm_without_scenarios_shows_its_makers_faults_and_says_why_they_cannot_be_provoked() -> None:
+def test_an_error_without_a_scenario_is_shown_and_says_why_it_cannot_be_provoked() -> None:
     with notebook.FaultPanel(rcilab.load_model("Panda")) as panel:
         assert len(panel.fault.options) == 41
+        panel.fault.value = FrankaError.POWER_LIMIT_VIOLATION
         assert panel.provoke.disabled
         told = text_of(panel._details)
         assert panel.fault.value.cause in told
-        assert "no fault scenarios for Panda" in told
+        assert "no scenario for it on Panda" in told
 
 
 def test_every_fault_has_a_short_name_in_both_languages() -> None:

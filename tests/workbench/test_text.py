@@ -20,6 +20,7 @@ from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import message
 from rcilab.makers.maker import all_makers
 from rcilab.makers.rokae.conditions import RCI_CONDITIONS
+from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import JOINT_LAWS
 from tests.catalogues import require_equal
 
@@ -66,7 +67,7 @@ def test_the_texts_of_a_makers_faults_are_those_of_its_fault_table(maker):
     for fault in maker.faults():
         assert text(f"fault.{fault.key}") == fault.cause
         assert describe_remedy(fault, text).removeprefix(text("run.remedy")).strip() == fault.remedy
-    for scenario in maker.scenarios():
+    for scenario in (found for name in maker.robots for found in maker.scenarios(load_model(name))):
         for what in ("label", "sent", "explanation", "prevention"):
             assert text.has(f"{what}.{scenario.fault.key}")
 

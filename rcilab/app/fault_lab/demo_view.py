@@ -69,15 +69,16 @@ def body_html(demo: FaultDemo, text: Text) -> str:
     return f'<div class="rl-legend">{legend}</div><table class="rl-table rl-facts-table rl-demo">{table}</table>'
 
 
-def seen_lower(values: Array, lower: float) -> float:
+def seen_lower(values: Array, lower: Array) -> Array:
     """Returns the lower bound if the curve comes near it, else NaN: it is not drawn.
 
     Args:
         values: Values of the bounded quantity, shape (N,).
-        lower: Its lower bound.
+        lower: Its lower bound, shape (N,).
     """
-    least = float(np.nanmin(np.where(np.isfinite(values), values, np.nan)))
-    return lower if math.isfinite(lower) and least < _NEAR * lower else math.nan
+    least, nearest = float(np.nanmin(np.where(np.isfinite(values), values, np.nan))), float(lower.max())
+    is_near = math.isfinite(nearest) and least < _NEAR * nearest
+    return lower if is_near else np.full(len(lower), math.nan)
 
 
 def _breakable(name: str) -> str:

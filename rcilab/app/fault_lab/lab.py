@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rcilab.app.fault_lab.fault_demo import FaultDemo, RecoveryStep
 from rcilab.app.fault_lab.signals import Signals
 from rcilab.app.fault_lab.table import FaultTable
+from rcilab.conformance.common_conditions import LOST_COMMANDS_THRESHOLD
 from rcilab.control_process.simulate import simulate
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
@@ -31,8 +32,7 @@ from rcilab.makers.maker import capabilities_of, maker_of, parameters_of, requir
 from rcilab.makers.parameters import default_parameters
 from rcilab.makers.scenario import FaultScenario, Scene
 from rcilab.model.robot_model import RobotModel, load_model
-from rcilab.motion import plan_joint
-from rcilab.sim.streamed_motion import LATE_TOLERANCE
+from rcilab.motion import plan_joint, plan_recovery
 
 _CAPACITY = 4096  # [cycles] More than any scenario takes.
 _OPEN = SafetyBox(size=(20.0, 20.0, 20.0), T_base_box=IDENTITY, active=False)
@@ -125,7 +125,8 @@ class FaultLab(Closeable):
         after = _watch_stop(robot, rows[-1], fault.stop)  # First: its states are already arriving.
         status = robot.world.status()
         progress(_SHOWN)
-        signal = Signals(rows, self.model, scene.limits, scene.box, status.lost - LATE_TOLERANCE).find(scenario.fault)
+        lost = min(status.lost, LOST_COMMANDS_THRESHOLD)  # A controller that holds commands counts late ones, too.
+        signal = Signals(rows, self.model, scene.limits, scene.box, lost).find(scenario.fault)
         if signal is None:
             raise RcilabError(
                 f"{scenario.fault.manual_name}: the record does not show what the controller saw: {status.reason}"
@@ -162,6 +163,9 @@ class FaultLab(Closeable):
         done += self._recover(robot)
         self._widen(robot)
         self._configure(robot, RobotConfiguration(control=default_parameters(parameters_of(self.model))))
+        back = plan_recovery(self.model, robot.receive_state().q_c)
+        if len(back.q) > 1:
+            robot.control(MotionStream(back.q, "joint_position", self.model))
         nudged = np.array(robot.receive_state().q_c)
         nudged[-1] -= np.copysign(_TEST_MOTION, nudged[-1])
         self._go(robot, nudged)

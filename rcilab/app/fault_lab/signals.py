@@ -15,11 +15,13 @@ from rcilab.conformance.common_conditions import ACCELERATION_CUTOFF, condition_
 from rcilab.conformance.tool_signals import rotation_steps
 from rcilab.core.arrays import Array
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.condition import Condition
+from rcilab.core.condition import Bounds, Condition
 from rcilab.core.cycle_log import state_cycles
+from rcilab.core.errors import UnreachableError
 from rcilab.core.fault import FaultCode
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
+from rcilab.model.kinematics.collision import ClearanceQuery
 from rcilab.model.robot_model import RobotModel
 from rcilab.sim.momentum_observer import MomentumObserver
 from rcilab.sim.plant import Measurement
@@ -37,9 +39,10 @@ class FaultSignal:
     """The joint, from 1; 0 for other quantities."""
     values: Array
     """Shape (N,), in the condition's unit."""
-    lower: float
-    """Lower bound, -inf without one."""
-    upper: float
+    lower: Array
+    """Lower bound in each cycle, shape (N,); -inf without one."""
+    upper: Array
+    """The same for the upper bound."""
 
     @property
     def value(self) -> float:
@@ -49,19 +52,21 @@ class FaultSignal:
     @property
     def bound(self) -> float:
         """The bound on the side of the value."""
-        if not math.isfinite(self.lower):
-            return self.upper
-        return self.upper if self.value >= 0.5 * (self.lower + self.upper) else self.lower
+        lower, upper = float(self.lower[-1]), float(self.upper[-1])
+        if not math.isfinite(lower):
+            return upper
+        return upper if self.value >= 0.5 * (lower + upper) else lower
 
     @property
     def is_broken(self) -> bool:
         """Whether the last value is outside its bounds."""
-        return not self.lower < self.value < self.upper
+        return not bool(self.lower[-1] < self.value < self.upper[-1])
 
     @property
     def excess(self) -> float:
         """Distance of the last value beyond its bound, as a share of the bound."""
-        width = self.upper - max(self.lower, -self.upper)
+        lower, upper = float(self.lower[-1]), float(self.upper[-1])
+        width = upper - max(lower, -upper)
         return (abs(self.value - self.bound) if self.is_broken else -math.inf) / max(width, 1e-9)
 
 
@@ -93,30 +98,44 @@ class Signals:
         values = self._values(condition)
         if values is None:
             return []
-        lower, upper = condition.bounds(self._limits)
+        lower, upper = self._bounds(condition)
         return [
             FaultSignal(
                 condition=condition,
                 axis=column + 1 if condition.is_per_joint else 0,
                 values=values[:, column],
-                lower=float(lower[column]),
-                upper=float(upper[column]),
+                lower=lower[:, column],
+                upper=upper[:, column],
             )
             for column in range(values.shape[1])
         ]
+
+    def _bounds(self, condition: Condition) -> Bounds:
+        """Returns the bounds of a condition in each row, each of shape (N, k)."""
+        joint, count = self._limits.joint, len(self._rows)
+        if condition.bounds_at is None or not condition.depends_on_angles(joint):
+            lower, upper = condition.bounds(self._limits)
+            return np.tile(lower, (count, 1)), np.tile(upper, (count, 1))
+        q = self._rows["q_c"]
+        return condition.bounds_at(joint, np.concatenate((q[:1], q[:-1])))
 
     def _values(self, condition: Condition) -> Array | None:
         """Returns one column per axis, shape (N, k); None if nothing of the kind was commanded."""
         if condition.is_measured:
             return self._measured(condition)
+        if condition.stage == "start":
+            return self._distance_from_start(condition)
         match condition.signal:
             case "external_torque":
                 return self._external()
             case "lost_commands":
                 last = len(self._rows) - 1
                 return np.maximum(self._lost - last + np.arange(last + 1), 0.0)[:, None]
+            case "link_distance":
+                links = ClearanceQuery(self._model.collision_geometry()).links
+                return np.array([[links(q)[0]] for q in self._rows["q"]])
             case "joint":
-                commands = self._sent("command", self._rows["q_c"][0])
+                commands = self._joint_commands()
                 return None if commands is None else _differences(commands, condition.order, self._period)
             case "torque":
                 torques = self._sent("command_tau", np.zeros(self._model.n))
@@ -143,6 +162,43 @@ class Signals:
         steps = rotation_steps(poses[:, :3, :3]) if is_turn else np.diff(poses[:, :3, 3], axis=0)
         rates = np.diff(steps, condition.order - 1, axis=0) / self._period**condition.order
         return np.linalg.norm(rates, axis=1)[_BEFORE - condition.order :, None]
+
+    def _joint_commands(self) -> Array | None:
+        """Returns the joint angles of commands, also those that follow from poses; with rows as `_sent`."""
+        sent = self._sent("command", self._rows["q_c"][0])
+        poses = self._sent("command_pose", self._model.forward(self._rows["q_c"][0]).matrix)
+        if sent is not None or poses is None or self._model.redundancy.kind != "joint":
+            return sent
+        q = self._rows["q_c"][0]
+        psi, found = self._psi(q[np.newaxis])[0], [q] * (_BEFORE + 1)
+        for pose in poses[_BEFORE + 1 :]:
+            try:
+                q = self._model.inverse(pose, psi, q).nearest(q)
+            except UnreachableError:  # The last one may be beyond the range of a joint.
+                q = 2.0 * found[-1] - found[-2]
+            found.append(q)
+        return np.array(found)
+
+    def _distance_from_start(self, condition: Condition) -> Array | None:
+        """Returns the difference of each command from the arm at the start."""
+        if condition.order:
+            return None
+        match condition.signal:
+            case "joint":
+                name, start = "command", self._rows["q_c"][0]
+            case "translation":
+                name, start = "command_pose", self._model.forward(self._rows["q_c"][0]).matrix
+            case "arm_angle":
+                name, start = "command_psi", self._psi(self._rows["q_c"][:1])[0]
+            case _:
+                return None
+        sent = self._sent(name, start)
+        if sent is None:
+            return None
+        away = sent[_BEFORE:] - start
+        return (
+            np.linalg.norm(away[:, :3, 3], axis=1)[:, None] if name == "command_pose" else away.reshape(len(away), -1)
+        )
 
     def _measured(self, condition: Condition) -> Array | None:
         q, dq = self._rows["q"], self._rows["dq"]

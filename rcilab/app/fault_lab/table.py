@@ -21,7 +21,7 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
     def __init__(self, model: RobotModel) -> None:
         self._model = model
         maker = maker_of(model)
-        scenarios = () if maker is None else maker.scenarios()
+        scenarios = () if maker is None else maker.scenarios(model)
         self._scenarios = {scenario.fault: scenario for scenario in scenarios}
 
     def __getitem__(self, fault: FaultCode) -> FaultScenario:
@@ -36,7 +36,7 @@ class FaultTable(Mapping[FaultCode, FaultScenario]):
     def obstacle(self, fault: FaultCode | None) -> Message | None:
         """Returns why a fault cannot be provoked on this arm; None if it can."""
         if fault is None or fault not in self:
-            return message("learn.no_scenarios", model=self._model.name)
+            return message("learn.no_scenario" if self else "learn.no_scenarios", model=self._model.name)
         if self[fault].needs_elbow and not self._model.redundancy:
             return message("learn.no_elbow", model=self._model.name)
         return None

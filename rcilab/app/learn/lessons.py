@@ -123,7 +123,7 @@ def lessons_of(model: RobotModel) -> tuple[str, ...]:
     possible = {
         "elbow": bool(model.redundancy),
         "push": find_missing_feature(model, "guiding") is None,
-        "network": maker is not None and any(scenario.cuts_network for scenario in maker.scenarios()),
+        "network": maker is not None and any(scenario.cuts_network for scenario in maker.scenarios(model)),
     }
     return tuple(name for name in LESSONS if possible.get(name, True))
 

@@ -246,6 +246,19 @@ _BEHAVIOUR = (
         order=0,
         bounds=lambda limits: symmetric_bounds(math.inf),
     ),
+    Condition(
+        id="links.distance",
+        quantity="distance between links",
+        formula="d > 0",
+        necessity="necessary",
+        unit="m",
+        source=f"{_ERRORS}, self-collision; bound: rcilab, the page has no distance",
+        fault=FrankaError.SELF_COLLISION_AVOIDANCE_VIOLATION,
+        stage="throughout",
+        signal="link_distance",
+        order=0,
+        bounds=lambda limits: (np.array([0.0]), np.array([math.inf])),
+    ),
     replace(
         LOST_COMMANDS,
         fault=FrankaError.COMMUNICATION_CONSTRAINTS_VIOLATION,
@@ -263,8 +276,8 @@ FCI_CONDITIONS = ConditionTable(
     box=_BOX,
     conditions=(*_MOTION, _BOX, *_TOOL, *_TORQUES, *_BEHAVIOUR),
 )
-"""The rows for `check` and the monitors of the Panda. Errors without a bound on the pages (power, sensor range,
-self-collision) have no row."""
+"""The rows for `check` and the monitors of the Panda. Errors without a bound on the pages (power, sensor
+range) have no row."""
 
 
 _FR3_VELOCITY = "Franka's page Control parameters, limits for Franka Research 3; numbers: the URDF of the arm"

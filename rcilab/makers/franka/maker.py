@@ -53,9 +53,11 @@ class Franka:
 
         return parameter_groups()
 
-    def scenarios(self) -> tuple[FaultScenario, ...]:
-        """Returns none yet."""
-        return ()
+    def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
+        """Returns the scenarios of the errors of an arm."""
+        from rcilab.makers.franka.scenarios import scenarios_of
+
+        return scenarios_of(model.name)
 
     def parse_address(self, text: str) -> FciAddress:
         """Returns the parts of an address, fci://HOST."""

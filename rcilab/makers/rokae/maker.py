@@ -67,7 +67,7 @@ class Rokae:
 
         return parameter_groups(model.limits)
 
-    def scenarios(self) -> tuple[FaultScenario, ...]:
+    def scenarios(self, model: RobotModel) -> tuple[FaultScenario, ...]:
         """Returns one scenario for each fault."""
         from rcilab.makers.rokae.scenarios import SCENARIOS
 

@@ -35,7 +35,7 @@ class LearnDemoPanel:
         self._back = gui.add_button(text("learn.close"), icon="arrow-left", color="gray", visible=False)
         on_press(self._back, ask, lambda page: PressLearn(page=page, what="close"))
         self._head = Html(gui)
-        data, series, bands = _contents(np.array([0.0, 1.0]), np.zeros(2), -1.0, 1.0, state.theme)
+        data, series, bands = _contents(np.array([0.0, 1.0]), np.zeros(2), np.full(2, -1.0), np.ones(2), state.theme)
         self._plot = gui.add_uplot(
             data, series, bands=bands, height=_HEIGHT, legend={"show": False}, visible=False,
             scales={"x": {"time": False, "range": (0.0, 1.0)}, "y": {"range": (-1.2, 1.2)}},
@@ -95,12 +95,13 @@ class LearnDemoPanel:
 _RED = {"light": "#d1392b", "dark": "#ff7b70"}
 
 
-def _contents(t: Array, values: Array, lower: float, upper: float, theme: Theme) -> tuple[Any, Any, Any]:
+def _contents(t: Array, values: Array, lower: Array, upper: Array, theme: Theme) -> tuple[Any, Any, Any]:
     """Returns data, series and bands: bounds, the area beyond them, the curve, the sample with the fault."""
     red = _RED[theme]
     seen = np.where(np.isfinite(values), values, np.nan)
     floor = seen_lower(values, lower)
-    top = 1.25 * max(abs(upper), float(np.nanmax(np.abs(seen))), 1e-9)
+    known = np.concatenate((upper[np.isfinite(upper)], seen, [1e-9]))
+    top = 1.25 * float(np.nanmax(np.abs(known)))
 
     def level(value: float) -> Any:
         return np.full(len(t), value)
@@ -113,10 +114,10 @@ def _contents(t: Array, values: Array, lower: float, upper: float, theme: Theme)
     fault: Any = {"stroke": red, "width": 0, "points": {"show": True, "size": 11, "fill": red}}
     data = (
         t,
-        level(top if upper >= 0.0 else 0.0),
-        level(upper),
-        level(floor),
-        level(-top if floor < 0 else math.nan),
+        level(top if upper[-1] >= 0.0 else 0.0),
+        np.where(np.isfinite(upper), upper, math.nan),
+        floor,
+        level(-top if floor[-1] < 0 else math.nan),
         seen,
         mark,
     )

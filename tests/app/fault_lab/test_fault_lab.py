@@ -40,12 +40,35 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.Fau
     assert demo.condition.fault is fault
     assert demo.signal.is_broken
     inside = demo.signal.values[:-1]
-    assert ((demo.signal.lower < inside) & (inside < demo.signal.upper)).all(), "the first one past its bound"
+    lower, upper = demo.signal.lower[:-1], demo.signal.upper[:-1]
+    assert ((lower < inside) & (inside < upper)).all(), "the first one past its bound"
     if fault is not Fault.CARTESIAN_POSITION_MOTION_GENERATOR_INVALID_FRAME:
         numbers = [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", demo.sentence)]
         assert np.isclose(numbers, demo.value, rtol=5e-3).any(), "the controller's own number"  # It rounds to 3 digits.
     assert demo.way_out[-1] == "move"
     assert np.isfinite(demo.moved.q).all()
+
+
+@pytest.mark.parametrize("arm", ["Panda", "FR3"])
+def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_moves_again(arm: str) -> None:
+    with fault_lab.FaultLab(arm) as lab:
+        for fault in lab.faults:
+            demo = lab.provoke(fault)
+            assert demo.reported == (fault,)
+            assert demo.condition.fault is fault
+            lower, upper, inside = demo.signal.lower[:-1], demo.signal.upper[:-1], demo.signal.values[:-1]
+            assert ((lower < inside) & (inside < upper)).all(), fault
+            assert fault.manual_name in demo.explain("en")
+            assert demo.describe("sent", "en") != demo.describe("sent", "zh")
+            assert demo.way_out[-2:] == ("recover", "move")
+
+
+def test_the_bound_of_an_fr3_decreases_towards_the_end_of_a_range() -> None:
+    with fault_lab.FaultLab("FR3") as lab:
+        signal = lab.provoke("joint_motion_generator_velocity_limits_violation").signal
+    assert signal.axis == 7
+    assert (np.diff(signal.upper[-100:]) < 0.0).all()
+    assert signal.bound < 0.1  # In the middle of the range it is 5.26 rad/s.
 
 
 def test_every_fault_is_in_the_table_once() -> None:
@@ -70,8 +93,8 @@ def test_an_arm_without_a_virtual_controller_has_no_fault_lab(only_planned: str)
 
 def test_groups_without_a_scenario_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     maker = maker_of(MODEL)
-    scenarios = tuple(scenario for scenario in maker.scenarios() if scenario.group == "velocity")
-    monkeypatch.setattr(type(maker), "scenarios", lambda self: scenarios)
+    scenarios = tuple(scenario for scenario in maker.scenarios(MODEL) if scenario.group == "velocity")
+    monkeypatch.setattr(type(maker), "scenarios", lambda self, model: scenarios)
     assert fault_lab.FaultTable(MODEL).groups == ("velocity",)
 
 

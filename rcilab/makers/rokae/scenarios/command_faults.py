@@ -1,7 +1,4 @@
-"""Wrong commands: each fault of a command, and the shortest stream of commands that violates its condition.
-
-Paths are built from their second differences, cycle by cycle, so that no other condition is violated first.
-"""
+"""Wrong commands: each fault of a command, and the shortest stream of commands that violates its condition."""
 
 from __future__ import annotations
 
@@ -13,12 +10,13 @@ import numpy as np
 
 from rcilab.core.arrays import Array, JointVector, readonly_copy
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, Command, JointPosition, JointTorque
+from rcilab.core.command import CartesianPosition, Command
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotState
 from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
+from rcilab.makers.scenario_streams import PAUSE, joint_stream, path, rise, spin, tool_stream, torque_stream
 from rcilab.model.robot_model import RobotModel
 
 
@@ -30,64 +28,12 @@ def posed(*angles: float) -> Callable[[RobotModel], JointVector]:
 lively_elbow = posed(*map(radians, (0.0, -28.6, 58.8, 56.4, -5.8, 113.8, 0.0)))
 """Position in which the elbow turns fastest for given joint velocities: the arm angle exceeds its bound first."""
 
-_PAUSE = 20  # [cycles] Standstill at the start, so that the plot shows it.
 _SOFT_LIMIT = 0.05  # [rad] From the position of the joint.
 _HELD_LINK = 2
 _HOLD = 0.8  # Largest holding force, as a part of the collision threshold.
 _SENT_EVERY = 4  # [cycles] Interval at which it is sent to the simulation.
 _HALF_BOX = 0.03  # [m]
 _PAST = 1.006  # Factor on the bound: beyond it by more than rounding.
-
-
-def path(second: Array) -> Array:
-    """Returns the path with these second differences, [unit/s^2], from standstill at 0."""
-    return np.cumsum(np.cumsum(second)) * CYCLE_TIME**2
-
-
-def rise(slope: float, top: float, count: int) -> Array:
-    """Returns accelerations that are zero at first, rise by `slope` per cycle up to `top`, and stay there."""
-    return np.minimum(slope * np.maximum(np.arange(count) - _PAUSE, 0), top)
-
-
-def joint_stream(start: Array, joint: int, displacement: Array) -> Callback:
-    """Returns a callback that adds a displacement per cycle, [rad], to one joint, counted from 0, and then stops."""
-
-    def callback(state: RobotState, t: float) -> JointPosition:
-        cycle = round(t / CYCLE_TIME)
-        q = np.array(start)
-        q[joint] += displacement[min(cycle, len(displacement) - 1)]
-        return JointPosition(readonly_copy(q), finished=cycle >= len(displacement))
-
-    return callback
-
-
-def tool_stream(
-    start: Pose, offset: Callable[[float], tuple[Array, Array]], displacement: Array, psi: float
-) -> Callback:
-    """Returns a callback that moves and turns the tool: `offset` turns a displacement into a motion of it."""
-    held = None if np.isnan(psi) else psi
-
-    def callback(state: RobotState, t: float) -> CartesianPosition:
-        cycle = round(t / CYCLE_TIME)
-        shift, turn = offset(float(displacement[min(cycle, len(displacement) - 1)]))
-        T = start.matrix
-        T[:3, 3] += shift
-        T[:3, :3] = T[:3, :3] @ _rotation(turn)
-        return CartesianPosition(readonly_copy(T), psi=held, finished=cycle >= len(displacement))
-
-    return callback
-
-
-def torque_stream(n: int, joint: int, tau: Array) -> Callback:
-    """Returns a callback that commands torques of one joint, counted from 0, [N m]."""
-
-    def callback(state: RobotState, t: float) -> JointTorque:
-        cycle = round(t / CYCLE_TIME)
-        wanted = np.zeros(n)
-        wanted[joint] = tau[min(cycle, len(tau) - 1)]
-        return JointTorque(readonly_copy(wanted), finished=cycle >= len(tau))
-
-    return callback
 
 
 def soften_joint_1(scene: Scene) -> Scene:
@@ -132,7 +78,7 @@ def _joint_velocity(scene: Scene) -> Callback:
 
 
 def _tool_velocity(scene: Scene) -> Callback:
-    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.9, 9.5, 400)), scene.start.psi_c)
+    return tool_stream(scene.start.T_base_tool_c, spin, path(rise(0.9, 9.5, 400)), scene.start.psi_c)
 
 
 def _joint_acceleration(scene: Scene) -> Callback:
@@ -143,12 +89,12 @@ def _joint_acceleration(scene: Scene) -> Callback:
 
 def _tool_acceleration(scene: Scene) -> Callback:
     bound = scene.limits.cartesian.rotation_acceleration
-    return tool_stream(scene.start.T_base_tool_c, _spin, path(rise(0.97, 2.0 * bound, 80)), scene.start.psi_c)
+    return tool_stream(scene.start.T_base_tool_c, spin, path(rise(0.97, 2.0 * bound, 80)), scene.start.psi_c)
 
 
 def _joint_jerk(scene: Scene) -> Callback:
     step = _PAST * 1.2 * scene.limits.joint.jerk[0] * CYCLE_TIME
-    return joint_stream(scene.start.q_c, 0, path(np.where(np.arange(60) < _PAUSE, 0.0, step)))
+    return joint_stream(scene.start.q_c, 0, path(np.where(np.arange(60) < PAUSE, 0.0, step)))
 
 
 def _singular(scene: Scene) -> Callback:
@@ -161,19 +107,19 @@ def _singular(scene: Scene) -> Callback:
     wrist = flange.position - arm[-1].d * flange.rotation[:, 2]
     outwards = wrist - np.array([0.0, 0.0, arm[0].d])
     outwards /= np.linalg.norm(outwards)
-    displacement = np.cumsum(np.minimum(np.maximum(np.arange(3000) - _PAUSE, 0) * 1e-8, 1.5e-6))
+    displacement = np.cumsum(np.minimum(np.maximum(np.arange(3000) - PAUSE, 0) * 1e-8, 1.5e-6))
     return tool_stream(T, lambda value: (outwards * value, np.zeros(3)), displacement, scene.start.psi_c)
 
 
 def _torque_rate(scene: Scene) -> Callback:
     step = _PAST * 2.0 * scene.limits.joint.torque_rate[0] * CYCLE_TIME
-    return torque_stream(scene.robot.model.n, 0, np.where(np.arange(40) < _PAUSE, 0.0, step))
+    return torque_stream(scene.robot.model.n, 0, np.where(np.arange(40) < PAUSE, 0.0, step))
 
 
 def _torque_range(scene: Scene) -> Callback:
     """A force holds link 2 meanwhile: without it the link would be too fast before the bound is exceeded."""
     limits, robot = scene.limits.joint, scene.robot
-    tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - _PAUSE, 0)
+    tau = 0.95 * limits.torque_rate[1] * CYCLE_TIME * np.maximum(np.arange(200) - PAUSE, 0)
     axis = robot.model.rigid_body.link_jacobian(scene.start.q, _HELD_LINK, np.zeros(3))[3:, 1]
     stream = torque_stream(robot.model.n, 1, tau)
     strongest = _HOLD * limits.collision_threshold[1]
@@ -187,21 +133,8 @@ def _torque_range(scene: Scene) -> Callback:
     return callback
 
 
-def _spin(value: float) -> tuple[Array, Array]:
-    """About the tool's own axis: the last joint alone, so that the tool's bounds are exceeded before any joint's."""
-    return np.zeros(3), np.array([0.0, 0.0, value])
-
-
 def _lift(value: float) -> tuple[Array, Array]:
     return np.array([0.0, 0.0, value]), np.zeros(3)
-
-
-def _rotation(turn: Array) -> Array:
-    angle = float(np.linalg.norm(turn))
-    if angle < 1e-12:
-        return np.eye(3)
-    half = turn / angle * np.sin(angle / 2.0)
-    return Pose((0.0, 0.0, 0.0), (np.cos(angle / 2.0), *half)).rotation
 
 
 COMMAND_SCENARIOS = (

@@ -6,47 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.command import CartesianPosition, JointPosition
-from rcilab.core.state import RobotState
 from rcilab.makers.rokae.faults import Fault
-from rcilab.makers.rokae.scenarios.command_faults import box_around_tool, lively_elbow, soften_joint_1, torque_stream
+from rcilab.makers.rokae.scenarios.command_faults import box_around_tool, lively_elbow, soften_joint_1
 from rcilab.makers.scenario import Callback, FaultScenario, Scene
-from rcilab.sim.api import NetworkFaults
+from rcilab.makers.scenario_streams import LONGEST, PAUSE, cut_off, pushed, ramp_of, torque_stream
 
-_PAUSE = 20  # [cycles] Standstill at the start.
-_LONGEST = 3000  # [cycles] Within which a fault has to come.
-_STEP = 5  # [cycles] Interval at which a growing push is sent to the simulation.
 _ELBOW_LINK = 4
-_CUT = 40  # [cycles] After which the network is cut.
-
-Push = Callable[[int], tuple[float, ...]]
-"""Wrench on the tool by the cycle since the start of the push: force and moment, base axes, [N, N m]."""
-
-
-def held(scene: Scene, act: Callable[[int], None], *, tool: bool) -> Callback:
-    """Returns a callback that commands standstill, and calls `act` with the cycle before each answer."""
-    q, T, psi = scene.start.q_c, scene.start.T_base_tool_c, scene.start.psi_c
-    angle = None if np.isnan(psi) else psi
-
-    def callback(state: RobotState, t: float) -> JointPosition | CartesianPosition:
-        cycle = round(t / CYCLE_TIME)
-        act(cycle)
-        finished = cycle >= _LONGEST
-        return CartesianPosition(T, psi=angle, finished=finished) if tool else JointPosition(q, finished=finished)
-
-    return callback
-
-
-def pushed(scene: Scene, push: Push, *, link: int | None = None, tool: bool) -> Callback:
-    """Returns a callback that commands standstill while an external force grows."""
-
-    def act(cycle: int) -> None:
-        since = cycle - _PAUSE
-        if since >= 0 and since % _STEP == 0:
-            scene.robot.simulation.push(push(since), link=link, rise_time=0.0)
-
-    return held(scene, act, tool=tool)
 
 
 def _soft_joints(scene: Scene) -> Scene:
@@ -72,17 +37,12 @@ def _touchy(scene: Scene) -> Scene:
     return scene.guarded(thresholds)
 
 
-def _ramp(direction: tuple[float, ...], slope: float, top: float) -> Push:
-    """A push that grows by `slope` a second up to `top` times `direction`."""
-    return lambda since: tuple(min(since * CYCLE_TIME * slope, top) * part for part in direction)
-
-
 def _sideways(scene: Scene) -> Callback:
-    return pushed(scene, _ramp((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
+    return pushed(scene, ramp_of((0.0, 1.0, 0.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
 
 
 def _down(scene: Scene) -> Callback:
-    return pushed(scene, _ramp((0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
+    return pushed(scene, ramp_of((0.0, 0.0, -1.0, 0.0, 0.0, 0.0), 300.0, 40.0), tool=False)
 
 
 def _elbow(scene: Scene) -> Callback:
@@ -91,21 +51,21 @@ def _elbow(scene: Scene) -> Callback:
     still = np.linalg.svd(model.jacobian(q))[2][-1]
     direction = model.rigid_body.link_jacobian(q, _ELBOW_LINK, np.zeros(3))[:3] @ still
     force = direction / np.linalg.norm(direction)
-    return pushed(scene, _ramp((*force.tolist(), 0.0, 0.0, 0.0), 500.0, 90.0), link=_ELBOW_LINK, tool=True)
+    return pushed(scene, ramp_of((*force.tolist(), 0.0, 0.0, 0.0), 500.0, 90.0), link=_ELBOW_LINK, tool=True)
 
 
 def _swing(scene: Scene) -> Callback:
-    ramp = np.minimum(0.01 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 0.1)
+    ramp = np.minimum(0.01 * np.maximum(np.arange(LONGEST) - PAUSE, 0), 0.1)
     return torque_stream(scene.robot.model.n, scene.robot.model.n - 1, ramp)
 
 
 def _turn(scene: Scene) -> Callback:
     axis = scene.start.T_base_tool.rotation[:, 2]
-    return pushed(scene, _ramp((0.0, 0.0, 0.0, *axis.tolist()), 5.0, 0.12), tool=True)
+    return pushed(scene, ramp_of((0.0, 0.0, 0.0, *axis.tolist()), 5.0, 0.12), tool=True)
 
 
 def _throw(scene: Scene) -> Callback:
-    ramp = np.minimum(0.9 * np.maximum(np.arange(_LONGEST) - _PAUSE, 0), 30.0)
+    ramp = np.minimum(0.9 * np.maximum(np.arange(LONGEST) - PAUSE, 0), 30.0)
     return torque_stream(scene.robot.model.n, scene.robot.model.n - 3, ramp)
 
 
@@ -116,16 +76,6 @@ def _twist(scene: Scene) -> Callback:
 
 def _hit(scene: Scene) -> Callback:
     return pushed(scene, lambda since: (0.0, 0.0, -60.0, 0.0, 0.0, 0.0), tool=False)
-
-
-def _cut_off(scene: Scene) -> Callback:
-    def act(cycle: int) -> None:
-        if cycle == _CUT - 1:  # From now on lock-step waits only briefly for commands that may be lost.
-            scene.robot.simulation.set_network(NetworkFaults(jitter=1e-6), "commands")
-        elif cycle == _CUT:
-            scene.robot.simulation.set_network(NetworkFaults(loss=1.0), "commands")
-
-    return held(scene, act, tool=False)
 
 
 def _both(first: Callable[[Scene], Scene], second: Callable[[Scene], Scene]) -> Callable[[Scene], Scene]:
@@ -166,7 +116,7 @@ MEASURED_SCENARIOS = (
         fault=Fault.COLLISION, group="contact", mode="joint_position", prepare=_touchy, act=_hit,
     ),
     FaultScenario(
-        fault=Fault.INSTABILITY_DETECTION, group="contact", mode="joint_position", act=_cut_off,
+        fault=Fault.INSTABILITY_DETECTION, group="contact", mode="joint_position", act=cut_off,
         cuts_network=True,
     ),
 )  # fmt: skip
