@@ -100,7 +100,6 @@ def test_it_recovers_from_a_reflex(panda: Any, arm: Served) -> None:
     panda.start_controller(controllers.CartesianImpedance())
     arm.world.push([0.0, 0.0, -40.0, 0.0, 0.0, 0.0])
 
-
     def error() -> str:
         try:
             panda.raise_error()
