@@ -21,6 +21,7 @@ from rcilab.core.clearance import STANDARD_DISTANCE, ClearanceLimit
 from rcilab.core.clock import CYCLE_TIME
 from rcilab.core.cycle_log import RATE_FIELDS, state_cycles
 from rcilab.core.errors import PlanningError, UsageError
+from rcilab.core.fault import name_faults
 from rcilab.core.state import COMPLIANT_MODES, MODES, Mode, require_mode
 from rcilab.model.robot_model import require_model
 from rcilab.motion.differences import derivatives_from_differences
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check at the end of a motion.
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
-_LARGEST = 1e100  # [rad] Of commanded angles, also of one that is not a number: their differences remain finite.
+_LARGEST = 1e100  # [rad], [N m] Of commands, also of one that is not a number: their differences remain finite.
 _FARTHEST = 1e6  # [m] Of commanded positions; out of any arm's reach.
 
 
@@ -117,7 +118,12 @@ def check_sent(
         UsageError: Nothing was commanded.
     """
     model = with_soft_limits(require_model(run.model), run) if model is None else require_model(model)
-    box = run.setup.safety_box if box is None else box
+    return _explain_stop(_check(run, model, run.setup.safety_box if box is None else box, distance, mode), run)
+
+
+def _check(
+    run: Run, model: RobotModel, box: SafetyBox | None, distance: ClearanceLimit | None, mode: Mode | None
+) -> Report:
     recorded = recorded_mode(run)
     if recorded == "torque":
         motion, torques = sent_torques(run)
@@ -169,23 +175,46 @@ def recorded_mode(run: Run) -> Mode:
 def sent_torques(run: Run) -> tuple[Motion, Array]:
     """Returns the motion of the arm under the torques that a client commanded, and these torques, shape (N, n), [N m].
 
-    It ends with the last torque, or with the state for which the controller stopped it, until which that is held. It
-    has the joint angles that the controller reports as commanded, which are the measured ones under torques. A
-    command that did not arrive is interpolated, so that its change counts over the cycles in which it was held.
+    It ends with the last torque, a refused one included, or with the state for which the controller stopped it, until
+    which that is held; torques that came after it are not played. It has the joint angles that the controller reports
+    as commanded, which are the measured ones under torques. A command that did not arrive is interpolated, so that its
+    change counts over the cycles in which it was held; `.notes` counts these.
 
     Raises:
         UsageError: No torques were commanded.
     """
     rows = run.cycles
-    sent = rows[np.isfinite(rows["command_tau"]).all(axis=1)]
+    is_sent = np.isfinite(rows["command_tau"]).all(axis=1)
+    faulty = np.flatnonzero(rows["faults"])[:1]
+    if run.has_playout:
+        is_sent |= (rows["sent_ns"] != 0) & (run.setup.mode == "torque")  # Also of those that are not numbers.
+        played, sources = played_commands(rows)
+        if faulty.size and sources.size:
+            is_sent[sources[played <= max(faulty[0], played[0])].max() + 1 :] = False
+    sent = rows[is_sent]
     if not len(sent):
         raise UsageError("in this run no torques were sent")
-    last = max(sent["t"][-1:].tolist() + rows["t"][rows["faults"] != 0][:1].tolist())
+    last = max(sent["t"][-1:].tolist() + rows["t"][faulty].tolist())
     grid = sent["t"][0] + CYCLE_TIME * np.arange(round((last - sent["t"][0]) / CYCLE_TIME) + 1)
     q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q_c"].T], axis=1)
-    return Motion.from_cycles(q), np.stack(
-        [np.interp(grid, sent["t"], column) for column in sent["command_tau"].T], axis=1
+    lost = round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1 - len(sent) if run.has_playout else 0
+    motion = replace(Motion.from_cycles(q), notes=_note_missing(lost))
+    return motion, np.stack([np.interp(grid, sent["t"], column) for column in _finite(sent["command_tau"]).T], axis=1)
+
+
+def _explain_stop(report: Report, run: Run) -> Report:
+    """Returns a report with a note if the controller stopped the run for a commanded value, and the check would not."""
+    faults = {row.condition.fault for row in report.rows if not row.condition.is_measured}
+    blamed = [fault for fault in run.faults if fault in faults]
+    if not (run.has_playout and report.ok and blamed):
+        return report
+    missed = int(run.cycles["missed"][: np.flatnonzero(run.cycles["faults"])[0] + 1].sum())
+    note = (
+        f"the controller stopped it for {name_faults(blamed)}, but its commands conform in the client's own order: it "
+        f"had counted {missed} cycle{'s' * (missed != 1)} without a command, and decides when the next one comes over "
+        "how many cycles that leads"
     )
+    return replace(report, motion=replace(report.motion, notes=(*report.motion.notes, note)))
 
 
 def _is_first_refused(run: Run) -> bool:

@@ -316,7 +316,7 @@ class CycleCapture:
                 "row": self._count,
                 "stopped": reason.as_dict() if reason else None,
                 "received": self._received,
-                "unrecorded": self._unrecorded,
+                "unrecorded": self._unrecorded + len(self._waiting),
                 "lost": playout.lost,
                 "most_lost": playout.max_consecutive_lost,
                 "late": playout.late,

@@ -291,14 +291,14 @@ def test_a_pose_next_to_the_arm_that_the_controller_accepted_conforms() -> None:
     assert check_sent(run, distance=None).ok
 
 
-def recorded_torques(torques: list[float]) -> Run:
-    """Commands torques of joint 7, [N m], until the controller stops the arm."""
+def recorded_torques(torques: list[float], joint: int = 7) -> Run:
+    """Commands torques of a joint, [N m], until the controller stops the arm."""
     with watched() as (place, motions), place.connect() as robot:
         programs.prepare(robot, NEAR, factor=1.0)
         robot.start_move(wire.TORQUE, wire.JOINT)
         left = iter(torques)
         with pytest.raises(ControlException):
-            robot.control(lambda state: Output(tau=(0.0,) * 6 + (next(left),)))
+            robot.control(lambda state: Output(tau=(0.0,) * (joint - 1) + (next(left),) + (0.0,) * (7 - joint)))
         return as_run(collect(motions, 2)[1])
 
 
@@ -307,6 +307,39 @@ def test_torques_are_checked_up_to_the_state_for_which_the_controller_stopped_th
     assert [fault.name for fault in run.faults] == ["ACTUAL_JOINT_VELOCITY_LIMITS_VIOLATION"]
     (violation,) = check_sent(run, distance=None).violations
     assert (violation.condition.id, violation.joint) == ("measured.joint.velocity", 7)
+
+
+def test_torques_after_the_stop_are_not_checked() -> None:
+    run = recorded_torques([min(0.002 * step, 0.4) for step in range(600)])
+    cycles = run.cycles.copy()
+    after = np.flatnonzero(cycles["faults"])[0] + 3
+    cycles["command_tau"][after], cycles["sent_ns"][after] = 50.0, 1
+    (violation,) = check_sent(replace(run, cycles=cycles), distance=None).violations
+    assert violation.condition.id == "measured.joint.velocity"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e308])
+def test_torques_that_are_not_numbers_do_not_conform(value: float) -> None:
+    report = check_sent(recorded_torques([0.0] * 50 + [value] * 100), distance=None)
+    assert {violation.condition.id for violation in report.violations} == {"torque.rate", "torque.range"}
+    assert report.violations[0].time == pytest.approx(50 * CYCLE_TIME)
+
+
+def test_a_stop_for_a_torque_after_a_lost_one_is_explained() -> None:
+    run = recorded_torques([0.0] * 50 + [4.0] * 100, joint=1)  # The client's filter makes 1.54 N m of it.
+    assert [fault.name for fault in run.faults] == ["COMMAND_TORQUE_DISCONTINUITY"]
+    assert not check_sent(run, distance=None).ok
+    cycles = run.cycles.copy()
+    lost = np.flatnonzero(cycles["played"])[49]
+    row = lost - int(cycles["age"][lost])
+    cycles["command_tau"][row], cycles["sent_ns"][row] = np.nan, 0
+    cycles["played"][lost], cycles["missed"][lost] = 0, 1
+    report = check_sent(replace(run, cycles=cycles), distance=None)
+    assert report.ok
+    missing, *_, stopped = report.motion.notes
+    assert missing.startswith("1 command is missing in the record")
+    assert stopped.startswith("the controller stopped it for kCommandTorqueDiscontinuity")
+    assert "had counted 1 cycle without a command" in stopped
 
 
 def test_the_soft_limits_in_force_are_checked(sine: Run) -> None:

@@ -215,3 +215,14 @@ def test_a_client_that_counts_ahead_leaves_the_row_of_a_lost_command_empty(bench
     assert recorded(rows) == bench.sent
     answered = np.flatnonzero(np.isfinite(rows["command"]).all(axis=1))
     assert np.diff(answered).tolist() == [1] * 59 + [2] + [1] * 38
+
+
+def test_commands_that_wait_for_a_row_at_the_end_are_counted(bench: Bench) -> None:
+    in_time(bench, 50)
+    bench.controller.receive(rci.decode_command(wire.pack_command(10**6, (1.0,) * 7), 7))  # It stops the arm.
+    for number in range(10**6 + 1, 10**6 + 30):
+        bench.send(number)
+    bench.cycles(1000)
+    rows, end = recorded(bench.rows()), bench.ring.events(0)[0][-1]
+    assert end["received"] == len(rows) + end["unrecorded"] == 80
+    assert end["unrecorded"] > 10
