@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import NamedTuple
 
+from rcilab.conformance.common_conditions import TOOL_CONDITIONS
 from rcilab.core.arrays import JointVector
+from rcilab.core.condition import Condition
 from rcilab.core.limits import Limits
 from rcilab.core.safety_box import EntryBox, SafetyBox, active_box, box_for_start
 from rcilab.core.spatial import Pose
@@ -88,9 +90,21 @@ class MotionLimits:
     servos: tuple[ServoFigures, ...] | None
     """The servos that respond to a held command, one per joint; None: lost commands are bridged instead."""
 
+    def tool_conditions(self) -> tuple[Condition, ...]:
+        """Returns `TOOL_CONDITIONS` with the maker's range of the arm angle, which may be that of a joint."""
+        table = self.model.description.conditions
+        ranges = [row.bounds for row in table().conditions if _is_arm_angle_range(row)] if table is not None else []
+        if not ranges:
+            return TOOL_CONDITIONS
+        return tuple(replace(row, bounds=ranges[0]) if _is_arm_angle_range(row) else row for row in TOOL_CONDITIONS)
+
     def entry_box(self) -> SafetyBox | EntryBox | None:
         """Returns the bounds of the tool; if it starts outside the box, it may only move inwards."""
         return box_for_start(self.box, *(pose.parts[1] for pose in self.starts))
+
+
+def _is_arm_angle_range(row: Condition) -> bool:
+    return (row.signal, row.order, row.stage) == ("arm_angle", 0, "throughout")
 
 
 def build_motion_limits(

@@ -163,7 +163,7 @@ class PoseReference:
 
     def _monitor_from(self, pose: Pose, psi: float) -> CartesianMonitor:
         bounds = self._bounds
-        monitor = CartesianMonitor(bounds.limits, bounds.entry_box())
+        monitor = CartesianMonitor(bounds.limits, bounds.entry_box(), bounds.tool_conditions())
         monitor.reset(pose, psi if self.has_psi else None)
         return monitor
 

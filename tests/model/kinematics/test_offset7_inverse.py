@@ -70,14 +70,35 @@ def test_one_and_many_configurations_are_judged_alike_for_singularities(case):
     np.testing.assert_allclose(one, held_singularity_path(ARM, q), rtol=1e-9)
 
 
-def test_every_branch_of_a_thousand_poses_of_the_fr3_reaches_them() -> None:
-    fr3 = load_model("FR3")
-    limits = fr3.limits.joint
+@pytest.fixture(scope="module", params=["Panda", "FR3"])
+def thousand(request):
+    """An arm, random configurations within its range and their poses."""
+    model = load_model(request.param)
+    limits = model.limits.joint
     q = np.random.default_rng(11).uniform(limits.lower, limits.upper, (1000, 7))
-    T = fr3.forward_path(q)
-    found = fr3.inverse_batch(T, q[:, 2]).q
+    return model, q, model.forward_path(q)
+
+
+def test_every_branch_of_a_thousand_poses_at_an_elbow_reaches_them(thousand) -> None:
+    model, q, T = thousand
+    found = model.inverse_batch(T, q[:, 2]).q
     rows, branches = np.nonzero(np.isfinite(found[:, :, 0]))
-    assert np.abs(fr3.forward_path(found[rows, branches]) - T[rows]).max() < 1e-9
+    assert np.abs(model.forward_path(found[rows, branches]) - T[rows]).max() < 1e-9
     distance = np.abs(wrapped(found - q[:, np.newaxis])).max(axis=2)
     assert np.nanmin(distance, axis=1).max() < 1e-6
     assert np.bincount(rows).max() > 4
+
+
+def test_every_branch_of_a_thousand_poses_at_an_angle_of_joint_7_reaches_them(thousand) -> None:
+    model, q, T = thousand
+    arm = build_offset_geometry(model.description)
+    table, _ = trace(arm, T[:, :3, :3], T[:, :3, 3], q[:, 6])
+    upright = table.reshape(4, len(q), 7)
+    twins = upright * np.array([1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0]) + np.array([math.pi, 0, math.pi, 0, 0, 0, 0])
+    branches = np.concatenate((upright, twins))  # Joint 2 positive, and negative.
+    assert branches.shape == (8, len(q), 7)
+    number, row = np.nonzero(np.isfinite(branches[..., 0]))
+    assert np.bincount(number).min() > 100
+    assert np.abs(model.forward_path(branches[number, row]) - T[row]).max() < 1e-9
+    distance = np.abs(wrapped(branches - q)).max(axis=2)
+    assert np.nanmin(distance, axis=0).max() < 1e-6

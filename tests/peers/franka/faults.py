@@ -36,11 +36,15 @@ class Bounds(NamedTuple):
     """Velocity, acceleration and jerk of the tool's rotation, [rad/s, ...]."""
     last: float
     """Acceleration of joint 7, [rad/s^2]."""
+    elbow: tuple[float, float, float]
+    """Velocity, acceleration and jerk of the elbow, [rad/s, ...]."""
+    elbow_end: float
+    """End of its range, [rad]."""
 
 
 BOUNDS = {
-    5: Bounds(2.175, 12.5, 2.8973, (2.5, 25.0, 12500.0), 20.0),
-    10: Bounds(2.62, 10.0, 3.0196, (2.5, 17.0, 8500.0), 10.0),
+    5: Bounds(2.175, 12.5, 2.8973, (2.5, 25.0, 12500.0), 20.0, (2.175, 10.0, 5000.0), 2.8973),
+    10: Bounds(2.62, 10.0, 3.0196, (2.5, 17.0, 8500.0), 10.0, (1.5, 10.0, 5000.0), 2.9065),
 }
 
 
@@ -286,6 +290,30 @@ def inverse_jerk(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[
     return build
 
 
+def elbow_too_fast(make: Callable[[State, int, Rows], list[Output]]) -> Callable[[State], Wrong]:
+    def build(start: State) -> Wrong:
+        path, at = _too_fast(_bounds(start).elbow[0])
+        return Wrong(make(start, 2, path), at)
+
+    return build
+
+
+def elbow_too_strong(start: State) -> Wrong:
+    path, at = _too_strong(_bounds(start).elbow[1])
+    return Wrong(_poses(start, 2, path), at)
+
+
+def elbow_jerk(start: State) -> Wrong:
+    path, at = _jump(1.02 * H * _bounds(start).elbow[2])
+    return Wrong(_poses(start, 2, path), at)
+
+
+def elbow_range(start: State) -> Wrong:
+    path = _path(_rise(0.01, 0.2, 1200))
+    at = _first(path, _bounds(start).elbow_end - start.q_d[2]) if start.version == 5 else -1
+    return Wrong(_poses(start, 2, path), at)  # An FR3 is too fast before it is at the end.
+
+
 def elbow_jump(start: State) -> Wrong:
     jumped = (start.elbow_c[0] + 0.3, start.elbow_c[1])
     return Wrong([*_steady(start), Output(pose=start.O_T_EE_c, elbow=jumped, twist=(0.0,) * 6)], 5)
@@ -374,6 +402,7 @@ def near_end(version: int) -> tuple[float, ...]:
 
 
 TURNED = (1.9, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
+NEAR_ELBOW_END = (0.0, -0.785, 2.87, -2.356, 0.0, 1.571, 0.785)
 NEAR_FLIP = (0.0, -0.3, 0.2, -0.55, 0.1, 1.5, 0.785)
 END = (-1.0,)
 """Stands for `near_end`."""
@@ -392,6 +421,10 @@ CASES: dict[str, Case] = {
     "velocities whose change jumps": Case("15", DQ, rate_jerk),
     "a pose that begins off the arm": Case("16", POSE, pose_start),
     "a pose that begins turned": Case("16", POSE, turned_start),
+    "an elbow too fast": Case({5: "17 ...", 10: "17"}, POSE, elbow_too_fast(_poses)),
+    "an elbow accelerated too much": Case("17 ...", POSE, elbow_too_strong),
+    "an elbow whose acceleration jumps": Case("17 ...", POSE, elbow_jerk),
+    "an elbow over the end of its range": Case({5: "17 ...", 10: "28 ..."}, POSE, elbow_range, NEAR_ELBOW_END),
     "an elbow that jumps": Case("17", POSE, elbow_jump),
     "an elbow that jumps beside velocities": Case("17", TWIST, elbow_jump),
     "an elbow that is no number": Case("17", POSE, elbow_no_number),

@@ -84,6 +84,7 @@ class Robot:
         self._buffer = b""
         self._source: tuple[str, int] | None = None
         self.udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)  # States that come while a test waits.
         self.udp.bind(("0.0.0.0", 0))
         self.udp.settimeout(PATIENCE)
         try:

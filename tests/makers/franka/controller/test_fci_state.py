@@ -104,6 +104,7 @@ def test_the_state_of_a_motion_of_the_tool_agrees_with_the_model_and_with_differ
         assert state.O_T_EE_c == state.O_T_EE_d
         assert state.elbow == pytest.approx((state.q[2], -1.0), abs=near)
         assert state.elbow_c == state.elbow_d == pytest.approx((state.q_d[2], -1.0), abs=near)
+        assert (state.theta, state.dtheta) == (state.q, state.dq)
         assert state.delbow_c == pytest.approx((state.dq_d[2], 0.0), abs=10.0 * rates)
         assert state.O_dP_EE_d == state.O_dP_EE_c
         assert state.O_dP_EE_d == pytest.approx(model.jacobian(state.q_d) @ state.dq_d, abs=2.0 * rates)
