@@ -114,8 +114,8 @@ def shown(notebook: nbformat.NotebookNode, kind: str) -> list[str]:
     ]
 
 
-def test_there_are_eleven_lessons_in_two_languages() -> None:
-    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 12)]
+def test_there_are_twelve_lessons_in_two_languages() -> None:
+    assert [path.name[:3] for path in LESSONS] == [f"{number:02}_" for number in range(1, 13)]
     assert [path.name for path in CHINESE] == [path.name.replace(".ipynb", ".zh.ipynb") for path in LESSONS]
 
 
@@ -184,3 +184,30 @@ def test_the_sixth_lesson_shows_its_numbers_at_any_pace_and_again() -> None:
     assert re.findall(r"(\d+) × (00.*)", said) == [("50", "00 " * 19 + "01")] * 2
     assert said.count("kInstabilityDetection REFLEX") == said.count("RecoveryStatus.SUCCESS") == 2
     assert len(shown(notebook, "image/png")) == 2 * 2  # The bytes, the success rate.
+
+
+def test_the_last_two_lessons_move_an_arm_of_each_maker() -> None:
+    both, breaks = printed(run_lesson(LESSONS[10])), printed(run_lesson(LESSONS[11]))
+    assert re.findall(r"^(\w+) +T = \d\.\d{3} s, max", both, re.MULTILINE) == ["xMatePro7", "Panda"]
+    assert re.findall(r"^(\w+) +t = .*\['(\w+)'\]", both, re.MULTILINE) == [
+        ("xMatePro7", "kCommandCartesianAccelerationLimitsViolation")
+    ]
+    assert re.findall(r"^Panda +T = \S+ s, faults: 0$", both, re.MULTILINE)
+    assert re.findall(r"^(\w+) +stopped t = .*, (\w+)$", breaks, re.MULTILINE) == [
+        ("FR3", "joint_motion_generator_velocity_limits_violation"),
+        ("FR3", "controller_torque_discontinuity"),
+        ("FR3", "communication_constraints_violation"),
+        ("FR3", "cartesian_reflex"),
+    ]
+
+
+@pytest.mark.parametrize("path", LESSONS[10:], ids=lambda path: path.stem)
+def test_a_lesson_on_two_makers_runs_without_the_libraries_of_franka(path: Path) -> None:
+    import nbformat
+
+    notebook = with_solved_exercises(path)
+    missing = "import sys\nsys.modules.update({'panda_py': None, 'panda_py.libfranka': None, 'pylibfranka': None})"
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(missing))
+    said = printed(execute(notebook, path))
+    assert said.count("pip install 'rcilab[franka]'") == 1
+    assert re.findall("✗ not yet|✓ right", said) == ["✗ not yet", "✓ right"] * EXERCISES
