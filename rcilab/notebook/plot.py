@@ -13,7 +13,7 @@ from rcilab.conformance.check import HOLD_SAMPLES, check
 from rcilab.conformance.common_conditions import JOINT_CONDITIONS
 from rcilab.core.arrays import Array, as_vector
 from rcilab.core.clock import CYCLE_TIME
-from rcilab.core.condition import Condition
+from rcilab.core.condition import Bounds, Condition
 from rcilab.core.errors import InvalidValueError
 from rcilab.core.limits import JointLimits
 from rcilab.core.optional_deps import require_installed
@@ -24,7 +24,7 @@ from rcilab.motion.motion import Motion, require_motion
 from rcilab.notebook.fonts import select_font
 from rcilab.notebook.palette import JOINT_COLORS
 from rcilab.recording.run import Run
-from rcilab.views.plots import QUANTITIES, planned_differences, recorded_curves
+from rcilab.views.plots import QUANTITIES, plan_curves, planned_differences, recorded_curves
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,6 +50,7 @@ class _Panel:
     """As the controller evaluates it, shape (N, n)."""
     lower: Array
     upper: Array
+    """Bounds, shape (n,); shape (N, n) where they depend on the angles."""
     actual: Array | None
     """From the run, shape (M, n): measured angles and velocities, differences of the commanded angles; or None."""
 
@@ -138,15 +139,23 @@ def _panels(motion: Motion, limits: JointLimits, run: Run | None) -> list[_Panel
         _Panel(
             condition,
             planned_differences(motion.q, condition.order),
-            *condition.bounds(limits),
+            *_bounds(condition, limits, motion),
             None if run is None else recorded_curves(run.t, run.q, run.q_c, run.dq, QUANTITIES[condition.order]).values,
         )
         for condition in JOINT_CONDITIONS
     ]
 
 
+def _bounds(condition: Condition, limits: JointLimits, motion: Motion) -> Bounds:
+    if condition.bounds_at is None or not condition.depends_on_angles(limits):
+        return condition.bounds(limits)
+    before = plan_curves(motion, "dq").q
+    assert before is not None  # Only bounds of velocities depend on the angles.
+    return condition.bounds_at(limits, before)
+
+
 def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int], text: Text) -> None:
-    times = CYCLE_TIME * np.arange(len(panel.values))
+    times: Array = CYCLE_TIME * np.arange(len(panel.values), dtype=np.float64)
     planned: dict[str, Any] = {"linewidth": 1.3}
     if run is not None and panel.actual is not None:
         planned = {"linestyle": (0, (4, 2)), "linewidth": 1.0, "zorder": 3.0}
@@ -158,15 +167,17 @@ def _draw_panel(ax: Axes, panel: _Panel, run: Run | None, joints: Sequence[int],
     ax.set_ylabel(f"{QUANTITIES[panel.condition.order]} [{panel.condition.unit.replace('^2', '²').replace('^3', '³')}]")
     ax.margins(x=0.0)
     ax.grid(visible=True, color="#E0E0E0", linewidth=0.6)
-    _draw_limits(ax, panel.lower[list(joints)], panel.upper[list(joints)], everything=panel.condition.order > 0)
+    lower, upper = panel.lower[..., list(joints)], panel.upper[..., list(joints)]
+    _draw_limits(ax, times, lower, upper, everything=panel.condition.order > 0)
 
 
-def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> None:
+def _draw_limits(ax: Axes, times: Array, lower: Array, upper: Array, *, everything: bool) -> None:
     """Shades the area beyond each limit.
 
     Args:
         ax: Axes to draw into.
-        lower: Lower bounds of the drawn joints.
+        times: Times of bounds that depend on the angles, shape (N,), [s].
+        lower: Lower bounds of the drawn joints, shape (k,) or (N, k).
         upper: Upper bounds of the drawn joints.
         everything: Whether the panel shows all limits; otherwise it fits the angles, because a wrist that may turn by
             360 degrees would flatten every other curve.
@@ -176,6 +187,13 @@ def _draw_limits(ax: Axes, lower: Array, upper: Array, *, everything: bool) -> N
         low, high = min(low, _HEADROOM * float(lower.min())), max(high, _HEADROOM * float(upper.max()))
     beyond: dict[str, Any] = {"color": BEYOND_LIMIT_COLOR, "alpha": 0.16, "linewidth": 0.0, "zorder": 0.5}
     edge: dict[str, Any] = {"color": BEYOND_LIMIT_COLOR, "linewidth": 0.8, "linestyle": (0, (1, 1.5)), "zorder": 0.6}
+    if upper.ndim == 2:
+        for side, end in ((upper, high), (lower, low)):
+            for bound in side.T:
+                ax.fill_between(times, bound, end, **beyond)
+                ax.plot(times, bound, **edge)
+        ax.set_ylim(low, high)
+        return
     for bound in np.unique(upper[upper < high]):
         ax.axhspan(bound, high, **beyond)
         ax.axhline(bound, **edge)

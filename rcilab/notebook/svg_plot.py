@@ -96,7 +96,7 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
         side = "end" if at > right - 12.0 else "middle"
         name = f"{tick:g} {time}" if side == "end" else f"{tick:g}"
         out.append(f'<text x="{at:.1f}" y="{bottom + 13:g}" text-anchor="{side}" fill="{SOFT}">{esc(name)}</text>')
-    out.append(_beyond(frame, y, limit))
+    out.append(_beyond(frame, x, y, limit))
     out += [_span(float(x[a]), float(x[b])) for a, b in _spans(frame.violated)]
     for curve, joint in zip(frame.actual, joints, strict=False):
         out.append(_curve(x, y(curve), _color(joint), 'stroke-width="4" opacity=".38"'))
@@ -108,18 +108,18 @@ def _picture(panel: Panel, joints: Sequence[int], time: str, limit: str) -> str:
     return "".join(out)
 
 
-def _beyond(frame: Frame, y: Callable[[float], Array], limit: str) -> str:
+def _beyond(frame: Frame, x: Array, y: Callable[[Array], Array], limit: str) -> str:
     """Returns the grey areas beyond both limits."""
-    if not math.isfinite(frame.upper):
+    if not np.isfinite(frame.upper).any():
         return ""
-    upper, lower = float(y(frame.upper)), float(y(frame.lower))
     out = ""
-    for a, b in ((_TOP, upper), (lower, _TOP + _PLOT_HEIGHT)):
-        size = f'width="{_PLOT_WIDTH:g}" height="{max(b - a, 0.0):.1f}"'
-        out += f'<rect x="{_LEFT:g}" y="{a:.1f}" {size} fill="{SOFT}" opacity=".14"/>'
-    for edge in (upper, lower):
-        out += f'<path d="M{_LEFT:g},{edge:.1f}h{_PLOT_WIDTH:g}" stroke="{SOFT}" stroke-dasharray="2 3"/>'
-    place = f'x="{_WIDTH - _RIGHT - 4:g}" y="{upper + 11.0:.1f}" text-anchor="end"'
+    for edge, end in ((frame.upper, _TOP), (frame.lower, _TOP + _PLOT_HEIGHT)):
+        rows = slice(None) if np.ptp(edge) else [0, -1]
+        places = zip(x[rows].tolist(), y(edge[rows]).tolist(), strict=True)
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in places)
+        out += f'<polygon points="{_LEFT:g},{end:g} {points} {x[-1]:.1f},{end:g}" fill="{SOFT}" opacity=".14"/>'
+        out += f'<polyline points="{points}" fill="none" stroke="{SOFT}" stroke-dasharray="2 3"/>'
+    place = f'x="{_WIDTH - _RIGHT - 4:g}" y="{float(y(frame.upper[-1:])[0]) + 11.0:.1f}" text-anchor="end"'
     return out + f'<text {place} fill="{SOFT}" font-size="9.5">{esc(limit)}</text>'
 
 

@@ -43,6 +43,8 @@ class Curves:
     """[s], increasing, shape (N,)."""
     values: Array
     """One column per signal, shape (N, k)."""
+    q: Array | None = None
+    """Of joint velocities: the angles one cycle before, on which their limits may depend, shape (N, n), [rad]."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,9 +56,9 @@ class Frame:
     plan: tuple[Array, ...]
     actual: tuple[Array, ...]
     """Empty without a recording."""
-    upper: float
-    lower: float
-    """The limit, in the unit of the curves."""
+    upper: Array
+    lower: Array
+    """The limit, in the unit of the curves; NaN without one."""
     violated: NDArray[np.bool_]
     """Where a curve is outside its limits, widened to be visible, boolean."""
     bound: float
@@ -146,7 +148,9 @@ def plan_curves(
         assert model is not None
         rates = (planned_differences(motion.q, order, start, hold) for order in range(3))
         return Curves(t=t, values=model.torque(*rates).full)
-    return Curves(t=t, values=planned_differences(motion.q, ORDERS[quantity], start, hold))
+    order = ORDERS[quantity]
+    before = _extended(motion.q, 1, start, hold)[:-1] if quantity == "dq" else None
+    return Curves(t=t, values=planned_differences(motion.q, order, start, hold), q=before)
 
 
 def planned_differences(
@@ -163,12 +167,16 @@ def planned_differences(
     Returns:
         Shape (N + hold, n).
     """
-    before = np.repeat(q[:1], order, axis=0)
+    return np.diff(_extended(q, order, start, hold), n=order, axis=0) / CYCLE_TIME**order
+
+
+def _extended(q: JointPath, count: int, start: StartState | None, hold: int) -> JointPath:
+    """Returns commanded angles with those of so many cycles before them, and of the hold after them."""
+    before = np.repeat(q[:1], count, axis=0)
     if start is not None and start.moving:
-        steps = start.dq - CYCLE_TIME * np.arange(order)[:, np.newaxis] * start.ddq
+        steps = start.dq - CYCLE_TIME * np.arange(count)[:, np.newaxis] * start.ddq
         before = q[0] - CYCLE_TIME * np.cumsum(steps, axis=0)[::-1]
-    path = np.concatenate((before, q, np.repeat(q[-1:], hold, axis=0)))
-    return np.diff(path, n=order, axis=0) / CYCLE_TIME**order
+    return np.concatenate((before, q, np.repeat(q[-1:], hold, axis=0)))
 
 
 def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None = None) -> Curves:
@@ -188,7 +196,8 @@ def streamed_curves(q: JointPath, quantity: Quantity, model: RobotModel | None =
         assert model is not None
         rates = (backward_differences(t, q, order) for order in (1, 2))
         return Curves(t=t, values=model.torque(q, *rates).full)
-    return Curves(t=t, values=backward_differences(t, q, ORDERS[quantity]))
+    before = _shifted(q) if quantity == "dq" else None
+    return Curves(t=t, values=backward_differences(t, q, ORDERS[quantity]), q=before)
 
 
 def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantity) -> Curves:
@@ -201,9 +210,16 @@ def recorded_curves(t: Array, q: Array, q_c: Array, dq: Array, quantity: Quantit
         dq: Measured joint velocities, [rad/s], shape (N, n).
         quantity: The signal.
     """
-    if quantity in ("q", "dq"):
-        return Curves(t=t, values=q if quantity == "q" else dq)
+    if quantity == "q":
+        return Curves(t=t, values=q)
+    if quantity == "dq":
+        return Curves(t=t, values=dq, q=_shifted(q))
     return Curves(t=t, values=backward_differences(t, q_c, 2 if quantity == "ddq" else 3))
+
+
+def _shifted(q: Array) -> Array:
+    """Returns the row before each row; of the first one, itself."""
+    return np.concatenate((q[:1], q[:-1]))
 
 
 def backward_differences(t: Array, values: Array, order: int) -> Array:
@@ -245,8 +261,8 @@ def build_error_frame(t: Array, errors: Array, last: float, least: float, bucket
         t=times,
         plan=tuple(thin.T),
         actual=(),
-        upper=np.nan,
-        lower=np.nan,
+        upper=np.full(len(times), np.nan),
+        lower=np.full(len(times), np.nan),
         violated=np.zeros(len(times), dtype=bool),
         bound=max(1.12 * largest, least),
         end=float(times[-1]),
@@ -282,12 +298,30 @@ def build_frame(
     if quantity == "q" and plan is not None:  # As in `check`: a motion that starts outside may move back inside.
         limits = range_from(limits, plan.values[0], RECOVERY_RANGE)
     low, high = bounds_of(limits, quantity)
+    is_curved = quantity == "dq" and limits.near_ends is not None
 
-    def shown(values: Array) -> Array:
-        return factor * values[:, joint - 1 : joint] if joint else 100.0 * (2.0 * values - low - high) / (high - low)
+    def bounds(curves: Curves) -> tuple[Array, Array]:
+        return limits.velocity_bounds(curves.q) if is_curved and curves.q is not None else (low, high)
+
+    def usage(curves: Curves) -> Array:
+        lower, upper = bounds(curves)
+        if quantity == "q":
+            return 100.0 * (2.0 * curves.values - lower - upper) / (upper - lower)
+        return 100.0 * curves.values / np.where(curves.values > 0.0, upper, -lower)
+
+    def shown(curves: Curves) -> Array:
+        return factor * curves.values[:, joint - 1 : joint] if joint else usage(curves)
+
+    def edges(curves: Curves) -> Array:
+        return factor * np.stack([side[:, joint - 1] for side in bounds(curves)], axis=1)
 
     lower, upper = (factor * float(low[joint - 1]), factor * float(high[joint - 1])) if joint else (-100.0, 100.0)
-    return _frame(plan, actual, shown, lower, upper, buckets)
+    frame = _frame(plan, actual, shown, lower, upper, buckets)
+    if not (is_curved and joint):
+        return frame
+    drawn = plan if plan is not None else actual
+    used = _frame(plan, actual, lambda curves: usage(curves)[:, joint - 1 : joint], -100.0, 100.0, buckets)
+    return replace(frame, violated=used.violated, **_limit_curves(drawn, edges, frame))
 
 
 def build_tool_frame(
@@ -303,13 +337,22 @@ def build_tool_frame(
         buckets: Number of time buckets.
     """
     upper = np.nan if limit is None else factor * limit
-    return _frame(plan, actual, lambda values: factor * values, np.nan, upper, buckets)
+    return _frame(plan, actual, lambda curves: factor * curves.values, np.nan, upper, buckets)
+
+
+def _limit_curves(curves: Curves | None, edges: Callable[[Curves], Array], frame: Frame) -> dict[str, Array]:
+    """Returns lower and upper limit of a frame along curves; before and after them those of their ends."""
+    if curves is None or not len(curves.t):
+        return {}
+    at = np.clip(np.searchsorted(curves.t, frame.t, side="right") - 1, 0, len(curves.t) - 1)
+    lower, upper = edges(curves)[at].T
+    return {"lower": lower, "upper": upper}
 
 
 def _frame(
     plan: Curves | None,
     actual: Curves | None,
-    shown: Callable[[Array], Array],
+    shown: Callable[[Curves], Array],
     lower: float,
     upper: float,
     buckets: int,
@@ -319,7 +362,7 @@ def _frame(
     def thin(curves: Curves | None) -> tuple[Array, ...]:
         if curves is None or not len(curves.t):
             return ()
-        return tuple(decimate(Curves(t=curves.t, values=shown(curves.values)), edges).T)
+        return tuple(decimate(Curves(t=curves.t, values=shown(curves)), edges).T)
 
     planned, recorded = thin(plan), thin(actual)
     curves = np.array((*planned, *recorded)).reshape(-1, len(t))
@@ -333,8 +376,8 @@ def _frame(
         end=float(t[-1]),
         plan=planned,
         actual=recorded,
-        upper=upper,
-        lower=lower,
+        upper=np.full(len(t), upper),
+        lower=np.full(len(t), lower),
         violated=violated,
         bound=min(1.12 * max(limit, farthest), _FARTHEST * limit),
     )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -100,3 +101,19 @@ def page(opened) -> Iterator[BenchPage]:
     assert opened.problems == [], f"the page's own script failed: {opened.problems}"
     assert opened.bench.dispatcher.errors == []
     assert opened.bench.renderer.errors == []
+
+
+@pytest.fixture
+def heard(page):
+    """The page, taken for present: a busy machine may keep it silent for 2 s, which ends a motion."""
+    ending = threading.Event()
+
+    def beat() -> None:
+        while not ending.wait(0.3):
+            page.bench.session.heartbeat()
+
+    thread = threading.Thread(target=beat)
+    thread.start()
+    yield page
+    ending.set()
+    thread.join()

@@ -2,29 +2,9 @@
 
 from __future__ import annotations
 
-import threading
-
-import pytest
-
 from browser.test_settings import choose
 from rcilab.app.goal.goal_actions import SetSpeed
 from rcilab.app.run.mode_actions import SetDrive
-
-
-@pytest.fixture
-def heard(page):
-    """The page, taken for present: a busy machine may keep it silent for 2 s, which ends a motion."""
-    ending = threading.Event()
-
-    def beat() -> None:
-        while not ending.wait(0.3):
-            page.bench.session.heartbeat()
-
-    thread = threading.Thread(target=beat)
-    thread.start()
-    yield page
-    ending.set()
-    thread.join()
 
 
 def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(heard):

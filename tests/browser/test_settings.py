@@ -64,7 +64,7 @@ def test_another_arm_stands_there_without_a_restart(page):
     page.open_tab("Setup")
     page.unfold("Soft joint limits")
     page.open_tab("Settings")
-    choose(page, "Robot", "xMate3")
+    choose(page, "Robot", "ROKAE xMate3")
     page.wait(lambda: page.state.model.name == "xMate3", "the other model", 30)
     page.wait(lambda: page.status.q is not None and len(page.status.q) == 6, "states of a 6-axis arm", 30)
     page.wait(lambda: page.shows("live", page.status.q), "the other arm in the scene", 30)
@@ -74,7 +74,7 @@ def test_another_arm_stands_there_without_a_restart(page):
     page.wait(lambda: page.tab.get_by_text("J6 ≥", exact=False).is_visible(), "the unfolded group with its content")
     page.tab.locator("[aria-expanded]:visible", has_text="Soft joint limits").click()
     page.open_tab("Settings")
-    choose(page, "Robot", "xMatePro7")
+    choose(page, "Robot", "ROKAE xMatePro7")
     page.wait(lambda: page.status.q is not None and len(page.status.q) == 7, "the first arm again", 30)
     page.wait(lambda: page.shows("live", page.status.q), "the first arm in the scene", 30)
 

@@ -28,6 +28,7 @@ from rcilab.views.plots import (
 from rcilab.workbench.panels.plot_contents import plot_contents
 
 MODEL = load_model("xMatePro7")
+FR3 = load_model("FR3")
 LIMITS = MODEL.limits.joint
 
 
@@ -66,6 +67,37 @@ def test_a_violation_is_marked_where_it_is_and_nothing_else_is():
     worst = int(np.nanargmax(np.max(spoiled.plan, axis=0)))
     assert spoiled.violated[worst]
     assert 3 <= spoiled.violated.sum() <= 12
+
+
+def near_the_end() -> Motion:
+    """A fast motion of joint 4 of an FR3 to the end of its range, where its velocity limit decreases."""
+    goal = FR3.home.copy()
+    goal[3] = FR3.limits.joint.upper[3] - 0.02
+    return plan_joint(FR3, FR3.home, goal, speed=1.0, law="jerk_limited")
+
+
+def test_a_velocity_limit_that_depends_on_the_angle_is_a_curve_along_plan_and_run():
+    motion, limits = near_the_end(), FR3.limits.joint
+    assert check(motion, FR3).ok
+    plan = plan_curves(motion, "dq")
+    own = build_frame(plan, None, limits, "dq", 4)
+    assert own.upper[0] == pytest.approx(np.degrees(limits.velocity[3]))
+    last = np.array(motion.q[-1])
+    assert own.upper[-1] == pytest.approx(np.degrees(limits.velocity_bounds(last)[1][3]))
+    assert own.upper[-1] < 0.3 * own.upper[0]
+    assert own.lower.min() == pytest.approx(-own.upper[0])
+    run = recorded_curves(motion.times, motion.q, motion.q, motion.dq, "dq")
+    assert np.allclose(build_frame(None, run, limits, "dq", 4).upper, own.upper, rtol=0.02)
+    for joint in (0, 4):
+        assert not build_frame(plan, run, limits, "dq", joint).violated.any()
+        fast = Curves(t=plan.t, values=1.5 * plan.values, q=plan.q)
+        frame = build_frame(fast, None, limits, "dq", joint)
+        usage = 150.0 * np.abs(plan.values[:, 3]) / limits.velocity_bounds(plan.q)[1][:, 3]
+        assert (usage > 100.0).any()
+        assert frame.violated.any()
+    used = build_frame(plan, None, limits, "dq", 0)
+    assert set(used.upper) == {100.0}
+    assert np.nanmax(used.plan[0]) == 0.0  # A joint at rest uses nothing of its limit.
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)

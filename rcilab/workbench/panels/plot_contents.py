@@ -55,8 +55,8 @@ def plot_contents(
     data = [
         t,
         level(frame.bound),
-        level(frame.upper),
-        level(frame.lower),
+        frame.upper,
+        frame.lower,
         level(-frame.bound),
         np.where(frame.violated, frame.bound, -frame.bound),
     ]

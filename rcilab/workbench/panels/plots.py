@@ -168,7 +168,8 @@ class Plots:
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
         self._titles[name].show(f'<div class="rl-plot-title">{esc(title)}</div>')
         low = 0.0 if name in ("speed", "acceleration", "tool") else -frame.bound
-        self._reaches[name] = low, frame.bound, tuple(v for v in (frame.lower, frame.upper) if math.isfinite(v))
+        ends = float(frame.lower.min()), float(frame.upper.max())
+        self._reaches[name] = low, frame.bound, tuple(end for end in ends if math.isfinite(end))
         is_tool = name in (*TOOL_QUANTITIES, "tool")
         data, series, _ = plot_contents(frame, joint, state.model.n, state.theme, is_tool=is_tool)
         plot = self._plots[name]

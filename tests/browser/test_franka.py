@@ -1,0 +1,112 @@
+"""A Franka arm on the page: what its interface has, in its maker's words; plan, check, execute, user stop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from browser.test_settings import choose
+from rcilab.app.goal.goal_actions import SetSpeed
+from rcilab.app.run.run_actions import ChooseRobot
+from rcilab.app.view_actions import SetView
+
+pytest.importorskip("pylibfranka", reason="the extra franka is not installed")
+
+
+@pytest.fixture(scope="module")
+def switched(opened):
+    """The page with an FR3, chosen in its settings; afterwards with the arm of the other tests."""
+
+    def wait_for_arm(name: str) -> None:
+        opened.wait(lambda: opened.state.model.name == name, "the other model", 30)
+        opened.wait(lambda: opened.status.phase == "idle" and bool(opened.status.powered), "a ready arm", 30)
+        opened.wait(lambda: opened.shows("live", opened.status.q), "the arm in the scene", 30)
+
+    opened.start_afresh()
+    opened.open_tab("Settings")
+    choose(opened, "Robot", "Franka FR3")
+    wait_for_arm("FR3")
+    yield opened
+    opened.bench.dispatcher.ask(SetView(name="language", value="en"))
+    opened.bench.dispatcher.ask(ChooseRobot(model="xMatePro7"))
+    wait_for_arm("xMatePro7")
+
+
+@pytest.fixture
+def fr3(switched, page):
+    assert page.state.model.name == "FR3"
+    return page
+
+
+def headings(page) -> list[str]:
+    return page.tab.locator("[aria-expanded]:visible").all_inner_texts()
+
+
+def test_the_page_has_what_its_interface_has_and_nothing_of_another(fr3):
+    page = fr3
+    page.open_tab("Setup")
+    table = page.tab.locator("table.rl-setup:visible")
+    page.wait(lambda: "End effector (EE)" in table.inner_text(), "the parts of this arm")
+    for shown in ("Load", "Joint stiffness", "Cartesian stiffness", "Collision thresholds"):
+        assert shown in table.inner_text()
+    whole = page.tab.locator("#root").inner_text()
+    for foreign in ("Safety box", "Force-control frame", "Soft joint limits"):
+        assert foreign not in whole
+    page.open_tab("Run")
+    page.button("Plan from here").wait_for()
+    assert page.button("Power off").count() == page.button("Power on").count() == 0
+    assert "User stop" in " ".join(headings(page))
+    for foreign in ("Guide by hand", "Digital outputs", "Restart", "gate"):
+        assert foreign not in " ".join(headings(page))
+    assert "?" not in page.tab.locator(".rl-verdict:visible").first.inner_text()  # Ports that clients find themselves.
+
+
+def test_a_plan_is_checked_by_its_conditions_and_executed(fr3, heard):
+    page = fr3
+    page.plan_to(1, -40.0 if page.status.q_c[0] > 0 else 40.0)
+    page.open_tab("Check")
+    verdict = page.tab.locator(".rl-verdict.rl-good:visible").first
+    page.wait(lambda: "Passed" in verdict.inner_text(), "a green report")
+    cards = " ".join(page.tab.locator(".rl-card:visible").all_inner_texts())
+    for shown in ("joint_motion_generator_velocity_limits_violation", "dq_max(q)", "Franka's page"):
+        assert shown in cards
+    goal = np.array(page.state.goal.q)
+    page.open_tab("Run")
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: page.status.phase == "idle" and np.abs(page.status.q - goal).max() < 1e-6, "the arrival", 30)
+    page.wait(lambda: page.state.recording is not None and page.state.recording.tracking is not None, "a recording")
+    page.wait(lambda: page.shows("live", goal), "the live arm of the page at the goal")
+
+
+def test_a_user_stop_ends_the_motion_and_the_arm_is_ready_once_it_is_released(fr3, heard):
+    page = fr3
+    page.bench.dispatcher.ask(SetSpeed(speed=0.05))
+    page.plan_to(1, -40.0 if page.status.q_c[0] > 0 else 40.0)
+    page.open_tab("Run")
+    page.unfold("User stop")
+    page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
+    page.button("Execute").click()
+    page.wait(lambda: (page.status.motion_time or 0.0) > 0.1 and page.status.phase == "moving", "the arm on its way")
+    page.button("User stop").click()
+    page.wait(lambda: page.status.is_pressed and page.status.phase == "idle", "the stop")
+    page.wait(lambda: "The user stop is pressed" in page.toast(), "what has stopped the arm")
+    assert page.chip("phase") == "user stop pressed"
+    verdicts = page.tab.locator(".rl-verdict:visible")
+    page.wait(
+        lambda: "the user stop was pressed" in " ".join(verdicts.all_inner_texts()),
+        lambda: f"why: {verdicts.all_inner_texts()}",
+    )
+    page.button("Release").click()
+    page.wait(lambda: page.status.phase == "idle" and bool(page.status.powered), "a ready arm without another button")
+    page.button("Plan from here").click()
+    page.wait(lambda: page.button("Execute").is_enabled(), "the way to go on")
+
+
+def test_it_speaks_chinese(fr3):
+    page = fr3
+    page.bench.dispatcher.ask(SetView(name="language", value="zh"))
+    page.open_tab("运行")
+    page.wait(lambda: any(heading.startswith("用户停止") for heading in headings(page)), "the user stop")
+    page.open_tab("配置")
+    page.wait(lambda: "末端执行器 (EE)" in page.tab.locator("table.rl-setup:visible").inner_text(), "its parts")
