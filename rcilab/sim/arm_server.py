@@ -10,10 +10,11 @@ A maker whose clients are not expected to keep real time gives its server patien
 for its command before it counts as lost, and the grid moves on with it (soft lock-step). Before the first command,
 states follow each other after that time, and none counts as lost.
 
-In lock-step the next cycle of a motion is due when its command arrives, without a time limit of its own. If several
-commands are queued, as after the vendor client's sleep, their cycles are computed without sending a state, and the
-client answers the state after the last one. So it is with torques; a client that answers a state again, as the vendor's
-does when the next one is late, does not receive the state of that cycle, as if it had been lost.
+In lock-step the next cycle of a motion is due when the answer to the newest state arrives, without a time limit of its
+own. If several commands are queued, as after the vendor client's sleep, their cycles are computed without sending a
+state, and the client answers the state after the last one. A client that answers a state again, as the vendor's does
+when the next one is late, does not receive the state of that cycle, as if it had been lost. So no state of a motion is
+in the client's buffer at its end: the vendor's client would begin its next motion with it.
 """
 
 from __future__ import annotations
@@ -31,7 +32,6 @@ from rcilab.core.fault import FaultCode, name_faults
 from rcilab.i18n.translator import Remark
 from rcilab.realtime.cpu_latency import CpuLatencyLock
 from rcilab.realtime.scheduling import enter_realtime, leave_realtime
-from rcilab.sim.actuator import ControlLaw
 from rcilab.sim.arrivals import (
     Arrival,
     ClientConnected,
@@ -58,7 +58,8 @@ from rcilab.sim.simulation_port import SimulationPort
 
 PRIORITY = 80  # Under SCHED_FIFO; above the client's process, which it clocks.
 LEAD_TIME = 0.0005  # [s] From the start of a cycle until its state is due; longer than almost any cycle takes.
-RESEND_TIME = 0.02  # [s] In lock-step a state is repeated after this time until the first command arrives.
+RESEND_TIME = 0.02  # [s] In lock-step a state is repeated until the first command arrives, after this time,
+_MAX_RESEND_TIME = 0.1  # [s] and then less often: a vendor's client sleeps for 1 s, and then answers every copy.
 START_TIMEOUT = 0.1  # [s] In lock-step, for the first command, if a client may need another state before it.
 COMMAND_TIMEOUT = (
     60.0  # [s] In lock-step, for the next command; then its cycle is lost, and each following one at 1 kHz.
@@ -100,6 +101,7 @@ class ArmServer:
         self.bad_datagrams = 0
         self._server = server
         self._has_timed_out = False
+        self._arrived = 0  # In lock-step: commands of the motion before the newest state was sent.
         self._lines: LogLines | None = None
         if log is None:
             self._lines = LogLines(_STDERR, config.log_format)
@@ -168,10 +170,9 @@ class ArmServer:
         if not ipaddress.ip_address(self.host).is_loopback:
             text = f"warning: {self.host} is reachable from outside this machine, where others can move this arm"
             self._log.write("warning", text, host=self.host)
-        use_realtime = self.config.realtime and not self.config.lockstep
-        if use_realtime:
+        if self.config.realtime:
             warning = enter_realtime(PRIORITY).warning
-            if warning is not None:
+            if warning is not None and not self.config.lockstep:
                 self._log.write("warning", warning)
         parts = LogHandler(self._log)
         _parts_log.addHandler(parts)
@@ -180,7 +181,7 @@ class ArmServer:
         finally:
             _parts_log.removeHandler(parts)
             self._cpu_latency_lock.switch(False)
-            if use_realtime:
+            if self.config.realtime:
                 leave_realtime()
             self.close()
             if self._lines is not None:
@@ -246,8 +247,10 @@ class ArmServer:
                 self._await_recorder()
                 self._await_command()
                 self._timer.restart(self._clock.now())
-                if self._repeats_answer:
+                playout = self.controller.arm.playout
+                if playout.pop_repeated_answer(self.controller.cycle_number):
                     self._advance_unsent()
+                    self._arrived = playout.arrived
                     continue
             elif self.config.lockstep and self.controller.awaits_start:
                 self._await_start()
@@ -290,33 +293,35 @@ class ArmServer:
         After a timeout, a command that is too late for its cycle shows that the client is active again: it may then
         catch up.
         """
-        controller = self.controller
-        is_first = not controller.arm.playout.is_playing
-        late = controller.arm.playout.late
+        controller, playout = self.controller, self.controller.arm.playout
+        is_first = playout.arrived == 0
+        late = playout.late
         deadline = self._clock.now() + self._command_timeout
-        resend = self._clock.now() + RESEND_TIME
+        resend_time = RESEND_TIME
+        resend = self._clock.now() + resend_time
         notice_time = _FIRST_NOTICE_TIME if is_first else _NOTICE_TIME
         notice = self._clock.now() + notice_time
         while True:
             remaining = min(deadline - self._clock.now(), _CHECK_PERIOD)
             remaining = resend - self._clock.now() if is_first else remaining
-            self._poll(0.0 if len(controller.arm.playout) else remaining)
+            self._poll(0.0 if self._is_answered else remaining)
             self._check_periodically()
-            if len(controller.arm.playout) or not controller.wants_commands or self._is_ending:
+            if self._is_answered or not controller.wants_commands or self._is_ending:
                 self._has_timed_out = False
                 return
             if self._network.has_lost:
                 return
             if self._clock.now() >= notice:
                 notice = math.inf
-                self._log_wait(notice_time, controller.arm.playout.late - late)
-            if self._has_timed_out and controller.arm.playout.late > late:
+                self._log_wait(notice_time, playout.late - late)
+            if self._has_timed_out and playout.late > late:
                 self._has_timed_out = False
                 deadline = self._clock.now() + self._command_timeout
             if is_first:  # Not after every unknown datagram: the states would fill the client's buffer.
                 if self._clock.now() >= resend:
                     self._server.send_states()
-                    resend = self._clock.now() + RESEND_TIME
+                    resend_time = min(2.0 * resend_time, _MAX_RESEND_TIME)
+                    resend = self._clock.now() + resend_time
             elif self._clock.now() >= deadline:
                 self._has_timed_out = True
                 return
@@ -404,6 +409,7 @@ class ArmServer:
         else:
             self._clock.sleep_until(due)
         self._server.send_states()
+        self._arrived = self.controller.arm.playout.arrived
         if self._capture is not None:
             self._capture.write()
         if self.controller.is_moving is not was_moving and not self.config.lockstep:
@@ -437,10 +443,10 @@ class ArmServer:
             self._advance_unsent()
 
     @property
-    def _repeats_answer(self) -> bool:
-        """Whether the next torque answers a state that was answered before."""
-        arm = self.controller.arm
-        return arm.mode.law is ControlLaw.TORQUE and arm.playout.answers_again(self.controller.cycle_number)
+    def _is_answered(self) -> bool:
+        """Whether the newest state of a motion in lock-step is answered; after a lost command the stock is smaller."""
+        playout = self.controller.arm.playout
+        return playout.arrived > self._arrived or playout.is_supplied
 
     def _advance_unsent(self) -> None:
         """Advances by a cycle whose state is not sent."""

@@ -130,7 +130,7 @@ class ControllerConfig:
     is_recorded: bool = False
     """Whether every cycle is written to shared memory, for recorders and pages that watch."""
     realtime: bool = True
-    """Whether to request SCHED_FIFO and locked memory; never in lock-step, which has no deadlines."""
+    """Whether to request SCHED_FIFO and locked memory; in lock-step, too, because a client may wait only briefly."""
     parent_pid: int | None = None
     """Id of the parent process, with which this one ends; None: it has no parent."""
 

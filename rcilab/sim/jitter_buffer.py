@@ -15,11 +15,14 @@
   gap indicates a lost state.
 * A command that arrives out of order fills the gap. If states are reordered, the ids of their answers are out of
   order: then the command after the gap continues the motion, and those with the ids of the gap follow it, in the
-  order of their arrival.
+  order of their arrival; not one that arrived more than `SLACK` commands later, as in a burst.
 * If many more commands than the prefill are queued for a long time, the client has sent more commands than there were
   cycles; the loop then runs some extra cycles, because the delay would otherwise grow without bound.
 * Commands that close a control loop (torques) must be recent: queued ones beyond the prefill are skipped, oldest first.
-  In lock-step none is: the loop runs a cycle for each that answers a state that was answered before (`answers_again`).
+  In lock-step none is skipped.
+* In lock-step the loop waits for the answer to the newest state (`is_supplied`), so that the delay is one of commands
+  and the client never has a state in stock. It runs a cycle of its own for a command that answers an earlier state
+  again (`pop_repeated_answer`).
 * Commands that come now and then (goals of a planned motion) are played when they arrive; no cycle is lost.
 * A long gap, or ids that start again far behind, mean that the client has restarted its numbering: the command is
   treated as the next one.
@@ -29,6 +32,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import NamedTuple
 
 from rcilab.sim.arm_command import ArmCommand
@@ -70,6 +74,8 @@ class JitterBuffer:
         late: Commands dropped because their cycle had passed.
         dropped: Commands dropped, oldest first, because the queue was full.
         duplicates: Datagrams dropped as duplicates.
+        repeated: Commands that answer a state again, other than the first one: their client received the next one late.
+        arrived: Commands that were queued in this motion.
         prefill: Cycles between the first command's arrival and its play-out, from the next motion on.
         delay: The same of this motion.
         window: Cycles that the success rate covers, from the next motion on.
@@ -114,7 +120,9 @@ class JitterBuffer:
         self.is_playing = False
         self.is_finished = False
         self.cycles = self.span = self.lost = self.consecutive_lost = self.max_consecutive_lost = 0
-        self.late = self.dropped = self.duplicates = 0
+        self.late = self.dropped = self.duplicates = self.repeated = self.arrived = 0
+        self._is_newest_repeated = False
+        self._first_id: int | None = None
 
     def clear(self) -> None:
         """Clears the queue; the counters are kept."""
@@ -133,14 +141,16 @@ class JitterBuffer:
         """Queued commands beyond the prefill, next to that of the coming cycle; 0 where older ones are skipped."""
         return 0 if self._max_queued is not None else max(len(self._queue) - 1 - self.delay, 0)
 
-    def answers_again(self, newest: int) -> bool:
-        """Whether the next command answers a state that the delay does not explain, before the `newest` sent one.
+    @property
+    def is_supplied(self) -> bool:
+        """Whether as many commands are queued as sent states have been answered, or the last one of the motion is."""
+        queue = self._queue
+        return len(queue) > self.delay - self._countdown or (len(queue) > 0 and queue[-1].finished)
 
-        Its client has answered a state twice, because it received the next one late.
-        """
-        if not (self.is_playing and self._queue):
-            return False
-        return 0 < newest - self.delay - self._queue[0].number <= CAPACITY
+    def pop_repeated_answer(self, newest: int) -> bool:
+        """Returns, once, whether the newest command answers a state again that is older than the `newest` sent one."""
+        is_repeated, self._is_newest_repeated = self._is_newest_repeated, False
+        return is_repeated and len(self._queue) > 0 and 0 < newest - self._queue[-1].number <= CAPACITY
 
     @property
     def success_rate(self) -> float:
@@ -159,6 +169,8 @@ class JitterBuffer:
         if is_old and (command in self._past or command in queue):
             self.duplicates += 1
             return False
+        is_repeated = newest is not None and command.number == newest.number
+        self._is_newest_repeated = False
         if newest is None or not 0 < newest.number - command.number <= LONGEST_GAP:
             self._newest = command
         if self._is_late(command):
@@ -169,6 +181,11 @@ class JitterBuffer:
                 queue.popleft()
                 self.dropped += 1
             queue.append(command)
+            self.arrived += 1
+            self._is_newest_repeated = is_repeated
+            if self._first_id is None:
+                self._first_id = command.number
+            self.repeated += is_repeated and command.number != self._first_id
         return True
 
     def pop_extra_cycle(self) -> bool:
@@ -217,6 +234,10 @@ class JitterBuffer:
     def _find_next(self, is_next: Callable[[ArmCommand, int, bool], bool]) -> tuple[ArmCommand, int]:
         """Returns the next command of the queue, and the number of cycles until it is due, 1 for now."""
         command = self._queue[0]
+        if 1 < command.number - self._last_id <= LONGEST_GAP:
+            # States do not overtake so many others: this one was overtaken, in a burst. A slow motion cannot tell.
+            behind = islice(self._queue, SLACK, None)
+            command = next((other for other in behind if other.number == self._last_id + 1), command)
         steps = 1 if command.number == self._last_id + 1 else self._steps_to(command, is_next)
         if steps > 1:  # Unless a reordered command fills the gap, its cycles are lost.
             between = (other for other in self._queue if self._last_id < other.number < command.number)

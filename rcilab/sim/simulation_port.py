@@ -4,6 +4,9 @@ It serves the user who started the controller; other accounts of the machine are
 until another one needs its slot. Requests are lines of JSON, see `rcilab.sim.api`. A client whose line is not a valid
 request gets one line with the reason and is disconnected; further data is not read. So a web page's POST, whose first
 line is not a request, has no effect.
+
+Each call of `serve` reads at most one line of a client, because the cycle of the arm waits meanwhile; the socket stays
+readable for the others.
 """
 
 from __future__ import annotations
@@ -58,7 +61,7 @@ class SimulationPort:
         return host, port
 
     def serve(self, readable: Sequence[socket.socket]) -> None:
-        """Reads from these sockets and handles the requests."""
+        """Reads from these sockets and handles one request of each."""
         for sock in readable:
             if sock is self._listener:
                 self._accept()
@@ -96,7 +99,8 @@ class SimulationPort:
 
     def _read(self, client: socket.socket) -> None:
         try:
-            data = client.recv(_BYTES_AT_ONCE)
+            data = client.recv(_BYTES_AT_ONCE, socket.MSG_PEEK)
+            data = client.recv(data.find(b"\n") + 1 or _BYTES_AT_ONCE)
         except BlockingIOError:
             return
         except OSError:
@@ -113,6 +117,8 @@ class SimulationPort:
                     return
         except DecodeError as error:
             if self._answer(client, Refused(str(error)), 0):
+                with suppress(OSError):  # Unread bytes would reset the connection, and with it the answer.
+                    client.recv(_BYTES_AT_ONCE)
                 self._drop(client)
 
     def _answer(self, client: socket.socket, answer: WorldAnswer, request_id: int) -> bool:

@@ -221,7 +221,7 @@ def test_commands_that_answer_one_state_again_are_all_recorded() -> None:
         (parts,) = collect(motions, 1)
     run = as_run(parts)
     numbers = [int.from_bytes(data[:8], "big") for data in sent]
-    assert len(set(numbers)) < len(numbers) - 5
+    assert len(set(numbers)) < len(numbers) - 2  # A copy after 0.02, 0.06, 0.14, 0.24, 0.34 and 0.44 s.
     played = np.flatnonzero(run.cycles["played"])
     sources = played - run.cycles["age"][played].astype(int)
     assert (sources < played).all()

@@ -177,6 +177,15 @@ def test_a_command_that_was_overtaken_is_put_back_in_its_place() -> None:
     assert (playout.late, playout.lost) == (0, 0)
 
 
+def test_a_command_that_was_overtaken_in_a_burst_is_put_back_in_its_place_also_near_standstill() -> None:
+    """There a command after a gap continues the motion by one step as well as by the gap."""
+    playout = JitterBuffer(prefill=0)
+    for k in (0, *range(2, 60), 1):
+        playout.push(command(k))
+    played = [playout.take(by_one_step).command for _ in range(60)]
+    assert [found.number for found in played if found is not None] == list(range(60))
+
+
 def test_an_overtaken_command_whose_cycle_has_passed_is_dropped() -> None:
     playout = JitterBuffer(prefill=0)
     for k in (5, 7, 8):

@@ -52,6 +52,8 @@ class PhaseLog:
         duration = CYCLE_TIME * (max(playout.cycles - 1, 0) if is_new else playout.span)  # Up to the stop.
         is_fault = is_new or after.phase is not Phase.IDLE
         figures = f"{playout.cycles} cycles, {playout.lost} without a command; {playout.late} commands late"
+        if playout.repeated:
+            figures += f"; {playout.repeated} answered a state again because the next one came late"
         self._log(
             "motion_ended",
             f"motion {'stopped' if is_fault else 'ended'} after {duration:.3f} s: {figures}",
@@ -59,6 +61,7 @@ class PhaseLog:
             cycles=playout.cycles,
             without_command=playout.lost,
             late=playout.late,
+            repeated=playout.repeated,
             is_fault=is_fault,
         )
 

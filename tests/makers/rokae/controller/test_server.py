@@ -25,6 +25,8 @@ from rcilab.makers.rokae.faults import Fault
 from rcilab.makers.virtual_controller import build_virtual_controller
 from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import plan_joint
+from rcilab.realtime.scheduling import Scheduling
+from rcilab.sim import arm_server
 from rcilab.sim.api import Stall
 from rcilab.sim.controller_config import ControllerConfig
 from rcilab.sim.log_entry import LogEntry
@@ -292,6 +294,59 @@ def test_torques_that_answer_the_same_state_again_are_the_next_ones(lockstep: Ru
     playout = lockstep.server.controller.playout
     assert taken == sent
     assert (playout.late, playout.lost, playout.cycles) == (0, 0, len(sent))
+
+
+def assert_no_state(peer: Peer) -> None:
+    time.sleep(0.05)
+    peer.udp.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        peer.udp.recv(1247)
+    peer.udp.settimeout(PATIENCE)
+
+
+def test_in_lock_step_no_state_is_sent_before_the_newest_one_is_answered(lockstep: Running) -> None:
+    """The vendor's client keeps what it does not read, and would begin its next motion with it."""
+    with Peer(lockstep) as peer:
+        state = start_torque(peer)
+        for _ in range(10):
+            send_torque(peer, state.message_id, 0.0)
+            state = receive_next_state(peer, state)
+        assert_no_state(peer)
+
+
+def test_in_lock_step_the_cycle_of_a_second_answer_sends_no_state(lockstep: Running) -> None:
+    with Peer(lockstep) as peer:
+        state = peer.run(MOTION.q[:10])
+        peer.send(state.message_id - 1, MOTION.q[10])
+        assert_no_state(peer)
+        peer.send(state.message_id, MOTION.q[11])
+        following = peer.receive_state()
+        assert following.message_id == state.message_id + 1
+        assert np.array_equal(following.q_c, MOTION.q[11])
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+    ended = next(entry for entry in lockstep.entries if entry.kind == "motion_ended")
+    assert ended.facts["repeated"] == 1
+    assert ended.text.endswith("; 1 answered a state again because the next one came late")
+
+
+def test_in_lock_step_few_copies_of_the_first_state_await_a_client_that_sleeps(lockstep: Running) -> None:
+    with Peer(lockstep) as peer:
+        first = peer.start()
+        time.sleep(0.5)
+        peer.receive_newest_state()
+        assert 2 <= sum(state.message_id == first.message_id for state in peer.seen) <= 8
+
+
+def test_in_lock_step_the_controller_has_priority_where_permitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A client waits only briefly for the next state, and then answers the last one again."""
+    refused = Scheduling(policy="normal", priority=0, memory_locked=False, warning="not granted")
+    asked: list[int] = []
+    monkeypatch.setattr(arm_server, "enter_realtime", lambda priority: (asked.append(priority), refused)[1])
+    monkeypatch.setattr(arm_server, "leave_realtime", lambda: None)
+    with running(lockstep=True, realtime=True) as found, Peer(found) as peer:
+        peer.receive_state()
+    assert asked == [arm_server.PRIORITY]
+    assert found.lines == []
 
 
 def test_in_lock_step_a_torque_acts_as_late_as_by_the_clock(lockstep: Running) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import socket
 import struct
 import time
@@ -17,9 +18,9 @@ from rcilab.core.errors import InvalidValueError, UsageError
 from rcilab.core.state import RobotMode
 from rcilab.execution.simulation_control import SimulationControl
 from rcilab.makers.rokae import wire as rci
-from rcilab.sim.api import LONGEST_LINE, NetworkFaults, Stall
+from rcilab.sim.api import LONGEST_LINE, Done, NetworkFaults, Stall, WorldRequest
 from rcilab.sim.peer_user import is_allowed_peer
-from rcilab.sim.simulation_port import MAX_CLIENTS
+from rcilab.sim.simulation_port import MAX_CLIENTS, SimulationPort
 from tests.makers.rokae.controller.test_server import MODEL, MOTION, PATIENCE, Peer, Running, bind_udp, closes, running
 
 
@@ -103,6 +104,20 @@ def test_requests_in_pieces_and_several_at_once_are_answered_in_order(lockstep: 
         for start in range(0, len(lines), 11):
             guest.socket.sendall(lines[start : start + 11])
         assert [json.loads(guest.stream.readline()) for _ in range(5)] == [{"id": k, "ok": True} for k in range(5)]
+
+
+def test_of_many_requests_at_once_one_is_handled_at_a_time() -> None:
+    """The cycle of the arm waits for as long as requests are handled."""
+    handled: list[WorldRequest] = []
+    port = SimulationPort("127.0.0.2", 0, lambda request: (handled.append(request), Done())[1])
+    with socket.create_connection(port.address) as guest:
+        guest.sendall(b'{"id":1,"request":"release"}\n' * 100)
+        time.sleep(0.05)
+        port.serve(port.sockets)  # Accepts.
+        for count in (1, 2, 3):
+            port.serve(select.select(port.sockets, (), (), PATIENCE)[0])
+            assert len(handled) == count
+    port.close()
 
 
 def test_what_cannot_be_done_is_refused_and_the_connection_stays(lockstep: Running) -> None:
