@@ -146,8 +146,10 @@ class FaultDemo:
             InvalidValueError: The language is not supported.
         """
         text = Text(language, units)
-        key = f"{what}.{self.fault.key}"
-        return text(key) if text.has(key) else {"explanation": self.fault.cause}.get(what, self.fault.remedy)
+        for key in (f"{what}.{self.fault.key}.{self.model.name}", f"{what}.{self.fault.key}"):
+            if text.has(key):
+                return text(key)
+        return {"explanation": self.fault.cause}.get(what, self.fault.remedy)
 
     def recovery_steps(self, language: Language = "en") -> tuple[str, ...]:
         """Returns the steps of the recovery as texts.

@@ -65,7 +65,9 @@ def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_m
 
 def test_the_bound_of_an_fr3_decreases_towards_the_end_of_a_range() -> None:
     with fault_lab.FaultLab("FR3") as lab:
-        signal = lab.provoke("joint_motion_generator_velocity_limits_violation").signal
+        demo = lab.provoke("joint_motion_generator_velocity_limits_violation")
+    signal = demo.signal
+    assert "Joint 7" in demo.describe("sent")  # On a Panda, it is joint 1.
     assert signal.axis == 7
     assert (np.diff(signal.upper[-100:]) < 0.0).all()
     assert signal.bound < 0.1  # In the middle of the range it is 5.26 rad/s.
