@@ -152,7 +152,7 @@ def run_that(stopped: str | None) -> Recording:
 def test_a_lesson_that_an_arm_cannot_do_is_not_offered() -> None:
     assert lessons_of(MODEL) == tuple(LESSONS)
     assert set(LESSONS) - set(lessons_of(load_model("xMate3"))) == {"elbow"}
-    assert set(LESSONS) - set(lessons_of(load_model("Panda"))) == {"push", "network"}
+    assert set(LESSONS) - set(lessons_of(load_model("Panda"))) == {"push"}
     bench = Bench(load_model("xMate3"))
     bench.press("lesson", name="elbow")
     assert bench.state.learn.lesson is None
