@@ -248,8 +248,9 @@ class FciServer:
         self._link.send_frame(self._peer, encode_response(self._version, kind, command_id, status, content))
         is_refusal = status not in (Status.SUCCESS, Status.MOTION_STARTED, Status.PREEMPTED)
         if is_refusal:
-            text = f"{kind.__name__} was answered: {status.value}" + (f"; {why}" if why else "")
-            self._link.log("refused", text, request=kind.__name__, status=status.name)
+            name = "Move" if issubclass(kind, Move) else kind.__name__
+            text = f"{name} was answered: {status.value}" + (f"; {why}" if why else "")
+            self._link.log("refused", text, request=name, status=status.name)
 
     def _log_phase(self, before: Phase, after: Phase) -> None:
         playout = self.controller.playout
