@@ -14,6 +14,7 @@ import pytest
 from rcilab.app.arm_features import explain_missing_feature, explain_missing_part
 from rcilab.app.goal.goal import goal_at
 from rcilab.app.request import TypeField
+from rcilab.app.run.run_actions import ChooseRobot, RunActions
 from rcilab.app.setup.configuration_state import pending_parts
 from rcilab.app.setup.setup_actions import PressSetup, SetSetup, SetupActions
 from rcilab.app.store import Store, UiState
@@ -82,7 +83,7 @@ def test_the_setup_tab_has_the_parts_that_the_arm_has(lacking, store) -> None:
     table = setup._table_html(store.state, READY)
     assert "safety box" not in table
     assert "<th>tool</th>" in table
-    assert "Joint stiffness [" in table
+    assert "<th>Joint stiffness</th>" in table
     assert text("setup.in_mode") in table
 
 
@@ -178,3 +179,15 @@ def test_in_the_notebook_signals_restart_soft_limits_and_power_are_not_there(lac
     assert (panel.recover,) in rows
     assert not any(panel.power_off in row for row in rows)
     panel.close()
+
+
+def test_an_arm_of_another_maker_is_not_sought_at_the_address_of_the_last_one() -> None:
+    address = "fci://127.0.0.9"
+    model = load_model("FR3")
+    for name, target in (("Panda", address), ("xMate3", "virtual")):
+        shown = Store(UiState(model=model, goal=goal_at(model, model.home), target=address))
+        connection = MagicMock()
+        connection.status.return_value = READY
+        RunActions(shown, connection).choose_robot(ChooseRobot(model=name))
+        assert (shown.state.model.name, shown.state.target) == (name, target)
+        assert connection.open.call_args.args[1] == target

@@ -69,8 +69,12 @@ def ask_to_send(address: str) -> Message:
 
 def name_group(text: Text, group: ParameterGroup) -> str:
     """Returns the name of a group, with units, and with its ranges if there are few."""
-    ranges = f"[{group.parameters[0].unit}]" if has_own_ranges(group) else format_ranges(group)
-    return f"{text(f'control.{group.name}')} {ranges}"
+    return f"{text(f'control.{group.name}')} {units_of(group)}"
+
+
+def units_of(group: ParameterGroup) -> str:
+    """Returns the units of a group in brackets, with its ranges if there are few."""
+    return f"[{group.parameters[0].unit}]" if has_own_ranges(group) else format_ranges(group)
 
 
 def has_own_ranges(group: ParameterGroup) -> bool:

@@ -155,6 +155,8 @@ class RunActions:
             return
         model = state.model if request.model is None else load_model(request.model)
         target = state.target if request.target is None else request.target.strip()
+        if request.target is None and model.description.maker != state.model.description.maker:
+            target = "virtual"  # An address is that of the other maker's controller.
         if target != "virtual":
             parse_address(target, model)
         if model.name == state.model.name and target == state.target and request.target is None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rcilab.app.arm_features import explain_missing_part
 from rcilab.app.check.check_actions import PressCheck
 from rcilab.app.check.freshness import outdated
-from rcilab.app.run.mode_parameters import held_rows, name_group
+from rcilab.app.run.mode_parameters import held_rows, units_of
 from rcilab.app.setup.configuration_state import (
     LISTED,
     describe_held,
@@ -140,11 +140,11 @@ class SetupPanel:
         """Returns the parameters of all modes as the controller has them; Run has their fields."""
         groups, is_known = parameters_of(state.model), state.target == "virtual"
         held = held_rows(groups, None, status.setup.control, self._text, is_known=is_known)
-        where = f'<br><span class="rl-dim">{esc(self._text("setup.in_mode"))}</span>'
-        names = (name_group(self._text, group) for group in groups)
+        where = esc(self._text("setup.in_mode"))
         return [
-            f"<tr><th>{esc(name)}</th><td>{esc(shown)}{where}</td></tr>"
-            for name, (_, shown) in zip(names, held, strict=True)
+            f"<tr><th>{esc(name)}</th><td>{esc(shown)}"
+            f'<br><span class="rl-dim">{esc(units_of(group))} {where}</span></td></tr>'
+            for group, (name, shown) in zip(groups, held, strict=True)
         ]
 
     def _said(self, setup: Any, part: str) -> str:
