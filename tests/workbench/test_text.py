@@ -19,7 +19,6 @@ from rcilab.i18n.catalogue import load_ui_catalogue
 from rcilab.i18n.locale import LANGUAGES
 from rcilab.i18n.translator import message
 from rcilab.makers.maker import all_makers
-from rcilab.makers.rokae.conditions import RCI_CONDITIONS
 from rcilab.model.robot_model import load_model
 from rcilab.motion.joint import JOINT_LAWS
 from tests.catalogues import require_equal
@@ -51,7 +50,7 @@ def test_every_key_written_in_the_code_exists():
 
 def test_every_name_that_becomes_a_key_has_one():
     known = set(load_ui_catalogue("rcilab.app", "en"))
-    wanted = [f"condition.{row.id}" for row in RCI_CONDITIONS.conditions]
+    wanted = [f"condition.{row.id}" for maker in all_makers() for row in maker.conditions().conditions]
     wanted += [f"phase.{phase}" for phase in PHASES]
     wanted += [f"robot_mode.{mode.name}" for mode in RobotMode]
     wanted += [f"controller_mode.{mode.name}" for mode in ControllerMode]
