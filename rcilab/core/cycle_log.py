@@ -24,7 +24,7 @@ OTHER_STATE_FIELDS = (
     "dtheta", "motor_tau", "motor_tau_filtered", "psi", "psi_c", "dpsi_c", "ddpsi_c",
 )  # fmt: skip
 """Further fields of a complete row: the rest of the state, plain numbers last."""
-PLAYOUT_FIELDS = ("motion", "played", "age", "queued", "missed", "late")
+PLAYOUT_FIELDS = ("motion", "played", "age", "queued", "missed", "late", "command_number")
 """Further fields of a row that a virtual controller records: what it did with the commands of its client."""
 RATE_FIELDS = ("command_dq", "command_twist", "command_goal")
 """The last fields of such a row: commands of a client that are neither angles, nor poses, nor torques."""
@@ -80,6 +80,7 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
     queued                  commands left in the queue
     missed                  1: the motion was in progress and no command was there for this cycle
     late                    commands of this motion so far that came after their cycle and were dropped
+    command_number          number that the client gave its command; 0 without one
     command_dq              joint velocities sent, [rad/s], shape (n,); NaN when none were sent
     command_twist           velocity of the tool sent, base axes, shape (6,), [m/s, rad/s]; NaN when none was sent
     command_goal            joint angles sent as a goal to which the controller plans, [rad], shape (n,); NaN when none

@@ -32,7 +32,7 @@ from rcilab.core.shared_memory import PAGE, open_shared_memory, whole_pages
 CAPACITY = 16384
 """Cycles in the ring of a controller, 16 s: the longest time between two reads without a loss."""
 _MAGIC = b"RCILABCY"
-_VERSION = 2
+_VERSION = 3
 _HEADER = struct.Struct("<8sIIII")
 _EVENT_SLOTS, _EVENT_SIZE = 512, 4 * PAGE  # Of 256 motions: the shortest ones within the time of the rows.
 _MOST_JOINTS = 16

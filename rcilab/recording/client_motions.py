@@ -21,7 +21,9 @@ from rcilab.recording.run_setup import Setup
 LAG = 1100
 """[cycles] Rows this young are left for the next poll: their commands may still arrive."""
 _SETTLED = 300  # [cycles] After the first played command: all that came in one burst with it have been played.
-_ANSWER = ("sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau", *RATE_FIELDS)
+_ANSWER = (
+    "sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau", "command_number", *RATE_FIELDS,
+)  # fmt: skip
 _BEFORE = LAG  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
 
 

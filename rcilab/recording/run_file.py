@@ -62,7 +62,7 @@ R = TypeVar("R")
 ENDING = ".rcirun"
 CHUNK_CYCLES = 256  # Tuning value: a crash loses at most about a quarter of a second.
 
-_OPTIONAL_FIELDS = {"braking", *STATE_FIELDS, *RATE_FIELDS}  # Not recorded by the first versions.
+_OPTIONAL_FIELDS = {"braking", "command_number", *STATE_FIELDS, *RATE_FIELDS}  # Not recorded by the first versions.
 _STOP_CODES = {
     "on request": "on_request",
     "the session was closed while a motion ran": "session_closed",

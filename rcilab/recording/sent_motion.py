@@ -40,6 +40,7 @@ _STILL, _STEADY = 1e-4, 1e-2  # [rad/s], [rad/s^2] As the tolerance of a check a
 _FADE_TIME = 0.5  # [s] From full speed to standstill within the limits of every arm and its tool.
 _FADE_SHARE = 0.2  # Of the limits of the joints, for a shorter one.
 _LARGEST = 1e100  # [rad], [N m] Of commands, also of one that is not a number: their differences remain finite.
+_LONGEST_GAP = 256  # Between two numbers of a client that counts on; no controller bridges more.
 _FARTHEST = 1e6  # [m] Of commanded positions; out of any arm's reach.
 
 
@@ -328,8 +329,8 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     """Returns the numbers of the commands up to a refused one, from 0, one a cycle, and their rows.
 
     They are in the order in which they were played; those that came too late for it are at their place. Between two of
-    them, a number is missing for each cycle in which the controller had none to play and which none answers, and for
-    each command that is not in the record.
+    them, a number is missing for each cycle in which the controller had none to play, or one that is not in the record,
+    if the client's own numbers leave room for it; where those say nothing, if no command answers that cycle.
     """
     played, sources = played_commands(cycles)
     faulty = np.flatnonzero(cycles["faults"])
@@ -341,18 +342,37 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     is_late = sent.copy()
     is_late[sources], is_late[: sources[0]], is_late[newest[-1] :] = False, False, False
     late = np.flatnonzero(is_late)
+    numbers = cycles["command_number"].astype(np.int64)
+    is_own = np.abs(numbers - cycles["message_id"].astype(np.int64))[late] > _LONGEST_GAP  # Rows are then only near.
     place = np.searchsorted(newest, late) - 1  # Behind which of the played ones.
+    for k in np.flatnonzero(is_own & (numbers[late] > 0)):
+        place[k] = _place_of(int(numbers[late[k]]), numbers[sources], int(place[k]))
     turn = np.concatenate((np.arange(len(played)), place))
     rows = np.concatenate((sources, late))
-    order = np.lexsort((np.concatenate((np.full(len(played), -1), late)), turn))
+    order = np.lexsort((np.concatenate((np.full(len(played), -1), np.where(is_own, numbers[late], late))), turn))
     rows, turn = rows[order], turn[order]
     count = np.bincount(place, minlength=len(played))[:-1]
-    missed = np.diff(np.cumsum(cycles["missed"] != 0)[played]) - count
+    missed = (np.diff(np.cumsum(cycles["missed"] != 0)[played]) - count)[turn[:-1]]
     unknown = np.diff(np.cumsum(cycles["played"] != 0)[played]) - 1
-    unknown += np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
+    late = np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
+    unknown, late = (np.where(np.diff(turn) > 0, values[turn[:-1]], 0) for values in (unknown, late))
     unanswered = np.maximum(np.diff(np.cumsum(~sent)[rows]), 0)
-    steps = 1 + np.clip(missed[turn[:-1]], 0, unanswered) + np.where(np.diff(turn) > 0, unknown[turn[:-1]], 0)
+    ahead = np.diff(numbers[rows])
+    steps = 1 + np.where(
+        (ahead > 0) & (ahead <= _LONGEST_GAP),
+        np.clip(missed + unknown, 0, ahead - 1),
+        np.clip(missed, 0, unanswered) + unknown + late,
+    )
     return np.concatenate(([0], np.cumsum(steps))).astype(np.intp), rows
+
+
+def _place_of(number: int, played: NDArray[np.int64], place: int) -> int:
+    """Returns behind which of the played numbers another one belongs, at or near a place."""
+    while place > 0 and 0 < played[place] - number <= _LONGEST_GAP:
+        place -= 1
+    while place + 1 < len(played) and 0 < number - played[place + 1] <= _LONGEST_GAP:
+        place += 1
+    return place
 
 
 def _without_pauses(index: NDArray[np.intp], q: JointPath) -> NDArray[np.intp]:

@@ -34,6 +34,7 @@ _HEAD = struct.Struct("<Qdqqdd")
 _FAULTS = struct.Struct("<QIBBBB")
 _STAMPS = struct.Struct("<qq")
 _ANSWERED = struct.Struct("<qd")
+_NUMBER = struct.Struct("<Q")
 _TAIL = struct.Struct(f"<4d{len(PLAYOUT_FIELDS)}Q")
 _POSES = ("T_base_tool", "T_base_tool_c")
 _OTHERS = (name for name in (*STATE_FIELDS, *OTHER_STATE_FIELDS) if name not in _POSES)
@@ -86,6 +87,7 @@ class CycleCapture:
         "_no_answer",
         "_no_joints",
         "_no_rates",
+        "_number",
         "_offset",
         "_offsets",
         "_playout",
@@ -110,6 +112,7 @@ class CycleCapture:
         self._memory, self._size = ring.memory, dtype.itemsize
         self._offsets = {name: int(field[1]) for name, field in dtype.fields.items()}
         self._stamps = self._offsets["received_ns"]
+        self._number = self._offsets["command_number"]
         self._count = 0
         self._motion = 0  # Number of the last motion.
         self._is_moving = False
@@ -172,7 +175,7 @@ class CycleCapture:
         motion = self._motion if self._is_moving else 0
         start = count % CAPACITY * self._size
         self._memory[start : start + self._size] = self._pack(
-            state, motion, played, age, len(playout), missed, playout.late
+            state, motion, played, age, len(playout), missed, playout.late, 0
         )
         self._rows.setdefault(number, count)
         self._rows.pop(number - _FARTHEST, None)
@@ -242,6 +245,7 @@ class CycleCapture:
         """Adds a command to a row without one."""
         start = row % CAPACITY * self._size
         _ANSWERED.pack_into(self._memory, start + self._stamps + 8, time_ns, lateness)
+        _NUMBER.pack_into(self._memory, start + self._number, command.number)
         pack, offset, numbers_of = self._answer
         pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row

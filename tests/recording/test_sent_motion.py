@@ -342,6 +342,42 @@ def test_a_stop_for_a_torque_after_a_lost_one_is_explained() -> None:
     assert "had counted 1 cycle without a command" in stopped
 
 
+def counting(run: Run) -> tuple[Run, np.ndarray]:
+    """The same commands of a client that counts on its own; returns the rows of its commands, too."""
+    cycles = run.cycles.copy()
+    rows = np.flatnonzero(cycles["sent_ns"])
+    cycles["command_number"][rows] = 10**7 + rows
+    return replace(run, cycles=cycles), rows
+
+
+def test_a_lost_command_between_neighbouring_rows_is_interpolated(sine: Run) -> None:
+    """An earlier command was recorded one row on, and so all up to the lost one."""
+    run, rows = counting(sine)
+    cycles, lost = run.cycles, 400
+    at = np.flatnonzero(cycles["played"])
+    source = at - cycles["age"][at].astype(int)
+    for name in ("command", "command_number"):
+        cycles[name][rows[100] + 1 : rows[lost] + 1] = cycles[name][rows[100] : rows[lost]].copy()
+    cycles["sent_ns"][rows[100]], cycles["command"][rows[100]] = 0, np.nan
+    cycles["age"][at[(source >= rows[100]) & (source < rows[lost])]] -= 1
+    (hole,) = at[source == rows[lost]]
+    cycles["played"][hole], cycles["missed"][hole] = 0, 1
+    motion = sent_motion(run)
+    assert motion.notes == ("1 command is missing in the record and interpolated: it never came, or came too late",)
+    np.testing.assert_allclose(motion.q, sent_motion(sine).q, atol=1e-7)
+
+
+def test_late_commands_in_rows_of_each_other_are_in_the_order_of_the_client(sine: Run) -> None:
+    run, rows = counting(sine)
+    cycles, first, second = run.cycles, rows[400], rows[406]
+    at = np.flatnonzero(cycles["played"])
+    holes = at[np.isin(at - cycles["age"][at].astype(int), (first, second))]
+    cycles["played"][holes], cycles["missed"][holes] = 0, 1
+    for name in ("command", "command_number"):
+        cycles[name][[first, second]] = cycles[name][[second, first]]
+    np.testing.assert_array_equal(sent_motion(run).q, sent_motion(sine).q)
+
+
 def test_the_soft_limits_in_force_are_checked(sine: Run) -> None:
     upper = MODEL.limits.joint.upper.copy()
     upper[1] = sent_motion(sine).q[:, 1].max() - 0.01
