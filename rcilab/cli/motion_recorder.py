@@ -90,23 +90,24 @@ def recorder_process(folder: Path, ring: CycleRing, form: LogFormat, cycle: Call
         ending.set()
         process.stdin.close()
         process.stdout.close()
-        _await_end(process, show)
+        _await_end(process, show, folder)
 
 
-def _await_end(process: subprocess.Popen[bytes], show: Callable[[str, str], None]) -> None:
+def _await_end(process: subprocess.Popen[bytes], show: Callable[[str, str], None], folder: Path) -> None:
     """Waits until the recorder has written everything; Ctrl-C ends it at once."""
     try:
         process.wait(_SILENT_WAIT)
         return
     except subprocess.TimeoutExpired:
+        previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
         text = f"waiting for the recorder (process {process.pid}) and its last report; Ctrl-C ends without them"
         show("recorder_waits", text)
-    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
         process.wait(_END_TIMEOUT)
     except (subprocess.TimeoutExpired, KeyboardInterrupt):
         process.kill()
-        show("not_recorded", "the recorder was ended before its last report; the cycles so far are in their file")
+        text = f"the recorder was ended before its last report; cycles that it had not yet written to {folder} are lost"
+        show("not_recorded", text)
     finally:
         signal.signal(signal.SIGINT, previous)
 

@@ -212,9 +212,9 @@ class RingReader:
         rows = self._copy(first, end)
         return rows[max(0, self.count + 1 - len(self._rows) - first) :]  # Also without those of during the copy.
 
-    def skip(self) -> None:
-        """Moves the reader behind the newest row."""
-        self._next = self.count
+    def skip(self, to: int | None = None) -> None:
+        """Moves the reader to the row with a number; None: behind the newest one."""
+        self._next = self.count if to is None else to
 
     def drain(self, end: int | None = None) -> NDArray[np.void]:
         """Returns a copy of every row since the last call, oldest first.

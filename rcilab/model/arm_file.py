@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from rcilab.core.arrays import Array, as_number, as_vector, readonly_copy
+from rcilab.core.arrays import Array, as_number, as_vector, described, readonly_copy
 from rcilab.core.atomic_file import read_limited, replacing
 from rcilab.core.errors import InvalidValueError, VersionMismatchError
 from rcilab.robots import DhRow, RobotDescription, describe_robot
@@ -102,7 +102,9 @@ def build_arm(content: Any, name: str) -> RobotDescription:
         raise InvalidValueError("arm file", name, f'has no "format": "{FORMAT}"')
     if content.get("version") != VERSION:
         raise VersionMismatchError(f"{name}, version", content.get("version"), VERSION, "save the arm again")
-    nominal = describe_robot(content.get("model", ""))
+    if not isinstance(content.get("model"), str):
+        raise InvalidValueError("arm file", name, f'names no arm: "model" is {described(content.get("model"))}')
+    nominal = describe_robot(content["model"])
     try:
         return _build_arm(nominal, content, name)
     except (LookupError, TypeError, ValueError) as error:

@@ -113,8 +113,9 @@ class ClientMotions:
     def __init__(self, ring: CycleRing, lag: int = LAG) -> None:
         self._ring, self._lag = ring, lag
         self._reader = ring.open_reader()
-        self._reader.skip()
-        _, self._next_event = ring.events(0)
+        events, self._next_event = ring.events(0)
+        in_progress = events[-1] if events and events[-1].get("event") == "begin" else None
+        self._reader.skip(None if in_progress is None else max(in_progress["row"] - _BEFORE, 0))
         self._facts = _Facts.of(ring)
         self._model = load_model(self._facts.model)
         self._waiting: NDArray[np.void] = np.zeros(0, cycle_dtype(ring.n, complete=True, playout=True))
@@ -124,6 +125,8 @@ class ClientMotions:
         self._origin: int | None = None  # Number of its row with t = 0.
         self._is_resumed = False  # Its rows before the waiting ones were overwritten.
         self._gaps: list[range] = []  # Numbers of the rows that were overwritten and are not yet reported.
+        if in_progress is not None:
+            self._begin(in_progress)
 
     @property
     def position(self) -> int:

@@ -90,7 +90,8 @@ class ClientRecorder:
     def _describe_gap(self, part: MotionPart) -> str:
         where = "at its end" if self._part else "which were all of it,"
         if len(part.cycles):
-            where = f"before {part.cycles['t'][0]:.3f} s"
+            start = part.cycles["t"][0]
+            where = f"before {start:.3f} s" if start > 0.0 else "at its beginning"
         number = part.motion.number
         if not (self._part or len(part.cycles) or part.skipped == part.length):
             unread = f"{part.skipped} of its {part.length} cycles were {_OVERWRITTEN}"
@@ -132,7 +133,8 @@ class ClientRecorder:
         if file is None or self._motion is None:
             return
         self._part += 1
-        name = f"motion {self._motion.number} of {self._motion.client}"
+        cut = ", without its beginning" if self._is_continued else ""
+        name = f"motion {self._motion.number} of {self._motion.client}{cut}"
         file.close(stopped=stopped, truncated=self._is_continued)
         self._reports.submit(self._report, file.path, None if self._is_continued else end, name)
 

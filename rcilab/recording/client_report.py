@@ -164,7 +164,7 @@ def _describe_commands(run: Run, end: MotionEnd | None, counts: str) -> list[str
 
 def _find_gaps(run: Run) -> list[tuple[float, int]]:
     """Returns the beginnings of missed commands, [s], and the number of cycles of each, longest first."""
-    edges = np.flatnonzero(np.diff(run.cycles["missed"].astype(np.int8), prepend=0, append=0))
+    edges = np.flatnonzero(np.diff((run.cycles["missed"] != 0).astype(np.int8), prepend=0, append=0))
     pairs = [(float(run.t[start]), int(stop - start)) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
     return sorted(pairs, key=lambda pair: -pair[1])
 

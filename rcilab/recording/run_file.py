@@ -387,7 +387,7 @@ def _to_current_layout(cycles: NDArray[np.void]) -> NDArray[np.void]:
     theirs = _stored_fields(cycles.dtype)
     wide = np.zeros(len(cycles), ours)
     for name in _stored_fields(ours):
-        wide[name] = cycles[name] if name in theirs else np.nan if name in STATE_FIELDS else 0
+        wide[name] = cycles[name] if name in theirs else np.nan if name in (*STATE_FIELDS, *RATE_FIELDS) else 0
     return wide
 
 

@@ -329,8 +329,8 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     """Returns the numbers of the commands up to a refused one, from 0, one a cycle, and their rows.
 
     They are in the order in which they were played; those that came too late for it are at their place. Between two of
-    them, a number is missing for each cycle in which the controller had none to play, or one that is not in the record,
-    if the client's own numbers leave room for it; where those say nothing, if no command answers that cycle.
+    them, a number is missing for each cycle in which the controller had none to play and which none answers, and for
+    each command that is not in the record; where the client counts on its own, as many as its numbers leave out.
     """
     played, sources = played_commands(cycles)
     faulty = np.flatnonzero(cycles["faults"])
@@ -343,32 +343,36 @@ def _played_order(cycles: NDArray[np.void], sent: NDArray[np.bool_]) -> tuple[ND
     is_late[sources], is_late[: sources[0]], is_late[newest[-1] :] = False, False, False
     late = np.flatnonzero(is_late)
     numbers = cycles["command_number"].astype(np.int64)
-    is_own = np.abs(numbers - cycles["message_id"].astype(np.int64))[late] > _LONGEST_GAP  # Rows are then only near.
+    # Of a client that counts on its own: its rows are only near those of the states that it answers.
+    is_own = (numbers > 0) & (np.abs(numbers - cycles["message_id"].astype(np.int64)) > _LONGEST_GAP)
     place = np.searchsorted(newest, late) - 1  # Behind which of the played ones.
-    for k in np.flatnonzero(is_own & (numbers[late] > 0)):
+    for k in np.flatnonzero(is_own[late]):
         place[k] = _place_of(int(numbers[late[k]]), numbers[sources], int(place[k]))
+    is_between = (place >= 0) & (place < len(played) - 1)
+    late, place = late[is_between], place[is_between]
     turn = np.concatenate((np.arange(len(played)), place))
     rows = np.concatenate((sources, late))
-    order = np.lexsort((np.concatenate((np.full(len(played), -1), np.where(is_own, numbers[late], late))), turn))
+    rank = np.where(is_own, numbers, np.arange(len(cycles)))[late]
+    order = np.lexsort((np.concatenate((np.full(len(played), -1), rank)), turn))
     rows, turn = rows[order], turn[order]
     count = np.bincount(place, minlength=len(played))[:-1]
     missed = (np.diff(np.cumsum(cycles["missed"] != 0)[played]) - count)[turn[:-1]]
     unknown = np.diff(np.cumsum(cycles["played"] != 0)[played]) - 1
-    late = np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
-    unknown, late = (np.where(np.diff(turn) > 0, values[turn[:-1]], 0) for values in (unknown, late))
+    absent = np.where(count > 0, np.maximum(np.diff(cycles["late"][played].astype(np.int64)) - count, 0), 0)
+    unknown, absent = (np.where(np.diff(turn) > 0, values[turn[:-1]], 0) for values in (unknown, absent))
     unanswered = np.maximum(np.diff(np.cumsum(~sent)[rows]), 0)
     ahead = np.diff(numbers[rows])
     steps = 1 + np.where(
-        (ahead > 0) & (ahead <= _LONGEST_GAP),
+        is_own[rows[:-1]] & is_own[rows[1:]] & (ahead > 0) & (ahead <= _LONGEST_GAP),
         np.clip(missed + unknown, 0, ahead - 1),
-        np.clip(missed, 0, unanswered) + unknown + late,
+        np.clip(missed, 0, unanswered) + unknown + absent,
     )
     return np.concatenate(([0], np.cumsum(steps))).astype(np.intp), rows
 
 
 def _place_of(number: int, played: NDArray[np.int64], place: int) -> int:
     """Returns behind which of the played numbers another one belongs, at or near a place."""
-    while place > 0 and 0 < played[place] - number <= _LONGEST_GAP:
+    while place >= 0 and 0 < played[place] - number <= _LONGEST_GAP:
         place -= 1
     while place + 1 < len(played) and 0 < number - played[place + 1] <= _LONGEST_GAP:
         place += 1

@@ -41,6 +41,8 @@ def describe_robot(name: str) -> RobotDescription:
         for known, module in robots.items():
             if known.lower() == str(name).lower():
                 return import_module(f"rcilab.makers.{maker}.robots.{module}").DESCRIPTION
+    if name.lower().endswith(".json"):
+        raise ModelError(f"{plain_text(repr(name), 60)} is a file; this takes the name of an arm, such as xMatePro7")
     if "/" in name or "." in name:
         raise ModelError(f"{plain_text(repr(name), 60)} is not the file of an arm, which ends in .json")
     raise ModelError(f"unknown robot {plain_text(repr(name), 60)}; known robots: {', '.join(ROBOT_NAMES)}")

@@ -369,12 +369,27 @@ def test_a_display_reads_late_commands_of_every_kind_again(ring: CycleRing) -> N
     (part,) = motions.poll()
     rows = np.frombuffer(ring.memory, cycle_dtype(ring.n, complete=True, playout=True), CAPACITY)
     names = [name for name in part.cycles.dtype.names or () if name.startswith("command")]
-    assert len(names) == 7
+    assert len(names) == 8
     for name in names:
-        rows[name][900] = 0.5
+        rows[name][900] = 2
     motions.refresh(part.cycles, part.next)
     for name in names:
-        assert (part.cycles[name][900] == 0.5).all(), name
+        assert (part.cycles[name][900] == 2).all(), name
+
+
+@pytest.mark.parametrize("length", [2000, CAPACITY + 3000])
+def test_a_motion_in_progress_is_read_from_its_beginning(ring: CycleRing, length: int) -> None:
+    synthetic_rows(ring, 0, 1, motion=0)
+    ring.add_event(begin_event(1, 1))
+    synthetic_rows(ring, 1, length)
+    motions = ClientMotions(ring, lag=5)
+    (part,) = motions.poll()
+    assert part.motion.number == 1
+    assert len(part.cycles) + part.skipped in (length - 5, length - 4)
+    ring.add_event(end_event(1, length + 1))
+    assert [part.end is not None for part in motions.poll()] == [True]
+    (newest,) = ClientMotions(ring).poll() or [None]
+    assert newest is None
 
 
 def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: CycleRing, tmp_path: Path) -> None:
@@ -392,6 +407,20 @@ def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: 
     assert first.stopped == "this file ends here, the motion went on"
     assert second.t[0] > first.t[-1] + 0.5
     assert sum("cycles before" in line and "are not recorded" in line for line in lines) == 1
+    assert [", without its beginning, joint_position" in line for line in lines if "ran to" in line] == [True]
+
+
+def test_a_motion_whose_beginning_was_overwritten_is_named_as_a_part(ring: CycleRing, tmp_path: Path) -> None:
+    lines: list[str] = []
+    recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, CAPACITY + 1500)
+    ring.add_event(end_event(1, CAPACITY + 1500))
+    recorder.poll()
+    recorder.close()
+    gap, line = lines
+    assert "cycles at its beginning are not recorded" in gap
+    assert line.startswith("motion 1 of 127.0.0.1, without its beginning, joint_position, ")
 
 
 def test_a_motion_of_which_only_cycles_without_a_command_were_read_is_named(ring: CycleRing, tmp_path: Path) -> None:
@@ -459,8 +488,8 @@ def test_the_next_motion_is_recorded_after_the_folder_was_removed(tmp_path: Path
     [
         pytest.param(b"", id="empty"),
         pytest.param(b"x" * 10_000, id="another file"),
-        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 2, 7, 1400, CAPACITY) + bytes(4000), id="cut"),
-        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 2, 2**31, 1400, CAPACITY) + bytes(4000), id="joints"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 3, 7, 1400, CAPACITY) + bytes(4000), id="cut"),
+        pytest.param(struct.pack("<8sIIII", b"RCILABCY", 3, 2**31, 1400, CAPACITY) + bytes(4000), id="joints"),
     ],
 )
 def test_a_file_that_is_no_record_is_refused(content: bytes, tmp_path: Path) -> None:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.lib.recfunctions import repack_fields
 
 from rcilab.conformance.check import check
 from rcilab.core.clock import CYCLE_TIME
+from rcilab.core.cycle_log import RATE_FIELDS
 from rcilab.motion.motion import Motion
-from rcilab.recording.run import Run
+from rcilab.recording.run import Run, load_run
 from rcilab.recording.sent_motion import check_sent, sent_motion, with_stop
 from tests.peers import kinematics, programs, wire
 from tests.peers.robot import ControlException, Output, Robot
@@ -376,6 +379,12 @@ def test_late_commands_in_rows_of_each_other_are_in_the_order_of_the_client(sine
     for name in ("command", "command_number"):
         cycles[name][[first, second]] = cycles[name][[second, first]]
     np.testing.assert_array_equal(sent_motion(run).q, sent_motion(sine).q)
+
+
+def test_a_file_of_an_earlier_version_is_checked_alike(sine: Run, tmp_path: Path) -> None:
+    names = [name for name in sine.cycles.dtype.names or () if name not in ("command_number", *RATE_FIELDS)]
+    replace(sine, cycles=repack_fields(sine.cycles[names])).save(tmp_path / "a.rcirun")
+    np.testing.assert_array_equal(sent_motion(load_run(tmp_path / "a.rcirun")).q, sent_motion(sine).q)
 
 
 def test_the_soft_limits_in_force_are_checked(sine: Run) -> None:

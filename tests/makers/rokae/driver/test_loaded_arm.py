@@ -212,6 +212,7 @@ def test_a_calibrated_arm_with_friction_comes_back_from_its_file(tmp_path: Path)
     ("change", "expected"),
     [
         ({"format": "x"}, 'has no "format": "rcilab arm"'),
+        *(({"model": model}, f'names no arm: "model" is {model}') for model in (None, 5, True)),
         ({"dh": [[0, 0, 0, 0]]}, "dh.* must be a list of 7 entries"),
         ({"links": None}, "links.* must be a list of 7 entries"),
         ({"friction": {"viscous": [0.0] * 7}}, "coulomb"),
@@ -230,6 +231,11 @@ def test_a_file_that_is_not_valid_is_refused_in_one_sentence(tmp_path: Path, cha
     with pytest.raises(InvalidValueError, match=expected) as raised:
         load_model(str(file))
     assert "\n" not in str(raised.value)
+
+
+def test_a_command_for_a_named_arm_says_so_of_a_file() -> None:
+    with pytest.raises(ModelError, match=r"'good.json' is a file; this takes the name of an arm, such as xMatePro7"):
+        describe_robot("good.json")
 
 
 def test_a_missing_file_and_another_version_are_refused(tmp_path: Path) -> None:
