@@ -63,7 +63,7 @@ def test_every_language_has_the_same_keys_and_places_to_fill():
 
 
 def test_a_formula_with_words_in_it_has_them_in_every_language():
-    symbols = {"T", "x", "q", "v", "dv", "dq", "ddq", "psi", "dpsi", "omega", "domega", "pi", "sign"}
+    symbols = {"T", "d", "x", "q", "v", "dv", "dq", "ddq", "psi", "dpsi", "omega", "domega", "pi", "sign"}
     for row in (*RCI_CONDITIONS.conditions, *FRANKA_CONDITIONS):
         assert explain_formula(row) == row.formula
         said = re.findall(r"[A-Za-z][\w,]*", explain_formula(row, "zh"), re.ASCII)
