@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import os
 import re
+import sys
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -186,6 +187,7 @@ def test_the_sixth_lesson_shows_its_numbers_at_any_pace_and_again() -> None:
     assert len(shown(notebook, "image/png")) == 2 * 2  # The bytes, the success rate.
 
 
+@pytest.mark.skipif(sys.version_info >= (3, 13), reason="pylibfranka has no wheel for this Python")
 def test_the_last_two_lessons_move_an_arm_of_each_maker() -> None:
     both, breaks = printed(run_lesson(LESSONS[10])), printed(run_lesson(LESSONS[11]))
     assert re.findall(r"^(\w+) +T = \d\.\d{3} s, max", both, re.MULTILINE) == ["xMatePro7", "Panda"]

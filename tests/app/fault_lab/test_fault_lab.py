@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from unittest.mock import MagicMock
@@ -19,6 +20,7 @@ from rcilab.makers.maker import maker_of
 from rcilab.makers.rokae.faults import Fault
 from rcilab.model.robot_model import load_model
 
+NO_LIBRARY = pytest.mark.skipif(sys.version_info >= (3, 13), reason="pylibfranka has no wheel for this Python")
 MODEL = load_model("xMatePro7")
 FAULTS = fault_lab.FaultTable(MODEL)
 BY_POSE = sorted(Fault, key=lambda fault: (tuple(FAULTS[fault].start(MODEL)), fault))
@@ -49,7 +51,7 @@ def test_the_controller_reports_it_and_the_record_shows_why(booth: fault_lab.Fau
     assert np.isfinite(demo.moved.q).all()
 
 
-@pytest.mark.parametrize("arm", ["Panda", "FR3"])
+@pytest.mark.parametrize("arm", ["Panda", pytest.param("FR3", marks=NO_LIBRARY)])
 def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_moves_again(arm: str) -> None:
     with fault_lab.FaultLab(arm) as lab:
         for fault in lab.faults:
@@ -63,6 +65,7 @@ def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_m
             assert demo.way_out[-2:] == ("recover", "move")
 
 
+@NO_LIBRARY
 def test_the_bound_of_an_fr3_decreases_towards_the_end_of_a_range() -> None:
     with fault_lab.FaultLab("FR3") as lab:
         demo = lab.provoke("joint_motion_generator_velocity_limits_violation")
