@@ -318,6 +318,16 @@ class RobotModel(ReachingArm):
         return RigidBody(self.description, self.load, self.T_flange_tool)
 
     @cached_property
+    def driven_body(self) -> RigidBody:
+        """The rigid-body model that torques of the drives move: with the inertia of the rotors where that is known."""
+        from rcilab.model.dynamics.rigid_body import RigidBody
+
+        rotors = self.description.rotor_inertia
+        if rotors is None:
+            return self.rigid_body
+        return RigidBody(self.description, self.load, self.T_flange_tool, rotor_inertia=rotors)
+
+    @cached_property
     def fingerprint(self) -> Mapping[str, str]:
         """Hashes of the inputs of a check: model, limits, tool and load, each a SHA-256 in hex."""
         d = self.description

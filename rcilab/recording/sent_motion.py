@@ -177,9 +177,8 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
     """Returns the motion of the arm under the torques that a client commanded, and these torques, shape (N, n), [N m].
 
     It ends with the last torque, a refused one included, or with the state for which the controller stopped it, until
-    which that is held; torques that came after it are not played. It has the joint angles that the controller reports
-    as commanded, which are the measured ones under torques. A command that did not arrive is interpolated, so that its
-    change counts over the cycles in which it was held; `.notes` counts these.
+    which that is held; torques that came after it are not played. It has the measured joint angles. A command that did
+    not arrive is interpolated, so that its change counts over the cycles in which it was held; `.notes` counts these.
 
     Raises:
         UsageError: No torques were commanded.
@@ -197,7 +196,7 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
         raise UsageError("in this run no torques were sent")
     last = max(sent["t"][-1:].tolist() + rows["t"][faulty].tolist())
     grid = sent["t"][0] + CYCLE_TIME * np.arange(round((last - sent["t"][0]) / CYCLE_TIME) + 1)
-    q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q_c"].T], axis=1)
+    q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q"].T], axis=1)
     lost = round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1 - len(sent) if run.has_playout else 0
     motion = replace(Motion.from_cycles(q), notes=_note_missing(lost))
     return motion, np.stack([np.interp(grid, sent["t"], column) for column in _finite(sent["command_tau"]).T], axis=1)

@@ -156,7 +156,8 @@ class CycleCapture:
     def write(self) -> None:
         """Writes the row of this cycle; call it after its state was sent."""
         state, playback, playout = self._controller.state, self._arm.playback, self._playout
-        is_following = playback is not None or self._arm.is_following
+        is_followed = self._arm.is_following
+        is_following = playback is not None or is_followed
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
         count, number = self._count, state.message_id
@@ -186,6 +187,8 @@ class CycleCapture:
         elif self._waiting and (due := self._pop_due(count)) is not None:
             self._add(count, *due)
         self._counters[_ROWS] = count + 1
+        if is_following and not is_followed:  # The next motion may begin before the next cycle.
+            self._follow_motion(state, is_following=False)
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""

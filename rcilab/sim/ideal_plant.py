@@ -63,11 +63,9 @@ class IdealPlant:
     def _with_rotors(self) -> RigidBody:
         """Returns the body that torques move: with the rotor inertia that the drives do not compensate."""
         model, load = self._model, self._mounted
-        rotors = model.description.rotor_inertia
-        if rotors is None:
-            return self._body
-        load = model.load if load is None else load
-        return RigidBody(model.description, load, model.T_flange_tool, rotor_inertia=rotors)
+        if load is None:
+            return model.driven_body
+        return RigidBody(model.description, load, model.T_flange_tool, rotor_inertia=model.description.rotor_inertia)
 
     def reset(self, q: JointVector) -> Measurement:
         """Places the arm at `q`, shape (n,), [rad], at standstill."""

@@ -49,7 +49,7 @@ def joint_impedance(
         stiffness: n numbers, [N m/rad].
         damper: The damper of the previous cycles; None designs another.
     """
-    body, q, dq = model.rigid_body, measured.q, measured.dq
+    body, q, dq = model.driven_body, measured.q, measured.dq
     K = np.array(stiffness)
     tau = (damper or ModalDamping()).torque(
         lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
@@ -89,7 +89,7 @@ def cartesian_impedance(
         axes: Rotation whose columns, in base, are the directions that both refer to, shape (3, 3); None: the base's.
         damper: The damper of the previous cycles; None designs another.
     """
-    body, q, dq = model.rigid_body, measured.q, measured.dq
+    body, q, dq = model.driven_body, measured.q, measured.dq
     terms = body.tool_terms(q, dq)
     J = terms.jacobian
     # Rows of J, error and desired wrench in the axes of the springs, where the stiffness is diagonal.

@@ -69,6 +69,19 @@ def test_a_joint_yields_by_torque_over_stiffness_and_comes_back(make: Maker, nam
 
 
 @both
+def test_a_light_joint_with_a_rotor_is_as_stiff_as_asked_for(make: Maker) -> None:
+    """The last link of an FR3 without a hand has 1e-4 kg m^2, its rotor 0.1: 1 kHz is enough for 2000 N m/rad."""
+    model = load_model("FR3")
+    plant, stiffness = make(model), [3000.0] * 3 + [2500.0] * 2 + [2000.0] * 2
+    rest, force = plant.reset(model.home), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
+    plant.push(force)
+    pushed = run(plant, rest, joints(model, model.home, stiffness), 1500)
+    yielded = model.jacobian(pushed.q).T @ force / stiffness
+    assert pushed.q - model.home == pytest.approx(yielded, abs=1e-5)
+    assert abs(yielded[6]) > 9e-4
+
+
+@both
 @arms
 def test_the_tool_yields_by_force_over_stiffness_and_comes_back(make: Maker, name: str) -> None:
     model = load_model(name, tool=Pose([0.0, 0.03, 0.12]))

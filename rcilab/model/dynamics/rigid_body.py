@@ -121,7 +121,8 @@ class RigidBody:
         description: The arm.
         load: The load at the flange.
         tool: Pose of the tool in the flange; it has no mass.
-        rotor_inertia: Rotor inertia at the joints, which accelerations include, shape (n,), [kg m^2]; None: none.
+        rotor_inertia: Rotor inertia at the joints, which accelerations, `motion_torque` and inverse inertias include,
+            shape (n,), [kg m^2]; None: none.
     """
 
     def __init__(
@@ -204,7 +205,7 @@ class RigidBody:
 
     def mass_inverse(self, q: JointVector) -> Matrix:
         """Returns the inverse of the joint-space inertia matrix, shape (n, n), [1/(kg m^2)]."""
-        return pin.computeMinverse(self._model, self._data, q).copy()
+        return pin.computeMinverse(self._weightless, self._data, q).copy()
 
     def gravity(self, q: JointVector) -> JointVector:
         """Returns g(q), shape (n,), [N m]."""
@@ -263,7 +264,7 @@ class RigidBody:
 
     def tool_motion(self, q: JointVector, dq: JointVector) -> ToolTerms:
         """Returns the tool's pose, twist and Jacobian in one state; see `ToolTerms` for the arguments."""
-        return ToolTerms(self._model, self._data, self._tool, q, dq)
+        return ToolTerms(self._weightless, self._data, self._tool, q, dq)
 
     def tool_terms(self, q: JointVector, dq: JointVector) -> ToolTerms:
         """Returns the `tool_motion` of the current state, shared by all control laws of a cycle.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi
+from math import cos, pi, sin
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from rcilab.core.cycle_ring import CycleRing
 from rcilab.makers.franka.controller.fci_controller import FciController
 from rcilab.makers.franka.controller.phases import Phase
 from rcilab.makers.franka.wire.command_packet import CommandPacket
-from rcilab.makers.franka.wire.requests import AsyncMove
-from rcilab.makers.franka.wire.versions import VERSION_10, Status
+from rcilab.makers.franka.wire.requests import AsyncMove, Move
+from rcilab.makers.franka.wire.versions import VERSION_5, VERSION_10, Status
 from rcilab.model.robot_model import load_model
 from rcilab.recording.client_motions import ClientMotions
 from rcilab.recording.playout import played_commands
@@ -81,5 +81,60 @@ def test_the_record_has_velocities_and_goals_and_its_check_the_angles_that_follo
         height = [model.pose(q).parts[1][2] for q in (start, motion.q[-1])]
         way = height[1] - height[0] if generator == 3 else moved[6]
         assert way == pytest.approx(SPEED * 1e-3 * CYCLES / 2.0, rel=1e-3)
+    assert check_sent(run).ok
+    ring.close()
+
+
+def test_a_motion_that_follows_at_once_is_another_one_in_the_record() -> None:
+    model = load_model("FR3")
+    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_10)
+    ring = CycleRing.create(7, {"model": "FR3", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False})
+    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    start = tuple(controller.state.q_c.tolist())
+    for generator in (1, 3, 3, 1):
+        assert controller.begin_move(AsyncMove(0, generator, DEVIATION, DEVIATION, False, (0.5,) * 7)) is (
+            Status.MOTION_STARTED
+        )
+        for is_last in (False, False, True):
+            controller.receive(packet(controller.cycle_number, generator, 0.0, start, is_last=is_last))
+            controller.step()
+            capture.write()
+        while controller.phase is not Phase.IDLE:
+            controller.step()
+            capture.write()
+    parts = [part for part in motions.poll(is_last=True) if part.end is not None]
+    assert [part.motion.number for part in parts] == [1, 2, 3, 4]
+    assert [part.end.received for part in parts if part.end] == [3, 3, 3, 3]
+    fields = [np.isfinite(part.cycles["command_twist"]).any() for part in parts]
+    assert fields == [False, True, True, False]
+    ring.close()
+
+
+def test_torques_beside_a_generator_at_rest_are_judged_by_what_the_arm_did() -> None:
+    """A client of version 5 cannot command torques alone: it sends zero velocities with them."""
+    model = load_model("Panda")
+    controller = FciController(VirtualArm(model, build_plant("ideal", model), prefill=0), VERSION_5)
+    ring = CycleRing.create(7, {"model": "Panda", "plant": "ideal", "url": "fci://127.0.0.1", "realtime": False})
+    capture, motions = CycleCapture(ring, controller), ClientMotions(ring)
+    assert controller.begin_move(Move(2, 1, DEVIATION, DEVIATION)) is Status.MOTION_STARTED
+    start, cycles = tuple(controller.state.q_c.tolist()), 300
+    for k in range(cycles):
+        push = 3.0 * sin(2.0 * pi * k / cycles)
+        is_last = k == cycles - 1
+        tau = (0.0,) * 6 + (push,)
+        command = packet(controller.cycle_number, 1, 0.0, start, is_last=is_last)
+        controller.receive(command._replace(tau_c=tau))
+        controller.step()
+        capture.write()
+        assert not controller.faults
+    while controller.phase is not Phase.IDLE:
+        controller.step()
+        capture.write()
+    for _ in range(50):
+        controller.step()
+        capture.write()
+    (part,) = motions.poll(is_last=True)
+    run = build_run(part.cycles, plan=None, model=part.motion.model, setup=part.motion.setup, realtime=False)
+    assert abs(run.cycles["q"][-1, 6] - run.cycles["q"][0, 6]) > 0.05
     assert check_sent(run).ok
     ring.close()
