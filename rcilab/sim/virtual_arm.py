@@ -35,7 +35,7 @@ from rcilab.sim.jitter_buffer import JitterBuffer, Playback
 from rcilab.sim.measured_state import MeasuredStateMonitor
 from rcilab.sim.plant import Measurement, Plant, Setpoint
 from rcilab.sim.reference_trajectory import ReferenceTrajectory
-from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, LossBehaviour, StreamedMotion
+from rcilab.sim.streamed_motion import LOST_LIMIT, PREFILL, TORQUE_PREFILL, LossBehaviour, StreamedMotion
 from rcilab.sim.tool_kinematics import ToolKinematics
 from rcilab.sim.violations import Violations, describe_violations
 
@@ -266,6 +266,12 @@ class VirtualArm:
             is_compliant=mode.law.is_compliant,
         )
         self._tau_c = [0.0] * self.model.n if mode.law is ControlLaw.TORQUE else None
+        delay = self.playout.delay
+        if mode.law is ControlLaw.TORQUE and delay > PREFILL:
+            self.warnings.append(
+                f"torques act {delay} ms after the state that they answer: a control law of torques may oscillate; "
+                f"--prefill 0 to {TORQUE_PREFILL} is for torques"
+            )
 
     def drain_motion(self) -> None:
         """Plays the queued commands, then stops."""

@@ -45,6 +45,14 @@ def arm(request) -> VirtualArm:
     return arm
 
 
+@pytest.mark.parametrize(("prefill", "warned"), [(10, []), (50, ["50 ms"])])
+def test_a_long_delay_of_torques_is_a_warning(prefill: int, warned: list[str]) -> None:
+    arm = VirtualArm(MODEL, build_plant("ideal", MODEL), parameters(), torque_prefill=prefill)
+    arm.prepare_motion(MotionMode(ControlLaw.TORQUE, CommandKind.TORQUES))
+    arm.begin_motion(MODEL.limits)
+    assert [warning[12:17] for warning in arm.warnings] == warned
+
+
 def moved(joint: int, angle: float) -> tuple[float, ...]:
     return (*HOME[: joint - 1], HOME[joint - 1] + angle, *HOME[joint:])
 

@@ -32,6 +32,7 @@ from rcilab.makers.rokae.controller.request_handlers import (
     check_request,
     conclude,
     describe_refusal,
+    find_outside,
 )
 from rcilab.makers.rokae.controller.settings import Settings, apply_request, apply_setup, guided_freedom
 from rcilab.makers.rokae.controller.state_machine import Action, Event, Phase, Transition, transition
@@ -126,6 +127,7 @@ class RciController:
         self._requested = self._shown = _IDLE_MODES
         self._countdown = 0
         self._is_still = False
+        self._stops_by_fault = False
         self._message_id = 0
         self._datagram: bytes | None = None
         self.state = self._report()
@@ -365,6 +367,10 @@ class RciController:
             self._raise(measured_violations)
         if self.phase is Phase.STOPPING and self.arm.is_standstill and not self.arm.is_following:
             self.on_event(Event.AT_REST)
+        if self._stops_by_fault and self.is_settled:
+            self._stops_by_fault = False
+            if where := find_outside(self.settings, self.arm.measured_state):
+                self.arm.warnings.append(f"{where}: power off and on, then move it back")
 
     def _may_stay_still(self) -> bool:
         """Returns whether the next cycle will equal this one, unless a request arrives or the arm is moved."""
@@ -442,6 +448,7 @@ class RciController:
                 self.arm.discard_motion()
             case Action.SET_FAULTS:
                 self.faults = tuple(sorted({*self.faults, *faults}))
+                self._stops_by_fault = True
             case Action.CLEAR_FAULTS:
                 self.faults = ()
             case Action.GUIDE:

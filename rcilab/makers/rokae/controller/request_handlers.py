@@ -115,12 +115,12 @@ def check_recovery(settings: Settings, sensors: MeasuredStateMonitor) -> rci.Rec
         settings: Soft limits, box and thresholds.
         sensors: Position of the arm, and external forces.
     """
-    if _find_outside(settings, sensors) is not None:
+    if find_outside(settings, sensors) is not None:
         return rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     return None if sensors.find_collision(settings.collision_thresholds) is None else rci.RecoveryStatus.REFLEX
 
 
-def _find_outside(settings: Settings, sensors: MeasuredStateMonitor) -> str | None:
+def find_outside(settings: Settings, sensors: MeasuredStateMonitor) -> str | None:
     """Returns the joint that is too far beyond its range, or how far the tool is outside its box; None for neither."""
     bounds = zip(sensors.measured.q.tolist(), settings.joint_lower, settings.joint_upper, strict=True)
     for number, (q, lower, upper) in enumerate(bounds, 1):
@@ -156,7 +156,7 @@ def describe_refusal(
     elif status is rci.RecoveryStatus.REFLEX:
         why = arm.measured_state.find_collision(settings.collision_thresholds)
     elif status is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED:
-        why = f"{_find_outside(settings, arm.measured_state)}: power off and on, then move it back"
+        why = f"{find_outside(settings, arm.measured_state)}: power off and on, then move it back"
     why = why or _describe_phase(phase, safety_stop, faults)
     return f"refused {type(request).__name__} ({status.name.lower().replace('_', ' ')}): {why}"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from rcilab.core.state import RobotMode
@@ -37,6 +39,10 @@ def test_recovery_is_refused_beyond_a_limit_and_while_something_presses(make_han
     hand.start()
     hand.play(hand.swing(1, 1.5, 0.4))
     hand.rest()
+    (warning,) = hand.cycle.arm.warnings
+    assert re.fullmatch(
+        r"joint 1 is at \d+\.\d\d deg, beyond -5.73 to 5.73 deg: power off and on, then move it back", warning
+    )
     assert hand.ask(rci.AutomaticErrorRecovery()) is rci.RecoveryStatus.MANUAL_RECOVERY_NEEDED
     assert hand.state.robot_mode is RobotMode.REFLEX
     assert hand.ask(rci.SetMotorPower(0)) == 0
