@@ -66,6 +66,7 @@ COMMAND_TIMEOUT = (
 )
 _NOTICE_TIME = 1.0  # [s] In lock-step; a command that takes longer is logged,
 _FIRST_NOTICE_TIME = 3.0  # [s] or this for the first one: a vendor client begins 1 s after StartMove.
+_RECORDER_TIME = 0.0005  # [s] In lock-step, for a recorder that is behind; shorter than any client's own timeout.
 _RECORDER_TIMEOUT = 5.0  # [s] In lock-step; then its motions have gaps.
 CORRUPTED_TIMEOUT = 0.05  # [s] The same with simulated corruption of datagrams: below any client's own timeout.
 SLIP = 20  # [cycles] A motion that took this much longer than planned is logged.
@@ -359,9 +360,14 @@ class ArmServer:
         self._log.write("waiting", text, state=state, late=late)
 
     def _await_recorder(self) -> None:
-        """Waits, in lock-step, until the recorder has read the oldest rows; not for one that was stopped or killed."""
+        """Waits, in lock-step, until the recorder has read the oldest rows; not for one that was stopped or killed.
+
+        Before, each cycle gives it time: a client would answer a state again and again during a long wait.
+        """
         if self._capture is None or self._recorder_is_lost:
             return
+        if self._capture.is_crowded:
+            self._clock.sleep_until(self._clock.now() + _RECORDER_TIME)
         deadline = self._clock.now() + _RECORDER_TIMEOUT
         while not self._capture.has_room and not self._is_ending:
             if self._clock.now() > deadline:

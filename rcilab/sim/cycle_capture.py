@@ -144,6 +144,12 @@ class CycleCapture:
         read = self._counters[RingCounter.READ]
         return not read or self._count - read < CAPACITY - _RESERVE
 
+    @property
+    def is_crowded(self) -> bool:
+        """Whether the recorder, if there is one, has still to read half of the rows."""
+        read = self._counters[RingCounter.READ]
+        return read > 0 and self._count - read > CAPACITY // 2
+
     def connect(self, client: str) -> None:
         """Stores the address of the client."""
         self._client = client

@@ -349,6 +349,15 @@ def test_in_lock_step_the_controller_has_priority_where_permitted(monkeypatch: p
     assert found.lines == []
 
 
+def test_in_lock_step_a_recorder_that_is_behind_gets_time_in_each_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(arm_server.CycleCapture, "is_crowded", True)
+    with running(lockstep=True, is_recorded=True) as found, Peer(found) as peer:
+        began = time.monotonic()
+        peer.run(MOTION.q[:300])
+        assert time.monotonic() - began >= 300 * 0.0005
+        assert peer.ask(rci.StopMove()) is rci.StopStatus.SUCCESS
+
+
 def test_in_lock_step_a_torque_acts_as_late_as_by_the_clock(lockstep: Running) -> None:
     """Two cycles later than without a delay: the step of a torque is in the third state after the one it answers."""
     with Peer(lockstep) as peer:
