@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +25,12 @@ _ANSWER = (
     "sent_ns", "lateness", "command", "command_pose", "command_psi", "command_tau", "command_number", *RATE_FIELDS,
 )  # fmt: skip
 _BEFORE = LAG  # [cycles] A first command answers a state that is at most so old: the vendor's client has a buffer.
+
+_PARTS = {
+    "begin": {"motion", "row", "mode", "client", "wall_ns", "tool", "load", "settings"},
+    "end": {"motion", "row", "stopped"},
+}
+"""Parts of each event that a reader needs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,7 +66,7 @@ class MotionEnd:
     duplicates: int
     """Datagrams that arrived twice."""
     unrecorded: int = 0
-    """Commands that came late or were skipped, and are not in the record."""
+    """Commands that came late, were skipped or came before the first played one, and are not in the record."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -113,8 +119,8 @@ class ClientMotions:
     def __init__(self, ring: CycleRing, lag: int = LAG) -> None:
         self._ring, self._lag = ring, lag
         self._reader = ring.open_reader()
-        events, self._next_event = ring.events(0)
-        in_progress = events[-1] if events and events[-1].get("event") == "begin" else None
+        events = self._take_events(0)
+        in_progress = events[-1] if events and events[-1]["event"] == "begin" else None
         self._reader.skip(None if in_progress is None else max(in_progress["row"] - _BEFORE, 0))
         self._facts = _Facts.of(ring)
         self._model = load_model(self._facts.model)
@@ -124,6 +130,7 @@ class ClientMotions:
         self._row = 0  # Number of the first row of the motion.
         self._origin: int | None = None  # Number of its row with t = 0.
         self._is_resumed = False  # Its rows before the waiting ones were overwritten.
+        self._cut = 0  # Commands of its rows before t = 0.
         self._gaps: list[range] = []  # Numbers of the rows that were overwritten and are not yet reported.
         if in_progress is not None:
             self._begin(in_progress)
@@ -145,7 +152,7 @@ class ClientMotions:
             is_last: Whether no row is left for another poll.
         """
         parts: list[MotionPart] = []
-        events, self._next_event = self._ring.events(self._next_event)
+        events = self._take_events(self._next_event)
         self._read(events, 0 if is_last else self._lag, parts)
         for event in events:
             if event["event"] == "begin":
@@ -171,6 +178,11 @@ class ClientMotions:
         rows = self._reader.read(next - len(cycles), next)
         for name in _ANSWER:
             cycles[name][len(cycles) - len(rows) :] = rows[name]
+
+    def _take_events(self, start: int) -> list[dict[str, Any]]:
+        """Returns the events from a number on, without those of a damaged record that lack a part."""
+        events, self._next_event = self._ring.events(start)
+        return [event for event in events if _PARTS.get(str(event.get("event")), {""}) <= event.keys()]
 
     def _read(self, events: list[dict[str, Any]], lag: int, parts: list[MotionPart]) -> None:
         """Reads new rows. After a gap the waiting ones are a part of their own."""
@@ -204,6 +216,7 @@ class ClientMotions:
             skipped = sum(len(range(max(gap.start, self._row), min(gap.stop, row or gap.stop))) for gap in self._gaps)
             self._gaps = []
         length = 0 if row is None else row - self._row
+        end = end and replace(end, unrecorded=end.unrecorded + self._cut)
         return MotionPart(motion=self._motion, cycles=cycles, next=self._first, length=length, end=end, skipped=skipped)
 
     def _take(self, *, is_whole: bool) -> NDArray[np.void]:
@@ -228,6 +241,8 @@ class ClientMotions:
                 start = int(sources[is_there].min())
             elif self._origin is None:
                 return rows[:0]
+            if self._origin is None:
+                self._cut = int((rows["sent_ns"][of_motion[0] : start] != 0).sum())
             self._origin = self._first + start if self._origin is None else self._origin
             self._is_resumed = False
         taken = rows[start:end].copy()
@@ -241,7 +256,7 @@ class ClientMotions:
             self._waiting, self._first = self._waiting[count:], self._first + count
 
     def _begin(self, event: dict[str, Any]) -> None:
-        self._motion, self._row, self._origin = self._begun(event), event["row"], None
+        self._motion, self._row, self._origin, self._cut = self._begun(event), event["row"], None, 0
         self._is_resumed = self._row < self._first
 
     def _begun(self, event: dict[str, Any]) -> ClientMotion:

@@ -325,8 +325,7 @@ def _build(chunks: tuple[Chunk, ...], max_rows: int, build: Callable[..., R]) ->
     if dtype.itemsize > _LARGEST_ROW:
         raise ValueError(f"a cycle takes {dtype.itemsize} bytes, the maximum is {_LARGEST_ROW}")
     _layout_for(dtype)  # Checked before memory for the cycles is allocated.
-    parts = [_decode_cycles(chunk.payload, dtype) for chunk in chunks if chunk.kind == "CYCL"]
-    cycles = _to_current_layout(np.concatenate(parts) if parts else np.zeros(0, dtype))
+    cycles = _to_current_layout(_join_cycles([chunk.payload for chunk in chunks if chunk.kind == "CYCL"], dtype))
     cycles.flags.writeable = False
     _require_times(cycles["t"], max(max_rows, DEFAULT_MAX_ROWS))
     plans = [chunk.payload for chunk in chunks if chunk.kind == "PLAN"]
@@ -416,6 +415,17 @@ def _layout_for(dtype: np.dtype[np.void]) -> np.dtype[np.void]:
 
 def _stored_fields(dtype: np.dtype[np.void]) -> dict[str, np.dtype[Any]]:
     return {name: field[0] for name, field in _fields(dtype) if name != "reserved"}
+
+
+def _join_cycles(payloads: list[bytes], dtype: np.dtype[np.void]) -> NDArray[np.void]:
+    """Returns the cycles of all chunks; at no time are they in memory twice."""
+    cycles = np.zeros(sum(_ROWS.unpack_from(payload)[0] for payload in payloads), dtype)
+    end = 0
+    for payload in payloads:
+        found = _decode_cycles(payload, dtype)
+        cycles[end : end + len(found)] = found
+        end += len(found)
+    return cycles
 
 
 def _decode_cycles(payload: bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:

@@ -410,6 +410,29 @@ def test_a_motion_with_a_gap_is_two_runs_and_neither_is_checked_across_it(ring: 
     assert [", without its beginning, joint_position" in line for line in lines if "ran to" in line] == [True]
 
 
+def test_commands_before_the_first_played_one_count_as_not_recorded(ring: CycleRing) -> None:
+    motions = ClientMotions(ring)
+    ring.add_event(begin_event(1, 0))
+    synthetic_rows(ring, 0, 50, played=False)
+    synthetic_rows(ring, 50, 1000)
+    ring.add_event(end_event(1, 1050))
+    (part,) = motions.poll()
+    assert part.end is not None
+    assert len(part.cycles) + part.end.unrecorded == 1050
+    assert part.end.unrecorded == 49
+
+
+@pytest.mark.parametrize("part", ["event", "load", "row"])
+def test_an_event_that_lacks_a_part_is_skipped(ring: CycleRing, part: str) -> None:
+    event = begin_event(1, 0)
+    del event[part]
+    ring.add_event(event)
+    synthetic_rows(ring, 0, 2000)
+    motions = ClientMotions(ring)
+    ring.add_event(event)
+    assert motions.poll() == ClientMotions(ring).poll() == []
+
+
 def test_a_motion_whose_beginning_was_overwritten_is_named_as_a_part(ring: CycleRing, tmp_path: Path) -> None:
     lines: list[str] = []
     recorder = ClientRecorder(tmp_path, ring, lambda kind, text: lines.append(text))
