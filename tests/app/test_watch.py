@@ -398,7 +398,7 @@ def test_curves_show_the_soft_limits_of_their_motion(place: Arena, watching) -> 
     for state in (store.state, replayed(store.state, run)):
         state = dataclasses.replace(state, plot_joint=1)
         frame = Plots(Text("en"))._joint_frame(state, "q", 1.0)
-        assert (frame.lower, frame.upper) == (-2.0, 2.0)
+        assert (np.unique(frame.lower).tolist(), np.unique(frame.upper).tolist()) == ([-2.0], [2.0])
 
 
 @pytest.mark.parametrize(("address", "error"), [("x", InvalidValueError), ("127.0.0.2:1", ConnectionLostError)])
