@@ -232,7 +232,12 @@ class VirtualArm:
         self._motion.prepare(mode, self.on_loss)
 
     def begin_motion(
-        self, limits: Limits, *, start: StartTolerance | None = None, checks_accelerations: bool = True
+        self,
+        limits: Limits,
+        *,
+        start: StartTolerance | None = None,
+        checks_accelerations: bool = True,
+        counts_replacements: bool = False,
     ) -> None:
         """Follows commands from now on, from the present reference.
 
@@ -242,6 +247,8 @@ class VirtualArm:
                 it ends the motion by this violation alone. None: `start_tolerance`, beyond which the jump violates
                 limits. It is not checked for velocities and goals.
             checks_accelerations: Whether measured accelerations and the speed of the arm angle are checked.
+            counts_replacements: Whether the replacement of a lost command is checked and counts as the last command,
+                as where the maker's client computes with it. False: received commands are checked over the gap.
         """
         mode, parameters, sensors = self._motion.mode, self._parameters, self.measured_state
         tolerance = start_tolerance(mode.law, parameters)
@@ -254,7 +261,16 @@ class VirtualArm:
         servos = servo_figures(self.model.description) if self._motion.on_loss == "hold" else None
         is_strict = start is not None
         bounds = build_motion_limits(
-            mode, self.model, parameters, limits, starts, tools, tolerance, servos, is_strict_start=is_strict
+            mode,
+            self.model,
+            parameters,
+            limits,
+            starts,
+            tools,
+            tolerance,
+            servos,
+            is_strict_start=is_strict,
+            counts_replacements=counts_replacements,
         )
         self._motion.begin(build_generator(mode, bounds, list(self.commanded.q)))
         sensors.begin(

@@ -13,6 +13,7 @@ range raises the error of a measured one.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -36,23 +37,22 @@ from rcilab.conformance.common_conditions import (
     TORQUE_RANGE,
     TORQUE_RATE,
 )
+from rcilab.conformance.standstill import resolution
 from rcilab.core.condition import (
     AnyLimits,
     Bounds,
     Condition,
     ConditionTable,
+    Signal,
     joint_limits,
-    joint_tolerance,
     symmetric_bounds,
 )
 from rcilab.makers.franka.errors import FrankaError
 
 _PAGE = "Franka's page Robot and interface specifications"
 _ERRORS = "Franka's page Errors"
+_STEP = "tolerance: what one cycle may change by jerk, rcilab"
 _ELBOW_JOINT = 2  # From 0: Franka's elbow is the angle of joint 3.
-
-START_TOLERANCE = 1e-6  # [rad] or [m]
-"""Tolerance of the start. The page gives no figure: a smaller step is a jerk inside every bound."""
 
 _JOINT_ERRORS = {
     JOINT_POSITION.id: FrankaError.JOINT_MOTION_GENERATOR_POSITION_LIMITS_VIOLATION,
@@ -80,6 +80,16 @@ _MEASURED_ERRORS = {
 }
 
 
+def _first_step(signal: Signal) -> Callable[[AnyLimits], Bounds]:
+    """Returns the bounds of a first command: a larger step from standstill violates the jerk."""
+
+    def bounds(limits: AnyLimits) -> Bounds:
+        step = resolution(signal, 0, limits)
+        return -step, step
+
+    return bounds
+
+
 def _motion_row(row: Condition) -> Condition:
     """Returns a common row on joint motions in Franka's form."""
     if row.id in _JOINT_ERRORS:
@@ -89,8 +99,8 @@ def _motion_row(row: Condition) -> Condition:
             row,
             necessity="necessary",
             fault=FrankaError.JOINT_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
-            source=f"{_PAGE}, necessary by its example; {_ERRORS} (tolerance: rcilab)",
-            bounds=joint_tolerance(START_TOLERANCE),
+            source=f"{_PAGE}, necessary by its example; {_ERRORS} ({_STEP})",
+            bounds=_first_step("joint"),
         )
     ours = "" if row.signal == "torque" else "; tolerance: rcilab"
     return replace(row, source=f"{_PAGE}, recommended (printed for Cartesian trajectories{ours})")
@@ -170,8 +180,8 @@ _TOOL = (
     *(_inverse_row(row) for row in JOINT_CONDITIONS),
     replace(
         START_POSE,
-        source=f"{_ERRORS} ({_PAGE}: recommended; tolerance: rcilab)",
-        bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
+        source=f"{_ERRORS} ({_PAGE}: recommended; {_STEP})",
+        bounds=_first_step("translation"),
         necessity="necessary",
         fault=FrankaError.CARTESIAN_POSITION_MOTION_GENERATOR_START_POSE_INVALID,
     ),
@@ -181,12 +191,12 @@ _TOOL = (
         formula="q_3,c = q_3",
         necessity="necessary",
         unit="rad",
-        source=f"{_ERRORS} (tolerance: rcilab)",
+        source=f"{_ERRORS} ({_STEP})",
         fault=FrankaError.CARTESIAN_MOTION_GENERATOR_START_ELBOW_INVALID,
         stage="start",
         signal="arm_angle",
         order=0,
-        bounds=lambda limits: symmetric_bounds(START_TOLERANCE),
+        bounds=_first_step("arm_angle"),
     ),
     *(
         replace(row, source=f"{_PAGE}, Cartesian trajectory, recommended (tolerance: rcilab)")

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from math import remainder, tau
+from math import dist, remainder, tau
 
 from rcilab.conformance.pose_validation import find_frame_error
 from rcilab.core.clock import CYCLE_TIME
@@ -51,7 +51,7 @@ class CartesianGenerator:
         self._stream = CommandExtrapolator([*position, *wxyz_from_rotation(rotation), self._psi])
         self._filter = PoseLowPass(bounds.parameters.cartesian_filter, reference.pose, self._psi)
         self._before_pause: CommandExtrapolator | None = None  # While the last command is held.
-        self._gap = MissedCycles()
+        self._gap = MissedCycles(bounds)
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""
@@ -79,7 +79,7 @@ class CartesianGenerator:
             if is_lost:
                 values = self._stream.predict(1, values, playback.steps)
         if not self._has_begun:
-            self._begin(values)
+            self._begin(values, command)
         if is_held:  # The servo continues from the last joint angles.
             self._stream.take(values)
             return self._reference.hold()
@@ -114,14 +114,14 @@ class CartesianGenerator:
         """Continues the response to a pause after the last command; None without one."""
         return self._reference.settle()
 
-    def _begin(self, values: list[float]) -> None:
+    def _begin(self, values: list[float], command: ArmCommand | None) -> None:
         """Processes the first command; filter and prediction start there if the motion does."""
         self._has_begun = True
         try:
             pose = _pose(values)
         except InvalidValueError:
             return  # `step` refuses it.
-        if self._reference.begin(pose, values[7]):
+        if self._reference.begin(pose, values[7], 0.0 if command is None else _distortion(command, pose)):
             self._stream = CommandExtrapolator(values)
             self._filter = PoseLowPass(self._bounds.parameters.cartesian_filter, pose, values[7])
 
@@ -143,6 +143,12 @@ class CartesianGenerator:
         # The vendor's client marks an arm angle of exactly zero as not valid.
         passes_zero = self._had_psi and command.psi == 0.0 and abs(self._psi) <= self._smallest_psi
         return 0.0 if passes_zero else self._psi
+
+
+def _distortion(command: ArmCommand, pose: Pose) -> float:
+    """Returns how far the numbers of a commanded orientation are from those of the rotation that is taken for it."""
+    m, rotation = command.T_base_tool, pose.parts[0]
+    return dist((m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]), rotation)
 
 
 def _pose(values: Sequence[float]) -> Pose:

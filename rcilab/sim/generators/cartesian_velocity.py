@@ -43,7 +43,7 @@ class CartesianVelocityGenerator:
         self._filter = LowPass(bounds.parameters.twist_filter, [0.0] * 6)
         self._psi = CommandExtrapolator([reference.psi])
         self._has_begun = False
-        self._gap = MissedCycles()
+        self._gap = MissedCycles(bounds)
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:
         """Returns whether a command continues the motion by one cycle rather than by `steps`."""

@@ -61,13 +61,19 @@ class MissedCycles:
 
     Attributes:
         missing: Cycles without a command up to now.
+
+    Args:
+        bounds: Whether replacements of lost commands count as commands.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, bounds: MotionLimits) -> None:
+        self._counts_replacements = bounds.counts_replacements
         self.missing = 0
 
     def step(self, playback: Playback) -> int:
-        """Returns the number of cycles since the last command; 0 in a cycle without a command."""
+        """Returns the number of cycles since the last command, or its replacement; 0 in a cycle without."""
+        if self._counts_replacements:
+            return 1 + playback.skipped
         if playback.is_lost:
             self.missing += 1
             return 0
@@ -108,10 +114,10 @@ def with_jump(jump: ArmViolation | None, violations: Sequence[LimitViolation]) -
 class JointReference:
     """The last stage of every motion of joint angles: the soft-limit governor, if enabled, then the joint conditions.
 
-    The conditions apply to the client's commands, over the cycles between them. The replacement of a lost command is
-    checked only for an acceleration above `JOIN_SHARE` times the limit and for the range of the joint. Where the last
-    command is held instead, the reference is the response of the servo (`HoldResponse`), which only the measured
-    conditions check.
+    The conditions apply to the client's commands, over the cycles between them, or to every cycle where replacements
+    count as commands (`MotionLimits`). Otherwise the replacement of a lost command is checked only for an acceleration
+    above `JOIN_SHARE` times the limit and for the range of the joint. Where the last command is held instead, the
+    reference is the response of the servo (`HoldResponse`), which only the measured conditions check.
 
     Args:
         bounds: Filters and limits of the motion.
@@ -151,7 +157,7 @@ class JointReference:
         if not any(offset):
             return False
         jump = None if is_checked else find_joint_jump(q, self._last, self._tolerance)
-        if jump is not None and self._is_strict:
+        if self._is_strict and not is_checked:
             self._jump = jump
             return False
         if all(abs(d) <= jerk * h3 for d, jerk in zip(offset, self._limits.jerk.tolist(), strict=True)):

@@ -35,7 +35,7 @@ class JointGenerator:
         self._stream = CommandExtrapolator(q)
         self._filter = LowPass(bounds.parameters.joint_filter, q)
         self._before_pause: CommandExtrapolator | None = None  # While the last command is held.
-        self._gap = MissedCycles()
+        self._gap = MissedCycles(bounds)
         self._reference = JointReference(bounds, q, checks_box=True)
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:

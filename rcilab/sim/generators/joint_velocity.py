@@ -32,7 +32,7 @@ class JointVelocityGenerator:
         self._q = list(q)
         self._stream = RateExtrapolator(self._n)
         self._filter = LowPass(bounds.parameters.velocity_filter, [0.0] * self._n)
-        self._gap = MissedCycles()
+        self._gap = MissedCycles(bounds)
         self._reference = JointReference(bounds, q, checks_box=True)
 
     def is_next(self, command: ArmCommand, steps: int, in_doubt: bool) -> bool:

@@ -85,6 +85,8 @@ class MotionLimits:
     """Largest difference of the first command from the reference."""
     is_strict_start: bool
     """Whether a start outside the tolerance is a violation by itself, and the only one of its cycle."""
+    counts_replacements: bool
+    """Whether the replacement of a lost command counts as the last command, in place of the cycles over the gap."""
     starts: tuple[Pose, ...]
     """Poses of the tool in base where the motion begins: measured and commanded."""
     servos: tuple[ServoFigures, ...] | None
@@ -118,6 +120,7 @@ def build_motion_limits(
     servos: tuple[ServoFigures, ...] | None,
     *,
     is_strict_start: bool = False,
+    counts_replacements: bool = False,
 ) -> MotionLimits:
     """Returns filters and bounds of a motion.
 
@@ -135,6 +138,7 @@ def build_motion_limits(
         tolerance: Largest difference of the first command from the reference.
         servos: The servos that respond to a held command; None: lost commands are bridged.
         is_strict_start: Whether a start outside the tolerance is a violation by itself.
+        counts_replacements: Whether the replacement of a lost command counts as the last command.
     """
     joint = parameters.soft_limits(limits.joint)
     for q in starts:
@@ -148,6 +152,7 @@ def build_motion_limits(
         box=active_box(None if has_walls else parameters.safety_box),
         tolerance=tolerance,
         is_strict_start=is_strict_start,
+        counts_replacements=counts_replacements,
         starts=tools,
         servos=servos,
     )

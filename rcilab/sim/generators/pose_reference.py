@@ -19,6 +19,8 @@ from rcilab.sim.generators.motion_limits import MotionLimits
 from rcilab.sim.generators.start import StartMonitor, find_tool_jump
 from rcilab.sim.violations import ArmCondition, ArmViolation
 
+_SMALL_TURN = 1e-6  # [rad] In one cycle: a jerk inside every bound.
+
 
 def invalid_pose(remark: Remark) -> GeneratorOutput:
     """Returns the output for a command that is not a pose the arm can reach."""
@@ -41,7 +43,9 @@ def _flipped(sentence: str) -> ArmViolation:
 class PoseReference:
     """Checks commanded poses and arm angles and returns their joint angles, on the present branch.
 
-    The conditions apply to the client's commands, over the cycles between them. Owned by a motion generator.
+    The conditions apply to the client's commands, over the cycles between them. A wrong pose is not solved, except of
+    an arm with an elbow flip, whose maker names the errors of the joints beside those of the tool. Owned by a motion
+    generator.
 
     Attributes:
         pose: Pose of the tool in base at the start of the motion.
@@ -74,12 +78,12 @@ class PoseReference:
         if not self.has_psi:
             return None
         violation = find_arm_angle_error(command)
-        if violation is None and command.elbow_side != 0.0 and command.elbow_side != self._side:
+        if violation is None and self._flip is not None and command.has_psi and command.elbow_side != self._side:
             sides = f"{command.elbow_side:g}, and the arm began on side {self._side:+d}"
             return _flipped(f"elbow: the commanded side is {sides}")
         return violation
 
-    def begin(self, pose: Pose, psi: float) -> bool:
+    def begin(self, pose: Pose, psi: float, distortion: float = 0.0) -> bool:
         """Processes the first command, before `step`; returns whether the motion starts there, at standstill.
 
         Otherwise it is the first step of a motion from the reference, near it or too far from it.
@@ -87,6 +91,7 @@ class PoseReference:
         Args:
             pose: Pose of the tool in base.
             psi: Arm angle, [rad].
+            distortion: How far the commanded orientation is from a rotation: its turn is known to this only, [rad].
         """
         rotation, position = self.pose.parts
         translation = dist(position, pose.parts[1])
@@ -94,10 +99,14 @@ class PoseReference:
         lag = remainder(psi - self.psi, tau)
         if not (translation or turn or lag):
             return False
-        jump = find_tool_jump(translation, turn, lag, self._bounds.tolerance)
-        if jump is not None and self._bounds.is_strict_start:
-            self._jump = jump
+        if self._bounds.is_strict_start:
+            is_distorted = _SMALL_TURN < turn <= distortion
+            self._jump = find_tool_jump(translation, 0.0 if is_distorted else turn, lag, self._bounds.tolerance)
+            if is_distorted:  # Its turn is not a motion.
+                self._monitor = self._monitor_from(Pose.from_parts(pose.parts[0], position), self.psi)
+            self._joints_have_begun = not is_distorted
             return False
+        jump = find_tool_jump(translation, turn, lag, self._bounds.tolerance)
         cartesian, arm_angle = self._bounds.limits.cartesian, self._bounds.limits.arm_angle
         h3 = CYCLE_TIME**3
         is_a_step = translation <= cartesian.translation_jerk * h3 and turn <= cartesian.rotation_jerk * h3
@@ -120,23 +129,29 @@ class PoseReference:
         """
         if self._jump is not None and self._bounds.is_strict_start:
             return GeneratorOutput(violations=(self._jump,))
+        violations: Sequence[LimitViolation] = ()
         if cycles > 0:
             violations = self._step_monitor(pose, psi if self.has_psi else None, cycles)
-            if violations:
+            if violations and self._flip is None:
                 return GeneratorOutput(violations=with_jump(self._jump, violations))
             self._jump = None
         try:
             q = self._tracker.follow(pose, self._q) if psi is None else self._tracker.solve(pose, psi, self._q)
         except KinematicsError as error:
+            if violations:
+                return GeneratorOutput(violations=tuple(violations))
             if cycles == 0:
                 return lost_motion(Remark(f"no joint angles for a bridged pose: {error}", "no_angles"))
             return invalid_pose(Remark(f"commanded pose: {error}", "no_angles"))
         if cycles > 0 and self._find_side(q) != self._side:
-            return GeneratorOutput(violations=(_flipped("elbow: the commanded pose flips it to the other side"),))
+            flipped = _flipped("elbow: the commanded pose flips it to the other side")
+            return GeneratorOutput(violations=(*violations, flipped))
         if not self._joints_have_begun:
             self._joints_have_begun = True
             self._joints.begin(q, is_checked=True)
         step = self._joints.step(q, cycles)
+        if violations:
+            return GeneratorOutput(violations=(*violations, *step.violations))
         if step.q is not None:
             self._q = q
         return step

@@ -3,7 +3,8 @@
 The commanded torques pass the torque filter, then the conditions of torques. The torque before the first command is
 zero, so the first one may differ from zero by one cycle's torque rate. A lost cycle holds the last torque, or, if a
 later command is already known, interpolates linearly to it. The conditions apply to the received commands, over the
-cycles between them. Where a maker has no bound of torques, larger ones than the arm's act as the arm's.
+cycles between them, or to every cycle where held torques count as commands (`MotionLimits`). Where a maker has no bound
+of torques, larger ones than the arm's act as the arm's.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ class TorqueGenerator:
         nothing = [0.0] * bounds.model.n
         self._n = bounds.model.n
         self._tau = nothing
-        self._gap = MissedCycles()
+        self._gap = MissedCycles(bounds)
+        self._counts_replacements = bounds.counts_replacements
         self._stream = CommandExtrapolator(nothing)
         self._filter = LowPass(bounds.parameters.torque_filter, nothing)
         self._largest: list[float] = bounds.model.limits.joint.torque.tolist()
@@ -66,7 +68,8 @@ class TorqueGenerator:
 
     def _check_ahead(self, tau: list[float], steps: int) -> list[LimitViolation]:
         """Returns the violations of torques that are due later: the way to them begins in this cycle."""
-        return copy(self._monitor).step(copy(self._filter).step(tau), self._gap.missing - 1 + steps)
+        cycles = 1 if self._counts_replacements else self._gap.missing - 1 + steps
+        return copy(self._monitor).step(copy(self._filter).step(tau), cycles)
 
     @property
     def is_off_commands(self) -> bool:

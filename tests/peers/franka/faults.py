@@ -332,6 +332,10 @@ def elbow_of_no_side(start: State) -> Wrong:
     return Wrong([Output(pose=start.O_T_EE_c, elbow=(start.elbow_c[0], 0.5), twist=(0.0,) * 6)], 0)
 
 
+def elbow_of_side_zero(start: State) -> Wrong:
+    return Wrong([Output(pose=start.O_T_EE_c, elbow=(start.elbow_c[0], 0.0), twist=(0.0,) * 6)], 0)
+
+
 def elbow_start(start: State) -> Wrong:
     off = (start.elbow_c[0] + 0.01, start.elbow_c[1])
     return Wrong([Output(pose=start.O_T_EE_c, elbow=off, twist=(0.0,) * 6)] * 3, 0)
@@ -421,23 +425,25 @@ CASES: dict[str, Case] = {
     "velocities whose change jumps": Case("15", DQ, rate_jerk),
     "a pose that begins off the arm": Case("16", POSE, pose_start),
     "a pose that begins turned": Case("16", POSE, turned_start),
-    "an elbow too fast": Case({5: "17 ...", 10: "17"}, POSE, elbow_too_fast(_poses)),
-    "an elbow accelerated too much": Case("17 ...", POSE, elbow_too_strong),
-    "an elbow whose acceleration jumps": Case("17 ...", POSE, elbow_jerk),
-    "an elbow over the end of its range": Case({5: "17 ...", 10: "28 ..."}, POSE, elbow_range, NEAR_ELBOW_END),
-    "an elbow that jumps": Case("17", POSE, elbow_jump),
-    "an elbow that jumps beside velocities": Case("17", TWIST, elbow_jump),
+    "an elbow too fast": Case({5: "17 28", 10: "17"}, POSE, elbow_too_fast(_poses)),
+    "an elbow accelerated too much": Case("17 29", POSE, elbow_too_strong),
+    "an elbow whose acceleration jumps": Case("17 30", POSE, elbow_jerk),
+    "an elbow over the end of its range": Case({5: "17 27 ...", 10: "28 ..."}, POSE, elbow_range, NEAR_ELBOW_END),
+    "an elbow that jumps": Case("17 28 29 30", POSE, elbow_jump),
+    "an elbow that jumps beside velocities": Case("17 28 29 30", TWIST, elbow_jump),
     "an elbow that is no number": Case("17", POSE, elbow_no_number),
     "a tool too fast": Case("18", POSE, turn_velocity(_poses)),
-    "a tool accelerated too much": Case("19", POSE, turn_acceleration(_poses)),
-    "a tool whose acceleration jumps": Case("20", POSE, turn_jerk(_poses)),
+    "a tool accelerated too much": Case({5: "19 29", 10: "19 29 30"}, POSE, turn_acceleration(_poses)),
+    "a tool whose acceleration jumps": Case("20 30", POSE, turn_jerk(_poses)),
     "a twist too high": Case("18", TWIST, turn_velocity(_twists)),
-    "a twist that jumps": Case("19", TWIST, turn_acceleration(_twists)),
-    "a twist whose change jumps": Case("20", TWIST, turn_jerk(_twists)),
+    "a twist that jumps": Case({5: "19 29", 10: "19 29 30"}, TWIST, turn_acceleration(_twists)),
+    "a twist whose change jumps": Case("20 30", TWIST, turn_jerk(_twists)),
     "an elbow of the other side": Case("21", POSE, elbow_side),
     "an elbow of the other side at the start": Case("21", POSE, elbow_side_at_the_start),
     "an elbow of the other side beside velocities": Case("21", TWIST, elbow_side),
     "an elbow of no side": Case("21", POSE, elbow_of_no_side),
+    "an elbow of side zero": Case("21", POSE, elbow_of_side_zero),
+    "an elbow of side zero beside velocities": Case("21", TWIST, elbow_of_side_zero),
     "poses that stretch the arm": Case("31", POSE, stretched_arm, NEAR_FLIP),
     "an elbow that begins off the arm": Case("22", POSE, elbow_start),
     "poses that need an angle over the end of its range": Case({5: "27", 10: "0 ..."}, POSE, inverse_range, END),

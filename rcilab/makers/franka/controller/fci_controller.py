@@ -2,8 +2,8 @@
 
 Each `step` advances the arm by one cycle, turns its violations into errors, and reports the state. An error ends the
 motion: the violating command is not followed, the flag is set in the state of the same cycle and stays set until the
-error recovery, and the arm stops on one path, inside its acceleration and jerk limits. The errors that ended the last
-motion remain in `reflex_reason` until the next one.
+error recovery, and the arm stops on one path, inside its acceleration and jerk limits. The errors that ended a motion
+remain in `reflex_reason` until an error ends another one.
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ from operator import itemgetter
 
 import numpy as np
 
+from rcilab.conformance.standstill import resolution
 from rcilab.core.arrays import JointVector, readonly_copy
+from rcilab.core.condition import Signal
 from rcilab.core.errors import InvalidValueError, UsageError
+from rcilab.core.limits import Limits
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.state import ControllerMode, MotionGeneratorMode, RobotState
 from rcilab.i18n.translator import Remark
-from rcilab.makers.franka.conditions import START_TOLERANCE
 from rcilab.makers.franka.controller.error_of import errors_of
 from rcilab.makers.franka.controller.modes import MotionKind, motion_of
 from rcilab.makers.franka.controller.phases import (
@@ -62,12 +64,6 @@ _MOVES_THE_TOOL = (SetNEToEE, SetLoad)
 _ROW_MAJOR = itemgetter(*(column * 4 + row for row in range(4) for column in range(4)))
 """Settings of tool and load, with which the arm begins again at its present angles."""
 _STILL = (Phase.IDLE, Phase.REFLEX, Phase.USER_STOPPED)
-_START = StartTolerance(
-    joint=(START_TOLERANCE,) * 7,
-    translation=START_TOLERANCE,
-    rotation=START_TOLERANCE,
-    arm_angle=START_TOLERANCE,
-)
 _USER_STOP = Remark("the user stop was pressed", "estop")
 
 
@@ -80,7 +76,7 @@ class FciController:
         settings: All settings.
         phase: The phase of the robot.
         faults: The errors that are set.
-        reflex_reason: The errors that ended the last motion.
+        reflex_reason: The errors that ended the last motion that was ended by any.
         reason: Reason for the last error, as a sentence with numbers.
         outcome: How the last motion ended, for the second answer to its Move; None while there is no answer due.
         state: The last reported state.
@@ -289,14 +285,19 @@ class FciController:
             return Status.INVALID_ARGUMENT
         if motion.mode.is_cartesian and self._is_singular():
             return Status.START_SINGULAR
-        self.reflex_reason, self.outcome, self._motion = (), None, motion
+        self.outcome, self._motion = None, motion
         self._shown_states = 0
         self._deviations, self._final = deviations, None
         self._links.begin(self.arm.signals.measured.q)
         self.arm.prepare_motion(motion.mode)
         limits = cartesian_limits(self.model.limits, self.limit_table)
         unchecked = replace(limits.joint, torque=np.full(self.model.n, np.inf))  # The range of torques is no error.
-        self.arm.begin_motion(replace(limits, joint=unchecked), start=_START, checks_accelerations=False)
+        self.arm.begin_motion(
+            replace(limits, joint=unchecked),
+            start=_start_tolerance(limits),
+            checks_accelerations=False,
+            counts_replacements=True,
+        )
         self._enter(Phase.MOVING)
         self.state = self._report()
         return Status.MOTION_STARTED
@@ -470,6 +471,16 @@ class FciController:
         self.settings = settings
         self.arm.configure(settings)
         self._reporter.configure(self.model, settings)
+
+
+def _start_tolerance(limits: Limits) -> StartTolerance:
+    """Returns the tolerance of the rows on the start: a larger step from standstill violates the jerk."""
+
+    def step(signal: Signal) -> float:
+        return float(resolution(signal, 0, limits)[0])
+
+    joint = tuple(resolution("joint", 0, limits).tolist())
+    return StartTolerance(joint, step("translation"), step("rotation"), step("arm_angle"))
 
 
 def _as_command(packet: CommandPacket, motion: MotionKind, version: FciVersion) -> ArmCommand:

@@ -223,7 +223,7 @@ class StateReporter:
         return at_K, wrench_in(at_K, T_base_K.parts[0])
 
     def _side(self, q4: float) -> float:
-        return float(np.sign(q4 - self._flip))
+        return 1.0 if q4 > self._flip else -1.0
 
 
 def columns_of(pose: Pose) -> tuple[float, ...]:

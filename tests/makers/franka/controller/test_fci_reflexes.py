@@ -129,13 +129,71 @@ def test_a_motion_bridges_nineteen_lost_cycles_with_constant_acceleration(robot:
     seen: list[list[RobotState]] = []
 
     def lost(k: int) -> None:
-        if k == 290:  # Around the farthest place, where the acceleration changes least.
+        if k == 295:  # Around the farthest place: a path that changes its acceleration more is a discontinuity.
             seen.append(lose(place, 19))
 
     assert by_time(robot, lost).status == "success"
     acceleration = [state.ddq_c[3] for state in seen[0]]
     assert acceleration == pytest.approx([acceleration[0]] * 19, abs=1e-6)
     assert acceleration[0] < -1.0
+
+
+STEADY = 3.0  # [rad/s^2] Acceleration of joint 1 before cycles are lost.
+
+
+@pytest.mark.parametrize("lost", [1, 3, 10])
+@pytest.mark.parametrize(("share", "errors"), [(0.9, ()), (1.01, (14,)), (2.5, (14,))])
+def test_after_lost_cycles_the_next_angles_are_judged_from_those_of_the_state(
+    robot: Robot, place: FciArena, lost: int, share: float, errors: tuple[int, ...]
+) -> None:
+    limits = place.controller.model.limits.joint
+    size = share * float(limits.acceleration[0])
+    jerk = (15,) if size - STEADY > 1e-3 * limits.jerk[0] else ()
+    start = state = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    velocity = angle = 0.0
+    for acceleration in [0.0, 1.0, 2.0] + [STEADY] * 20:
+        velocity += 1e-3 * acceleration
+        angle += 1e-3 * velocity
+        robot.answer(state, Output(q=programs.with_offset(start.q_d, 0, angle)))
+        state = robot.state()
+    place.between(lambda: [place.controller.step() for _ in range(lost)])
+    before, state = state.message_id, robot.state()
+    for _ in range(state.message_id - before):
+        velocity += 1e-3 * STEADY
+        angle += 1e-3 * velocity
+    assert state.q_d[0] - start.q_d[0] == pytest.approx(angle, abs=1e-6)
+    ended = robot.play(state, [Output(q=programs.with_offset(start.q_d, 0, angle + 1e-3 * (velocity + 1e-3 * size)))])
+    assert ended.state.errors[: len((*errors, *jerk))] == tuple(ERROR_NAMES[n] for n in (*errors, *jerk))
+
+
+@pytest.mark.parametrize("lost", [0, 1, 10])
+@pytest.mark.parametrize(("step", "errors"), [(0.9, ()), (1.5, (32,))])
+def test_after_lost_cycles_a_torque_may_change_by_no_more_than_in_one_cycle(
+    robot: Robot, place: FciArena, lost: int, step: float, errors: tuple[int, ...]
+) -> None:
+    generator = wire.NONE if robot.version == 10 else wire.JOINT_VELOCITY
+    state = robot.move(wire.EXTERNAL, generator)
+    for _ in range(5):
+        robot.answer(state, Output(dq=programs.ZERO, tau=programs.ZERO))
+        state = robot.state()
+    place.between(lambda: [place.controller.step() for _ in range(lost)])
+    ending = robot.play(robot.state(), [Output(dq=programs.ZERO, tau=(0.0,) * 6 + (step,))])
+    assert ending.state.errors == tuple(ERROR_NAMES[n] for n in errors)
+
+
+@pytest.mark.parametrize(("share", "errors"), [(0.3, ()), (1.5, (20,))])
+def test_after_lost_cycles_the_next_pose_is_judged_from_that_of_the_state(
+    robot: Robot, place: FciArena, share: float, errors: tuple[int, ...]
+) -> None:
+    start = state = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)
+    for _ in range(5):
+        robot.answer(state, Output(pose=start.O_T_EE_c))
+        state = robot.state()
+    place.between(lambda: [place.controller.step() for _ in range(3)])
+    off = share * float(place.controller.model.limits.cartesian.translation_jerk) * 1e-9
+    ending = robot.play(robot.state(), [Output(pose=programs.with_offset(start.O_T_EE_c, 14, off))])
+    assert set(ending.state.errors) >= {ERROR_NAMES[n] for n in errors}
+    assert bool(ending.state.errors) == bool(errors)
 
 
 def test_twenty_lost_cycles_in_a_row_end_a_motion(robot: Robot, place: FciArena) -> None:

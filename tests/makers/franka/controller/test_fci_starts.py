@@ -1,0 +1,70 @@
+"""The first command of a motion: a step that the jerk bounds allow is no error, as `rcilab.check` finds, too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rcilab.conformance.check import check
+from rcilab.model.robot_model import load_model
+from rcilab.motion import Motion
+from tests.makers.franka.controller.test_fci_errors import recover
+from tests.peers.franka import programs, wire
+from tests.peers.franka.arena import MODELS, FciArena
+from tests.peers.franka.faults import columns
+from tests.peers.franka.robot import Output, Robot
+from tests.peers.franka.wire import ERROR_NAMES
+
+CYCLE = 0.001  # [s]
+
+
+def path(jerk: float) -> np.ndarray:
+    """Returns a short path with a constant jerk in either direction, from rest to rest."""
+    rates = np.concatenate(([jerk, -jerk, -jerk, jerk], np.zeros(4)))
+    return np.cumsum(np.cumsum(np.cumsum(rates))) * CYCLE**3
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.99])
+@pytest.mark.parametrize("joint", [1, 6])
+def test_a_motion_that_begins_with_its_largest_jerk_is_followed(
+    robot: Robot, place: FciArena, joint: int, share: float
+) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    home, jerk = place.controller.model.home, float(place.controller.model.limits.joint.jerk[joint])
+    rows = np.tile(home, (8, 1))
+    rows[:, joint] += path(share * jerk)
+    assert check(Motion.from_cycles(rows), load_model(MODELS[robot.version]), start=home, distance=None).ok
+    ending = robot.play(start, [Output(q=tuple(row)) for row in rows.tolist()])
+    assert (ending.status, ending.state.errors) == ("success", ())
+
+
+@pytest.mark.parametrize(("share", "errors"), [(0.7, (15,)), (1.05, (11,))])
+def test_a_first_step_that_ends_at_once_and_a_larger_one_are_errors(
+    robot: Robot, place: FciArena, share: float, errors: tuple[int, ...]
+) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.JOINT_POSITION)
+    home, jerk = place.controller.model.home, float(place.controller.model.limits.joint.jerk[6])
+    rows = np.tile(home, (5, 1))
+    rows[:, 6] += share * jerk * CYCLE**3
+    found = {v.fault for v in check(Motion.from_cycles(rows), load_model(MODELS[robot.version]), start=home).violations}
+    ending = robot.play(start, [Output(q=tuple(row)) for row in rows.tolist()])
+    assert ending.state.errors == tuple(ERROR_NAMES[n] for n in errors)
+    assert {f.manual_name for f in found if f is not None} >= set(ending.state.errors)
+    recover(robot, ending.state.errors)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25])
+def test_a_tool_that_begins_with_a_step_is_followed(robot: Robot, place: FciArena, share: float) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)
+    jerk = place.controller.model.limits.cartesian.translation_jerk
+    poses = [programs.with_offset(start.O_T_EE_c, 14, off) for off in path(share * jerk).tolist()]
+    ending = robot.play(start, [Output(pose=pose) for pose in poses])
+    assert (ending.status, ending.state.errors) == ("success", ())
+
+
+def test_an_orientation_that_is_a_rotation_within_its_tolerance_may_begin_a_motion(robot: Robot) -> None:
+    start = robot.move(wire.JOINT_IMPEDANCE, wire.CARTESIAN_POSE)
+    T = np.reshape(start.O_T_EE_c, (4, 4)).T.copy()
+    T[:3, 0] *= 1.0 + 9e-6
+    ending = robot.play(start, [Output(pose=columns(T))] * 20)
+    assert (ending.status, ending.state.errors) == ("success", ())
