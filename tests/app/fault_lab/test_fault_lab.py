@@ -56,7 +56,8 @@ def test_the_errors_of_franka_come_one_at_a_time_with_their_reason_and_the_arm_m
     with fault_lab.FaultLab(arm) as lab:
         for fault in lab.faults:
             demo = lab.provoke(fault)
-            assert demo.reported == (fault,)
+            is_of_tool = 17 <= fault <= 20  # Those of the joints that the pose needs come with it.
+            assert fault in demo.reported if is_of_tool else demo.reported == (fault,)
             assert demo.condition.fault is fault
             lower, upper, inside = demo.signal.lower[:-1], demo.signal.upper[:-1], demo.signal.values[:-1]
             assert ((lower < inside) & (inside < upper)).all(), fault

@@ -181,7 +181,7 @@ def test_after_lost_cycles_a_torque_may_change_by_no_more_than_in_one_cycle(
     assert ending.state.errors == tuple(ERROR_NAMES[n] for n in errors)
 
 
-@pytest.mark.parametrize(("share", "errors"), [(0.3, ()), (1.5, (20,))])
+@pytest.mark.parametrize(("share", "errors"), [(0.15, ()), (1.5, (20,))])
 def test_after_lost_cycles_the_next_pose_is_judged_from_that_of_the_state(
     robot: Robot, place: FciArena, share: float, errors: tuple[int, ...]
 ) -> None:
