@@ -139,6 +139,13 @@ def _check(subject: _Subject, args: Namespace, show_note: Callable[[str], None])
     return report, check(motion, model, start=start, box=box, mode=mode)
 
 
+_COMMAND_COLUMN, _LONGEST_HEADER = b"command[1]", 65536
+_RUN_NOTE = (
+    "the file is the table of a recorded run: its measured angles q are checked, without tool, load and box; the "
+    ".rcirun file has the commands and all of these"
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Subject:
     """What is checked, and for which arm."""
@@ -174,7 +181,16 @@ def _read_motion(args: Namespace) -> _Subject:
         if found.n != model.n and args.file.suffix.lower() == ".csv":
             problem = f"has {found.n} joints after the time, {model.name} has {model.n}; is there a column t [s]?"
             raise InvalidValueError("motion file", args.file.name, problem)
-    return _Subject(found=found, model=model, box=box, mode=args.mode or "joint_position")
+    mode = args.mode or "joint_position"
+    return _Subject(found=found, model=model, box=box, mode=mode, note=_RUN_NOTE if _is_run_table(args.file) else "")
+
+
+def _is_run_table(path: Path) -> bool:
+    """Returns whether a file is the table of a run, as `Run.save` writes it, which has more than its commands."""
+    if path.suffix.lower() != ".csv":
+        return False
+    with path.open("rb") as file:
+        return _COMMAND_COLUMN in file.readline(_LONGEST_HEADER)
 
 
 def _read_run(args: Namespace) -> _Subject:

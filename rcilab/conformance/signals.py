@@ -83,7 +83,7 @@ class MotionSignals:
         self._box = box
         self._distance = distance
         self._mode: Mode = mode
-        hold = HOLD_SAMPLES if record is None else max(HOLD_SAMPLES - len(motion.q), 0)
+        hold = HOLD_SAMPLES if record is None else 0
         self._differences = _backward_differences(motion.q, start, hold)
         self.is_off_start = bool(np.abs(motion.start - start.q).max() > START_POSITION_TOLERANCE)
 
@@ -181,7 +181,7 @@ class MotionSignals:
             return tau, np.diff(tau, axis=0, prepend=before) / CYCLE_TIME
         q, dq, _, jerk = self._differences
         joint, smooth = self._model.limits.joint, 0.0 if self._mode == "torque" else _SMOOTH_RATE
-        places = q[:: len(q) // 2]  # Start, middle and end; the greatest inertia counts.
+        places = q[:: max(len(q) // 2, 1)]  # Start, middle and end; the greatest inertia counts.
         inertia = np.max([np.abs(self._model.rigid_body.mass_matrix(place)) for place in places], axis=0)
         weights = (inertia / joint.torque_rate[:, None]).max(axis=0)  # Of a joint's jerk, in the rate of any joint.
         change = np.einsum("j,jn->n", weights, np.abs(jerk.T))  # Not by BLAS, whose threads take longer to start.
@@ -208,7 +208,8 @@ class MotionSignals:
     def _end_values(self, condition: Condition) -> Array:
         """Returns velocity or acceleration at an end of the motion, shape (1, n) or (1, 1)."""
         values = self._throughout(condition)
-        row = min(len(self._motion), len(values)) - 1 if condition.stage == "end" else condition.order
+        row = len(self._motion) - 1 if condition.stage == "end" else condition.order
+        row = min(row, len(values) - 1)
         return values[row : row + 1]
 
 

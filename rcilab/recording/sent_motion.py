@@ -86,7 +86,7 @@ def read_sent(run: Run) -> SentCommands:
     if not len(rows):
         has_torques = np.isfinite(cycles["command_tau"]).any()
         what = "torques were sent, which have no path" if has_torques else "nothing was sent"
-        raise UsageError(f"in this run {what}: only joint angles and poses of the tool can be checked")
+        raise _empty(run, f"in this run {what}: only joint angles and poses of the tool can be checked")
     q = _angles_of_poses(run, rows) if of_poses else _finite(cycles["command"][rows])
     was_refused = len(q) < len(rows)
     if not len(q):
@@ -193,13 +193,19 @@ def sent_torques(run: Run) -> tuple[Motion, Array]:
             is_sent[sources[played <= max(faulty[0], played[0])].max() + 1 :] = False
     sent = rows[is_sent]
     if not len(sent):
-        raise UsageError("in this run no torques were sent")
+        raise _empty(run, "in this run no torques were sent")
     last = max(sent["t"][-1:].tolist() + rows["t"][faulty].tolist())
     grid = sent["t"][0] + CYCLE_TIME * np.arange(round((last - sent["t"][0]) / CYCLE_TIME) + 1)
     q = np.stack([np.interp(grid, rows["t"], column) for column in rows["q"].T], axis=1)
     lost = round((sent["t"][-1] - sent["t"][0]) / CYCLE_TIME) + 1 - len(sent) if run.has_playout else 0
     motion = replace(Motion.from_cycles(q), notes=_note_missing(lost))
     return motion, np.stack([np.interp(grid, sent["t"], column) for column in _finite(sent["command_tau"]).T], axis=1)
+
+
+def _empty(run: Run, otherwise: str) -> UsageError:
+    """Returns the error for a run without commands."""
+    is_lost = not (len(run.cycles) or run.is_complete)
+    return UsageError(f"there are no cycles in this run: {run.missing_end}" if is_lost else otherwise)
 
 
 def _explain_stop(report: Report, run: Run) -> Report:

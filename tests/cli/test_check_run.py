@@ -210,6 +210,40 @@ def test_a_jump_at_the_end_of_a_run_is_a_violation_and_no_stop_is_written(tmp_pa
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 1
 
 
+def test_a_run_refused_at_its_second_command_is_judged_by_its_two_commands(tmp_path, capsys):
+    """Their jerk is that of one jump; commands that stayed there would have twice as much, the other way."""
+    jump = 1e-4  # [rad]
+    cycles = some_cycles()[:2].copy()
+    cycles["command"] = MODEL.home
+    cycles["command"][1, 1] += jump
+    cycles["q_c"] = MODEL.home
+    run_of(cycles, stopped="joint 2: jump").save(tmp_path / "a.rcirun")
+    code, report = report_of(capsys, str(tmp_path / "a.rcirun"))
+    assert code == 1
+    assert row(report, "joint.jerk")["value"] == pytest.approx(jump / 1e-9)
+    assert all(violation["worst_time"] < 0.0015 for violation in report["violations"])
+
+
+def test_of_a_run_whose_file_is_damaged_before_its_first_cycles_this_is_said(tmp_path, capsys):
+    file = tmp_path / "a.rcirun"
+    some_run().save(file)
+    content = file.read_bytes()
+    whole = len(content)
+    place = whole // 2
+    file.write_bytes(content[:place] + bytes(4 * [255]) + content[place + 4 :])
+    assert main(["check", str(file)]) == 2
+    assert "there are no cycles in this run: the rest of its file is damaged" in capsys.readouterr().err
+
+
+def test_of_the_table_of_a_run_it_is_said_what_is_checked(tmp_path, capsys):
+    some_run().save(tmp_path / "a.csv")
+    main(["check", str(tmp_path / "a.csv"), "--model", MODEL.name])
+    assert "its measured angles q are checked, without tool, load and box" in capsys.readouterr().out
+    Motion.from_cycles(PLAN.q).save(tmp_path / "b.csv")
+    main(["check", str(tmp_path / "b.csv"), "--model", MODEL.name])
+    assert "measured" not in capsys.readouterr().out
+
+
 def test_a_slowed_run_ends_at_standstill(tmp_path, capsys):
     run_of(some_cycles()[:300], stopped="an emergency stop was pressed").save(tmp_path / "a.rcirun")
     assert main(["check", str(tmp_path / "a.rcirun"), "--slow-down", str(tmp_path / "b.npz")]) == 0
