@@ -342,4 +342,4 @@ def _terms(full: Array, bias: Array, gravity: Array) -> TorqueTerms:
 
 def _newton_euler(model: pin.Model, q: JointPath, dq: JointPath, ddq: JointPath) -> JointPath:
     columns = (np.asfortranarray(table.T) for table in (q, dq, ddq))
-    return pin.rneaInParallel(1, pin.ModelPool(model, 1), *columns).T
+    return pin.rneaInParallel(1, pin.ModelPool(model, 1), *columns).T.reshape(q.shape)  # (n,) for one row.
