@@ -15,7 +15,7 @@ def test_a_soft_motion_is_held_gone_on_with_and_a_spoiled_network_is_noticed(hea
     page.unfold("Mode")
     choose(page, "Control mode", "joint impedance")
     page.wait(lambda: page.state.drive.mode == "joint_impedance", "the mode")
-    field = page.tab.get_by_text("Joint stiffness").first
+    field = page.tab.get_by_text("Joint stiffness [").first
     assert "N·m/rad" in field.inner_text()
     page.wait(lambda: page.button("Execute").is_enabled(), "Execute to be pressable")
     page.button("Execute").click()
