@@ -282,6 +282,7 @@ def build_frame(
     joint: int,
     buckets: int = 240,
     factor: float = math.degrees(1.0),
+    last: float | None = None,
 ) -> Frame:
     """Returns the content of a plot of one quantity of the joints.
 
@@ -294,6 +295,7 @@ def build_frame(
             0 in the middle, for q).
         buckets: Number of time buckets.
         factor: Factor from the SI unit to the unit shown; to degrees by default.
+        last: End of what the plots beside it show, [s]; None: that of these curves.
     """
     if quantity == "q" and plan is not None:  # As in `check`: a motion that starts outside may move back inside.
         limits = range_from(limits, plan.values[0], RECOVERY_RANGE)
@@ -316,16 +318,21 @@ def build_frame(
         return factor * np.stack([side[:, joint - 1] for side in bounds(curves)], axis=1)
 
     lower, upper = (factor * float(low[joint - 1]), factor * float(high[joint - 1])) if joint else (-100.0, 100.0)
-    frame = _frame(plan, actual, shown, lower, upper, buckets)
+    frame = _frame(plan, actual, shown, lower, upper, buckets, last)
     if not (is_curved and joint):
         return frame
     drawn = plan if plan is not None else actual
-    used = _frame(plan, actual, lambda curves: usage(curves)[:, joint - 1 : joint], -100.0, 100.0, buckets)
+    used = _frame(plan, actual, lambda curves: usage(curves)[:, joint - 1 : joint], -100.0, 100.0, buckets, last)
     return replace(frame, violated=used.violated, **_limit_curves(drawn, edges, frame))
 
 
 def build_tool_frame(
-    plan: Curves | None, actual: Curves | None, limit: float | None, factor: float, buckets: int = 240
+    plan: Curves | None,
+    actual: Curves | None,
+    limit: float | None,
+    factor: float,
+    buckets: int = 240,
+    last: float | None = None,
 ) -> Frame:
     """Returns the content of a plot of a signal of the tool or the elbow.
 
@@ -335,9 +342,10 @@ def build_tool_frame(
         limit: Limit, in the unit of the curves; None without one.
         factor: Factor from the SI unit to the unit shown.
         buckets: Number of time buckets.
+        last: End of what the plots beside it show, [s]; None: that of these curves.
     """
     upper = np.nan if limit is None else factor * limit
-    return _frame(plan, actual, lambda curves: factor * curves.values, np.nan, upper, buckets)
+    return _frame(plan, actual, lambda curves: factor * curves.values, np.nan, upper, buckets, last)
 
 
 def _limit_curves(curves: Curves | None, edges: Callable[[Curves], Array], frame: Frame) -> dict[str, Array]:
@@ -356,8 +364,9 @@ def _frame(
     lower: float,
     upper: float,
     buckets: int,
+    last: float | None,
 ) -> Frame:
-    edges, t = _time_axis(last_time(plan, actual), buckets)
+    edges, t = _time_axis(last_time(plan, actual) if last is None else last, buckets)
 
     def thin(curves: Curves | None) -> tuple[Array, ...]:
         if curves is None or not len(curves.t):

@@ -9,7 +9,9 @@ import socket
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -28,12 +30,14 @@ from rcilab.app.setup.configuration_state import pending_parts
 from rcilab.app.setup.setup_actions import SetupActions
 from rcilab.app.store import Store, UiState
 from rcilab.app.text import Text
+from rcilab.app.view_actions import PLOTS
 from rcilab.core.errors import ConnectionLostError, InvalidValueError, ProtocolError, UsageError
 from rcilab.core.safety_box import SafetyBox
 from rcilab.core.spatial import Pose
 from rcilab.core.state import RobotMode
 from rcilab.execution.simulation_control import SimulationControl, parse_simulation_port
 from rcilab.model.dynamics.payload import Payload
+from rcilab.motion import Motion
 from rcilab.recording.client_motions import ClientMotions, MotionPart
 from rcilab.sim.api import NetworkFaults, WorldStatus, decode_world_answer, encode_world_answer
 from rcilab.workbench.app import Workbench, WorkbenchConfig
@@ -399,6 +403,28 @@ def test_curves_show_the_soft_limits_of_their_motion(place: Arena, watching) -> 
         state = dataclasses.replace(state, plot_joint=1)
         frame = Plots(Text("en"))._joint_frame(state, "q", 1.0)
         assert (np.unique(frame.lower).tolist(), np.unique(frame.upper).tolist()) == ([-2.0], [2.0])
+
+
+def test_all_plots_have_one_time_axis_when_the_recording_ends_after_the_commands(place: Arena, watching) -> None:
+    """Acceleration and jerk end with the commands, the others with the recording, beyond the next round number."""
+    store, actions, _ = watching
+    with place.connect() as robot:
+        programs.prepare(robot, NEAR, factor=1.0)
+        programs.line(robot, SECONDS, period=SECONDS)
+        wait_for(lambda: (actions.tick(), getattr(store.state.recording, "tracking", None) is not None)[1])
+    plan = store.state.plan
+    assert plan is not None
+    plan = dataclasses.replace(plan, motion=Motion.from_cycles(plan.motion.q[:501]))
+    state = dataclasses.replace(store.state, plan=plan, plots=frozenset(PLOTS))
+    gui = Mock()
+    gui.add_uplot.side_effect = lambda *_, **facts: SimpleNamespace(data=(), series=(), **facts)
+    plots = Plots(Text("en"))
+    plots.build(gui, state)
+    plots.show(state)
+    ranges = {name: plot.scales["x"]["range"] for name, plot in plots._plots.items() if plot.visible}
+    assert {"dq", "ddq", "error", "tool"} <= set(ranges)
+    assert set(ranges.values()) == {(0.0, plots.end)}
+    assert plots.end > plan.motion.duration
 
 
 @pytest.mark.parametrize(("address", "error"), [("x", InvalidValueError), ("127.0.0.2:1", ConnectionLostError)])

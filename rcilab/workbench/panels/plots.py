@@ -60,6 +60,7 @@ class Plots:
         self._plan: object = None
         self._streamed: JointPath | None = None  # The plan as it was run at another speed override.
         self._above = 0
+        self._last = 1.0  # [s] End of everything that is drawn.
         self.end = 1.0
         """End of the time axis, [s]."""
 
@@ -113,7 +114,7 @@ class Plots:
         now = time.monotonic()
         if wanted != self._drawn and now >= self._next:
             began = time.thread_time()  # A busy machine draws slowly, not rarely.
-            self._drawn = wanted
+            self._drawn, self._last = wanted, _last(state)
             for name in visible:
                 self._draw(state, name)
             has_actual = state.recording is not None
@@ -161,8 +162,7 @@ class Plots:
         else:
             frame = self._joint_frame(state, cast("Quantity", name), factor)
             unit = unit if joint else self._text("plot.percent")
-        if name not in ERRORS:
-            self.end = frame.end
+        self.end = frame.end
         if state.recording is not None and state.recording.moment is not None:
             frame = mark_moment(frame, state.recording.moment - state.recording.delay * CYCLE_TIME)
         title = self._text(f"plot.{name}") + (f" · J{joint}" if joint else "") + f" [{unit}]"
@@ -195,7 +195,9 @@ class Plots:
             if name in ("ddq", "jerk"):
                 actual = _commanded_part(actual, state)
         model = plan.model if plan is not None and plan.is_recorded else state.model  # With the limits of its time.
-        return build_frame(self._planned.get(name), actual, model.limits.joint, name, state.plot_joint, factor=factor)
+        return build_frame(
+            self._planned.get(name), actual, model.limits.joint, name, state.plot_joint, factor=factor, last=self._last
+        )
 
     def _tool_frame(self, state: UiState, name: ToolQuantity, factor: float) -> Frame:
         path, recording, actual = played_path(state), state.recording, None
@@ -206,7 +208,8 @@ class Plots:
             actual = tool_curves(state.model, _times(recording), q, name)
             if name == "acceleration":
                 actual = _commanded_part(actual, state)
-        return build_tool_frame(self._planned.get(name), actual, tool_limit(state.model.limits, name), factor)
+        limit = tool_limit(state.model.limits, name)
+        return build_tool_frame(self._planned.get(name), actual, limit, factor, last=self._last)
 
     def _error_frame(self, state: UiState, name: str, scale: PlotScale) -> Frame:
         """Returns measured minus planned values of a finished motion: of the joints, or of the tool."""
@@ -214,11 +217,9 @@ class Plots:
         assert recording is not None
         assert recording.tracking is not None
         t, tracking = _times(recording), recording.tracking
-        path = played_path(state)
-        last = last_time(None if path is None else Curves(t=path[0], values=path[1]), Curves(t=t, values=t))
         errors = tracking.joint if not joint else tracking.joint[:, joint - 1 : joint]
         errors = tracking.position[:, None] if name == "tool" else errors
-        return build_error_frame(t, scale.factor * errors, last, scale.least)
+        return build_error_frame(t, scale.factor * errors, self._last, scale.least)
 
     def _height(self, state: UiState, rows: int) -> int:
         """Returns the height of each plot, [px]."""
@@ -246,6 +247,15 @@ def _commanded_part(actual: Curves, state: UiState) -> Curves:
         return actual
     count = int(np.searchsorted(actual.t, plan.motion.duration + CYCLE_TIME / 2.0))
     return Curves(t=actual.t[:count], values=actual.values[:count])
+
+
+def _last(state: UiState) -> float:
+    """Returns the end of plan and recording, [s]: one time axis for all plots, whatever each of them shows."""
+    path, recording = played_path(state), state.recording
+    times = [] if path is None else [path[0]]
+    if recording is not None:
+        times.append(_times(recording))
+    return last_time(*(Curves(t=t, values=t) for t in times))
 
 
 def _times(recording: Recording) -> Any:
