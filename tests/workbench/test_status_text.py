@@ -205,6 +205,15 @@ def test_the_bar_and_the_reason_on_run_speak_of_the_same_death():
 
 
 @pytest.mark.parametrize(
+    ("watched", "pages", "label"), [("", (1,), True), ("rci://it", (1,), False), ("rci://it", (1, 2), True)]
+)
+def test_a_single_page_that_watches_is_never_offered_the_controls(watched: str, pages: tuple[int, ...], label: bool):
+    """Also while it is silent on a busy machine, so that no page has them."""
+    state = replace(initial_state(), watched=watched, control_lock=ControlLock(pages))
+    assert bool(status_values(state, status(), Text("en"), 1.0)["take"]) == label
+
+
+@pytest.mark.parametrize(
     ("language", "holder", "note"),
     [("en", "its client", "this page moves no robot"), ("zh", "其客户端", "本页不驱动任何机器人")],
 )

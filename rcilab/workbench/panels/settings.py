@@ -76,7 +76,8 @@ class SettingsPanel:
         for choice, chosen in self._choices:
             choice.show(chosen(state))
         self._take.label = text("control_lock.take" if lock.holder is None else "control_lock.ask")
-        self._take.disabled = lock.holder is not None and len(lock.pages) < 2  # There is no other page to ask.
+        is_needless = lock.holder is not None or bool(state.watched)
+        self._take.disabled = is_needless and len(lock.pages) < 2  # There is no other page to ask.
         who = text("settings.free" if lock.holder is None else "settings.alone")
         if lock.holder is not None and len(lock.pages) > 1:
             who = text("settings.who", holder=lock.number(lock.holder), pages=len(lock.pages))

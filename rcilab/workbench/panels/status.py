@@ -46,7 +46,7 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         "theme": state.theme,
         "viser": text("bar.viser"),
         "holder": state.control_lock.holder,
-        "take": text("control_lock.take" if state.control_lock.holder is None else "control_lock.ask"),
+        "take": _take_label(state, text),
         "question": _question(state, text),
     }
     values["notices"] = [
@@ -54,6 +54,13 @@ def status_values(state: UiState, status: SupervisorStatus, text: Text, cursor_e
         for notice in state.notices
     ]
     return values
+
+
+def _take_label(state: UiState, text: Text) -> str:
+    """Returns the label of the button for the controls; "" hides it: to watch alone there is nothing to take."""
+    if state.watched and len(state.control_lock.pages) < 2:
+        return ""
+    return text("control_lock.take" if state.control_lock.holder is None else "control_lock.ask")
 
 
 def _target_name(state: UiState, text: Text) -> str:
