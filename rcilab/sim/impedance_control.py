@@ -3,7 +3,7 @@
 Both laws are computed from measurement and model alone and act through `Drive.TORQUE`, where gravity and friction are
 compensated already, so M ddq + C dq = tau + J^T w. They give
 
-    tau = springs + dampers + M ddq_c + C dq
+    tau = springs + dampers + M ddq_c + C dq + (damping of the drives) dq_c
 
 so that a free arm follows its reference, except for effects of the 1 ms step and the soft spring of the elbow, and an
 external force deflects it by force over stiffness. Every mode is damped with `DAMPING_RATIO` of critical, see
@@ -55,7 +55,7 @@ def joint_impedance(
         lambda: design_damping(body.mass_inverse(q), np.diag(K)), K * (q_c - q), dq_c - dq
     )
     tau += body.motion_torque(q, dq, ddq_c)
-    return tau
+    return tau if model.description.damping is None else tau + model.description.damping * dq_c
 
 
 def cartesian_impedance(
@@ -103,7 +103,7 @@ def cartesian_impedance(
         lambda: design_damping(terms.mass_inverse, along.T * stiffness6 @ along), along.T.dot(wrench), dq_c - dq
     )
     tau += body.motion_torque(q, dq, ddq_c)
-    return tau
+    return tau if model.description.damping is None else tau + model.description.damping * dq_c
 
 
 def _pose_error(T_c: Pose, T: Pose) -> tuple[float, ...]:
