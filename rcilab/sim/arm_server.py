@@ -211,12 +211,15 @@ class ArmServer:
         settings = {
             "prefill": config.prefill_cycles,
             "lost_limit": config.lost_limit,
-            "on_loss": config.on_loss,
             "realism": config.realism,
             "force_sign": config.force_sign,
             "lockstep": config.lockstep,
         }
-        self._capture = CycleCapture(self.ring, controller, lambda: {**settings, "limit_table": controller.limit_table})
+        self._capture = CycleCapture(
+            self.ring,
+            controller,
+            lambda: {**settings, "on_loss": controller.arm.on_loss, "limit_table": controller.limit_table},
+        )
 
     def _open_simulation_port(self) -> SimulationPort | None:
         if self.config.world_port is None:

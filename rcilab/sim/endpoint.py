@@ -326,6 +326,8 @@ class Endpoint:
             data = sock.recv(_FRAME_BYTES_AT_ONCE)
         except BlockingIOError:
             return
+        except ConnectionResetError:  # It was closed with states unread.
+            data = b""
         except OSError as error:
             self.drop(connection.peer, f"lost the connection ({error.strerror})")
             return
