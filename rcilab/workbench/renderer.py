@@ -87,6 +87,8 @@ _TABS = (
     ("tab.settings", "settings", SettingsPanel, ExtrasPanel, RunsFolderPanel),
 )
 
+_RUN = next(number for number, (label, *_) in enumerate(_TABS) if label == "tab.run")
+
 
 def tab_name(index: int) -> str:
     """Returns the key of a tab's label, counted from 0; "" for an unknown tab."""
@@ -182,7 +184,8 @@ class Renderer:
         is_whole = not self._can_wait(state, status)
         if is_whole:
             self._show_panels(state, seen, status)
-        self._live.publish(**status_values(seen, status, self._text, self._timeline.end))
+        first = _RUN if state.watched else 0  # The tab of a page that opens.
+        self._live.publish(**status_values(seen, status, self._text, self._timeline.end), tab=first)
         return is_whole
 
     def _can_wait(self, state: UiState, status: SupervisorStatus) -> bool:

@@ -28,6 +28,7 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             tab.wait_for_function("() => !!window.__viserMutable?.nodeRefFromName?.['/live']", timeout=40_000)
             close_toasts(tab)
+            page.wait(lambda: "Run" in tab.locator('[role="tab"][aria-selected="true"]').all_inner_texts(), "the Run tab")
             with controller.connect() as robot:
                 programs.prepare(robot, NEAR, factor=1.0)
                 page.wait(lambda: "Motion 1 of 127.0.0.1 has ended" in toast(tab), "the end of the motion")
@@ -36,7 +37,6 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
                 page.wait(lambda: page.chip("phase") == "watched", "the state in the bar")
             assert bench.store.state.plan is not None
             assert bench.store.state.plan.report.ok
-            page.open_tab("Run")
             text = tab.locator(".rl-note:visible").first.inner_text()
             assert text.startswith("This page only watches rci://127.0.0.2:")
             assert page.button("Execute").is_disabled()

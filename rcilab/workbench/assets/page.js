@@ -247,13 +247,14 @@
   const size = () => { if (acts()) send({ kind: "size", height: window.innerHeight }); };
   window.addEventListener("resize", () => { size(); place(); });
 
-  // A page that is loaded anew opens the tab that was open.
+  // A page that is loaded anew opens the tab that was open, a new one the tab that the server names.
   let shown = null;
   const keepTab = () => {
     const lists = [...document.querySelectorAll('[role="tablist"]')];
     const list = lists.sort((a, b) => b.children.length - a.children.length)[0];
     const found = list ? [...list.querySelectorAll('[role="tab"]')] : [];
-    const before = Number(recall("tab")) || 0;
+    const before = Number(recall("tab") ?? said.tab) || 0;
+    if (said.tab === undefined) return;
     if (found.length < 4 || (shown === null && found.length <= before)) return;  // They come one by one.
     if (shown === null) document.documentElement.dataset.rlReady = "";
     const open = Math.max(0, found.findIndex((tab) => tab.getAttribute("aria-selected") === "true"));
