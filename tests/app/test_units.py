@@ -48,7 +48,9 @@ def test_numbers_of_the_text_itself_are_said_in_the_units_of_the_page():
 def test_several_numbers_and_ranges_have_one_unit():
     ranges = ((math.radians(-10.0), math.radians(20.0)), (0.0, math.radians(5.0)))
     assert Text("en")("setup.joints_are", ranges=ranges) == "-10…20, 0…5°"
-    assert Text("en")("setup.box_on", x=0.06, y=1.2, z=0.5) == "on, 60 × 1200 × 500 mm"
+    assert Text("en")("setup.box_on", x=0.06, y=1.2, z=0.5, center=(0.0, 0.0, 0.9)) == (
+        "on, 60 × 1200 × 500 mm, centre 0, 0, 900 mm"
+    )
 
 
 @pytest.mark.parametrize(

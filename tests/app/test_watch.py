@@ -306,7 +306,7 @@ def test_a_page_shows_the_setup_of_its_controller_from_the_beginning_and_follows
         assert state.model.load.mass == 1.5
         assert state.model.limits.joint.upper.tolist() == [2.0, *own.upper[1:]]
         table = setup_table(store, controller)
-        for value in ("0, 0, 120 mm", "1.50 kg", "on, 2000 × 2000 × 2000 mm", "-115…115"):
+        for value in ("0, 0, 120 mm", "1.50 kg", "on, 2000 × 2000 × 2000 mm, centre 0, 0, 900 mm", "-115…115"):
             assert value in table, value
         before = state.setup
         follow(place, store, actions)

@@ -28,7 +28,8 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             tab.goto(f"{bench.url}?fixedDpr=0.2")
             tab.wait_for_function("() => !!window.__viserMutable?.nodeRefFromName?.['/live']", timeout=40_000)
             close_toasts(tab)
-            page.wait(lambda: "Run" in tab.locator('[role="tab"][aria-selected="true"]').all_inner_texts(), "the Run tab")
+            opened = tab.locator('[role="tab"][aria-selected="true"]')
+            page.wait(lambda: "Run" in opened.all_inner_texts(), "the Run tab")
             with controller.connect() as robot:
                 programs.prepare(robot, NEAR, factor=1.0)
                 page.wait(lambda: "Motion 1 of 127.0.0.1 has ended" in toast(tab), "the end of the motion")
@@ -50,7 +51,7 @@ def test_the_motion_of_a_foreign_client_is_followed(chromium, tmp_path) -> None:
             controller.process.terminate()
             page.wait(lambda: page.chip("phase") == "controller ended", "the end of the controller in the bar")
             page.wait(
-                lambda: "start rcilab watch" in tab.locator(".rl-note:visible").first.inner_text().replace("`", ""),
+                lambda: "start “rcilab watch”" in tab.locator(".rl-note:visible").first.inner_text(),
                 "what to do",
             )
             assert page.problems == []

@@ -145,7 +145,8 @@ def test_a_motion_out_of_the_box_is_refused_before_it_runs(bench, ask):
     assert not state.plan.report.ok
     assert "cartesian.position" in {violation.condition.id for violation in state.plan.report.violations}
     assert obstacle(state, bench.session.status()).code == "ready.violations"
-    assert "on, 120 × 120 × 120 mm" == Text("en").render(describe_held(bench.session.status(), "box"))
+    held = Text("en").render(describe_held(bench.session.status(), "box"))
+    assert held.startswith("on, 120 × 120 × 120 mm, centre ")
     target = next(panel for panel in bench.renderer._panels if isinstance(panel, TargetPanel))
     wait(lambda: "violated: Tool inside the safety box" in target._reach._shown, "the target's verdict to say so")
     wait(lambda: bench.renderer._stage._ribbon._beads > 0, "a bead where it is broken")

@@ -31,6 +31,11 @@ def test_every_language_has_the_same_keys_and_places_to_fill():
     require_equal(lambda language: load_ui_catalogue("rcilab.app", language), LANGUAGES)
 
 
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_no_text_of_the_page_has_the_marks_of_a_terminal(language: str):
+    assert [key for key, entry in load_ui_catalogue("rcilab.app", language).items() if "`" in entry] == []
+
+
 def test_no_key_of_the_page_is_also_a_shared_one():
     own, shared = (load_room_catalogue(package, "en").keys() for package in ("rcilab.app", "rcilab.i18n"))
     assert not own & shared, "said twice: page and shared"

@@ -140,7 +140,8 @@ def describe_part(setup: RobotConfiguration, part: str) -> Message:
         return message("setup.unset")
     if isinstance(value, SafetyBox):
         x, y, z = map(float, value.size)
-        return message("setup.box_on" if value.active else "setup.box_off", x=x, y=y, z=z)
+        center = _floats(value.T_base_box.position)
+        return message("setup.box_on" if value.active else "setup.box_off", x=x, y=y, z=z, center=center)
     if isinstance(value, Payload):
         center = _floats(value.center_of_mass)
         return message("setup.load_is" if value.mass else "setup.load_none", mass=f"{value.mass:.2f}", center=center)
