@@ -80,7 +80,7 @@ def cycle_dtype(n: int, *, complete: bool = False, playout: bool = False) -> np.
     queued                  commands left in the queue
     missed                  1: the motion was in progress and no command was there for this cycle
     late                    commands of this motion so far that came after their cycle and were dropped
-    command_number          number that the client gave its command; 0 without one
+    command_number          number that the client gave its command; that of the state without one
     command_dq              joint velocities sent, [rad/s], shape (n,); NaN when none were sent
     command_twist           velocity of the tool sent, base axes, shape (6,), [m/s, rad/s]; NaN when none was sent
     command_goal            joint angles sent as a goal to which the controller plans, [rad], shape (n,); NaN when none

@@ -182,7 +182,7 @@ class CycleCapture:
         motion = self._motion if self._is_moving else 0
         start = count % CAPACITY * self._size
         self._memory[start : start + self._size] = self._pack(
-            state, motion, played, age, len(playout), missed, playout.late, 0
+            state, motion, played, age, len(playout), missed, playout.late, number
         )
         self._rows.setdefault(number, count)
         self._rows.pop(number - _FARTHEST, None)
@@ -207,10 +207,11 @@ class CycleCapture:
         if row is not None and row < self._lowest and self._has_played:
             row = None  # It has begun to count again: the number is that of a state before the motion.
         if row is not None:
-            sent, answered = _STAMPS.unpack_from(self._memory, row % CAPACITY * self._size + self._stamps)
+            start = row % CAPACITY * self._size
+            sent, answered = _STAMPS.unpack_from(self._memory, start + self._stamps)
             lateness = 1e-9 * (now - sent)
             if not (answered or self._waiting):
-                self._add(row, now, lateness, command)
+                self._store(row, start, now, lateness, command)
                 return
         is_late = self._late > late
         if row in self._guests and not is_late:  # It is played, the other one not.
@@ -253,8 +254,12 @@ class CycleCapture:
     def _add(self, row: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
         """Adds a command to a row without one."""
         start = row % CAPACITY * self._size
-        _ANSWERED.pack_into(self._memory, start + self._stamps + 8, time_ns, lateness)
         _NUMBER.pack_into(self._memory, start + self._number, command.number)
+        self._store(row, start, time_ns, lateness, command)
+
+    def _store(self, row: int, start: int, time_ns: int, lateness: float, command: ArmCommand) -> None:
+        """Stores a command that has the number of its row, which begins at `start` in the memory."""
+        _ANSWERED.pack_into(self._memory, start + self._stamps + 8, time_ns, lateness)
         pack, offset, numbers_of = self._answer
         pack(self._memory, start + offset, *numbers_of(command))
         self._commands[id(command)] = row
