@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 import struct
 import sys
-import time
 from collections import deque
 from collections.abc import Callable
 from operator import attrgetter
+from time import monotonic_ns, time_ns
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ _POSES = ("T_base_tool", "T_base_tool_c")
 _OTHERS = (name for name in (*STATE_FIELDS, *OTHER_STATE_FIELDS) if name not in _POSES)
 _FIELDS = ("message_id", "success_rate", "q", "q_c", "dq", "tau", *_OTHERS)
 _ROWS = int(RingCounter.ROWS)
+_NAN = math.nan  # A global name is found faster.
 _RESERVE = 2048  # [rows] That are written before the next look at `has_room`, and those that may still change.
 _FARTHEST = 1024  # [rows] Whose commands may be added; then readers take the row.
 _LONGEST_QUEUE = 256  # Commands that may wait for a row: no queue of the arm is longer.
@@ -162,8 +163,7 @@ class CycleCapture:
     def write(self) -> None:
         """Writes the row of this cycle; call it after its state was sent."""
         state, playback, playout = self._controller.state, self._arm.playback, self._playout
-        is_followed = self._arm.is_following
-        is_following = playback is not None or is_followed
+        is_following = playback is not None or self._arm.is_following
         if is_following is not self._is_moving:
             self._follow_motion(state, is_following)
         count, number = self._count, state.message_id
@@ -193,17 +193,17 @@ class CycleCapture:
         elif self._waiting and (due := self._pop_due(count)) is not None:
             self._add(count, *due)
         self._counters[_ROWS] = count + 1
-        if is_following and not is_followed:  # The next motion may begin before the next cycle.
+        if playout.is_finished and not self._arm.is_following:  # The next motion may begin before the next cycle.
             self._follow_motion(state, is_following=False)
 
     def _take(self, command: ArmCommand) -> None:
         """Adds a command to the row of the state that it answers, or to the next one without a command."""
-        now = time.monotonic_ns()
+        now = monotonic_ns()
         if not self._received:
             self._answer = self._find_answer(self._arm.mode)
         self._received += 1
         late, self._late = self._late, self._playout.late
-        row, lateness = self._rows.get(command.number), math.nan
+        row, lateness = self._rows.get(command.number), _NAN
         if row is not None and row < self._lowest and self._has_played:
             row = None  # It has begun to count again: the number is that of a state before the motion.
         if row is not None:
@@ -317,7 +317,7 @@ class CycleCapture:
                 "row": self._count,
                 "mode": state.controller_mode.name.lower(),
                 "client": self._client,
-                "wall_ns": time.time_ns(),
+                "wall_ns": time_ns(),
                 "tool": arm.model.T_flange_tool.as_row_major(),
                 "load": [load.mass, load.center_of_mass.tolist(), load.inertia.tolist()],
                 "settings": {**describe_parameters(arm.parameters), **self._describe()},
@@ -362,7 +362,7 @@ class CycleCapture:
         ) = self._fields_of(state)  # fmt: skip
         tool, tool_c = self._arm.measured_state.tool, self._arm.tool_c  # Of this state, without its wrapping.
         parts: tuple[Any, ...] = (
-            _HEAD.pack(number, math.nan, time.monotonic_ns(), 0, math.nan, success_rate),
+            _HEAD.pack(number, _NAN, monotonic_ns(), 0, _NAN, success_rate),
             q, q_c, dq, self._no_joints, self._status, tau, self._no_answer,
             ext, ext_stiff, tool.matrix, theta, dq_c, ddq_c, tool_c.matrix, velocity_c, acceleration_c,
             tau_filtered, tau_c, dtau_c, dtheta, motor_tau, motor_tau_filtered,
