@@ -8,6 +8,7 @@ import os
 import select
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 from typing import TextIO
@@ -62,7 +63,7 @@ def drop_unread_output() -> None:
                 os.close(nowhere)
 
 
-def print_interruptibly(line: str, stream: TextIO | None = None) -> None:
+def print_interruptibly(line: str, stream: TextIO | None = None, *, unless: Callable[[], bool] | None = None) -> None:
     """Prints a line where handlers of signals only request the end; alone they would not end a write that is not read.
 
     After such a request the rest of the line is dropped if it is not read.
@@ -70,6 +71,7 @@ def print_interruptibly(line: str, stream: TextIO | None = None) -> None:
     Args:
         line: The line.
         stream: Stream; None: stdout.
+        unless: Returns whether the end was requested already: then nothing is printed.
     """
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -81,6 +83,8 @@ def print_interruptibly(line: str, stream: TextIO | None = None) -> None:
     handlers = {int(number): handler for number, handler in found.items() if callable(handler)}
     try:
         with handled_signals(dict.fromkeys(handlers, on_signal)):
+            if unless is not None and unless():
+                return
             target.write(f"{line}\n")
             target.flush()
     except _InterruptedWriteError:

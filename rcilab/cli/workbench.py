@@ -119,7 +119,7 @@ def serve(config: WorkbenchConfig, *, browser: bool) -> int:
     with handled_signals(handlers), _ended_by_memory_error(ending), Workbench(config) as bench:
         is_secret = config.token is not None and not sys.stdout.isatty()
         address = f"{bench.url.partition('?')[0]} with its token" if is_secret else bench.url
-        print_interruptibly(f"rcilab workbench: {address}  (Ctrl-C ends it)")
+        print_interruptibly(f"rcilab workbench: {address}  (Ctrl-C ends it)", unless=ending.is_set)
         problem = ""
         with _browser(bench.url if browser else None, is_private=config.token is not None):
             while not ending.wait(0.5):
